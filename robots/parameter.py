@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One number that a calibration may change, with its unit, its prior and what is known about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A scalar parameter OWNER.NAME of a robot.
+
+    Positive parameters are estimated as logarithms, so they cannot change sign; their prior sigma is then
+    relative to the prior mean.
+
+    Attributes:
+        name: full name, for example "joint1.stiffness".
+        value: present value, in `unit`.
+        unit: SI unit as text.
+        prior: mean of the prior, in `unit`; the start value of the first calibration.
+        prior_sigma: standard deviation of the prior, in `unit`.
+        positive: True if the parameter must stay above zero.
+        fixed: True if calibration must leave it alone.
+        sigma: standard deviation after calibration, in `unit`; None before.
+        published: value from the literature for comparison; None where there is none.
+        effect: id of the effect the parameter belongs to; None for the base model.
+    """
+
+    name: str
+    value: float
+    unit: str
+    prior: float
+    prior_sigma: float
+    positive: bool = True
+    fixed: bool = False
+    sigma: float | None = None
+    published: float | None = None
+    effect: str | None = None
+
+    @property
+    def owner(self) -> str:
+        """What the parameter belongs to: "motor", "joint1", "imu2"."""
+        return self.name.split(".", 1)[0]

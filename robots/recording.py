@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What was measured: named streams of samples, each at its own times.
+
+A Recording holds no model and no resampling. Times are float seconds since the start of the recording; the
+absolute start in nanoseconds is kept so that a sample can be found again in its bag.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Samples of one sensor, or of the command, in the order of their measurement times.
+
+    Attributes:
+        name: key of the sensor in the robot file ("motor_encoder", "imu1"), or "command".
+        times: time of measurement, strictly increasing, shape (n,) [s].
+        values: samples, shape (n, m), in the SI unit of the sensor.
+        channels: name of each column ("joint1.motor_position", "imu1.x", "joint1.command").
+        unit: SI unit of the values ("rad", "rad/s", "1" for a duty cycle, "V", "N m").
+        received: time at which the message was written to the bag, shape (n,) [s].
+    """
+
+    name: str
+    times: Array
+    values: Array
+    channels: tuple[str, ...]
+    unit: str
+    received: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def between(self, t0: float, t1: float) -> Stream:
+        """The samples with t0 <= time < t1 [s]."""
+        i0, i1 = np.searchsorted(self.times, [t0, t1])
+        received = None if self.received is None else self.received[i0:i1]
+        return Stream(self.name, self.times[i0:i1], self.values[i0:i1], self.channels, self.unit, received)
+
+
+@dataclass(frozen=True)
+class Notice:
+    """One thing that the reader did to the data, or saw in them.
+
+    Attributes:
+        stream: name of the stream.
+        kind: one of "duplicate", "out_of_order", "gap", "jitter", "clipping", "dropped", "unit", "info".
+        count: number of samples concerned.
+        text: the whole sentence for the user.
+    """
+
+    stream: str
+    kind: str
+    count: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Recording:
+    """All streams of one bag.
+
+    Attributes:
+        path: where the bag lies, as the user gave it.
+        sha256: hash of the bag's content (for a folder: of its storage files in order), hexadecimal.
+        start_ns: stamp of time zero [ns].
+        streams: by name; always contains "command".
+        notices: what was dropped and why, and what looked odd.
+    """
+
+    path: str
+    sha256: str
+    start_ns: int
+    streams: dict[str, Stream]
+    notices: list[Notice] = field(default_factory=list)
+
+    @property
+    def command(self) -> Stream:
+        """The command stream."""
+        return self.streams["command"]
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample of any stream [s]."""
+        return max(float(s.times[-1]) for s in self.streams.values()) - min(
+            float(s.times[0]) for s in self.streams.values()
+        )
+
+    @property
+    def sample_count(self) -> int:
+        """Number of messages in all streams."""
+        return sum(len(s) for s in self.streams.values())
+
+    def between(self, t0: float, t1: float) -> Recording:
+        """The part with t0 <= time < t1 [s], on the same time axis."""
+        streams = {name: stream.between(t0, t1) for name, stream in self.streams.items()}
+        return Recording(self.path, self.sha256, self.start_ns, streams, self.notices)

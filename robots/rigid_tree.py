@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rigid bodies of a robot: accelerations, mass matrix and body rates with derivatives, from pinocchio.
+
+All functions take many samples at once; pinocchio is called once per sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+
+Array = NDArray[np.float64]
+
+
+class RigidTree:
+    """A tree of rigid bodies with one-axis joints, M(q) a + s c(q, v) + g(q) = tau.
+
+    Args:
+        urdf: path of the URDF.
+        joints: names of the moving joints in the order of the state; all others stay locked.
+        gravity: acceleration of gravity in the base frame, shape (3,) [m/s^2].
+        coriolis: factor s on the Coriolis and centrifugal terms, 0 or 1.
+    """
+
+    def __init__(self, urdf: Path, joints: Sequence[str], gravity: Array, coriolis: bool = True):
+        self.urdf = urdf
+        self.joints = tuple(joints)
+        self.coriolis = coriolis
+        full = _read_urdf(urdf)
+        self.model = _reduce(full, self.joints, urdf)
+        self.model.gravity = pin.Motion(np.asarray(gravity, float), np.zeros(3))
+        self.data = self.model.createData()
+        self.gravity = np.asarray(gravity, float)
+        self._check_inertias()
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all links that can carry a sensor."""
+        return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
+
+    @property
+    def limits(self) -> Array:
+        """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none."""
+        return np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
+
+    @property
+    def velocity_limits(self) -> Array:
+        """Velocity limit of each joint, shape (n,) [rad/s]; infinite where the URDF gives none."""
+        limit = np.array(self.model.velocityLimit, dtype=float)
+        return np.where(limit > 0, limit, np.inf)
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Joint accelerations M^-1 (tau - s c - g).
+
+        Args:
+            q: positions, shape (m, n) [rad].
+            v: velocities, shape (m, n) [rad/s].
+            tau: joint torques, shape (m, n) [N m].
+
+        Returns:
+            Accelerations, shape (m, n) [rad/s^2].
+        """
+        a = np.empty_like(q)
+        v = v if self.coriolis else np.zeros_like(v)
+        model, data, aba = self.model, self.data, pin.aba
+        for k in range(len(q)):
+            a[k] = aba(model, data, q[k], v[k], tau[k])
+        return a
+
+    def acceleration_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
+        """Joint accelerations and their derivatives.
+
+        Args:
+            q: positions, shape (m, n) [rad].
+            v: velocities, shape (m, n) [rad/s].
+            tau: joint torques, shape (m, n) [N m].
+
+        Returns:
+            a, shape (m, n); da/dq, da/dv and M^-1 = da/dtau, each of shape (m, n, n).
+        """
+        m, n = q.shape
+        a, da_dq, da_dv, M_inverse = np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, n)), np.empty((m, n, n))
+        v_used = v if self.coriolis else np.zeros_like(v)
+        model, data, derivatives = self.model, self.data, pin.computeABADerivatives
+        for k in range(m):
+            da_dq[k], da_dv[k], M_inverse[k] = derivatives(model, data, q[k], v_used[k], tau[k])
+            a[k] = data.ddq
+        if not self.coriolis:
+            da_dv[:] = 0.0
+        return a, da_dq, da_dv, M_inverse
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M(q), shape (m, n, n) [kg m^2], for positions q of shape (m, n) [rad]."""
+        M = np.empty((len(q), self.n, self.n))
+        for k in range(len(q)):
+            M[k] = pin.crba(self.model, self.data, q[k])
+        return M
+
+    def body_rate(self, body: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Angular velocity of a body in its own frame, with derivatives.
+
+        Args:
+            body: name of the link.
+            q: positions, shape (m, n) [rad].
+            v: velocities, shape (m, n) [rad/s].
+
+        Returns:
+            omega_body, shape (m, 3) [rad/s]; its derivatives by q and by v, each of shape (m, 3, n).
+        """
+        m, n = q.shape
+        frame = self.frame_id(body)
+        omega, d_dq, d_dv = np.empty((m, 3)), np.empty((m, 3, n)), np.empty((m, 3, n))
+        model, data, local, zero = self.model, self.data, pin.ReferenceFrame.LOCAL, np.zeros(n)
+        for k in range(m):
+            pin.computeForwardKinematicsDerivatives(model, data, q[k], v[k], zero)
+            dq_k, dv_k = pin.getFrameVelocityDerivatives(model, data, frame, local)
+            d_dq[k], d_dv[k] = dq_k[3:], dv_k[3:]
+        np.einsum("kij,kj->ki", d_dv, v, out=omega)
+        return omega, d_dq, d_dv
+
+    def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:
+        """Pose of a body in the base frame: R_base_body, shape (m, 3, 3), and p_base_body, shape (m, 3) [m]."""
+        frame = self.frame_id(body)
+        R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        for k in range(len(q)):
+            pin.forwardKinematics(self.model, self.data, q[k])
+            pose = pin.updateFramePlacement(self.model, self.data, frame)
+            R[k], p[k] = pose.rotation, pose.translation
+        return R, p
+
+    def frame_id(self, body: str) -> int:
+        """Index of a link in pinocchio's frames."""
+        if body not in self.bodies:
+            raise RobotError(f"{self.urdf.name} has no link {body!r}; it has {', '.join(self.bodies)}")
+        return self.model.getFrameId(body, pin.FrameType.BODY)
+
+    def _check_inertias(self) -> None:
+        for joint, inertia in zip(self.model.names, self.model.inertias, strict=True):
+            if joint == "universe":
+                continue
+            moments = np.linalg.eigvalsh(inertia.inertia)
+            if inertia.mass < 0 or moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+                raise RobotError(
+                    f"{self.urdf.name}: the body moved by {joint} has an impossible inertia: principal moments "
+                    f"{', '.join(f'{x:.4g}' for x in moments)} kg m2, mass {inertia.mass:g} kg; expected positive "
+                    "moments of which none is larger than the sum of the other two"
+                )
+
+
+def _read_urdf(urdf: Path) -> pin.Model:
+    if not urdf.is_file():
+        raise RobotError(f"the URDF {urdf} does not exist; set `urdf` in the robot file, relative to that file")
+    try:
+        return pin.buildModelFromUrdf(str(urdf))
+    except Exception as err:
+        raise RobotError(f"{urdf} is not a URDF that pinocchio can read: {str(err).splitlines()[0]}") from err
+
+
+def _reduce(model: pin.Model, joints: tuple[str, ...], urdf: Path) -> pin.Model:
+    """The model with only `joints` moving, all others locked at zero."""
+    known = list(model.names)[1:]
+    unknown = [joint for joint in joints if joint not in known]
+    if unknown:
+        raise RobotError(f"{urdf.name} has no moving joint {unknown[0]!r}; it has {', '.join(known)}")
+    locked = [model.getJointId(name) for name in known if name not in joints]
+    reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    if tuple(list(reduced.names)[1:]) != joints:
+        raise RobotError(f"joints must be listed as in {urdf.name}: {', '.join(list(reduced.names)[1:])}")
+    if reduced.nq != len(joints) or reduced.nv != len(joints):
+        raise RobotError(f"{urdf.name}: continuous and floating joints are not supported; use revolute or prismatic")
+    return reduced

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot with elastic joints: rigid tree, drives, sensors, parameters and their priors.
+
+A Robot is immutable; a calibration returns a new one. It is read from and written to a robot file (robot_file.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.parameter import Parameter
+from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelChoices:
+    """Choices of the model that are not parameters.
+
+    Attributes:
+        integrator: "euler" (eq. 31), "midpoint" or "simpson".
+        coriolis: whether c(q, v) is part of the model.
+        friction_velocity: "motor", or "link" as eq. (12) is printed.
+        friction_sharpness: k in tanh(k v) [s/rad].
+        bias_at_rest: whether gyro samples before the first command measure the bias directly (eq. 32).
+    """
+
+    integrator: str = "simpson"
+    coriolis: bool = True
+    friction_velocity: str = "motor"
+    friction_sharpness: float = 200.0
+    bias_at_rest: bool = False
+
+
+@dataclass(frozen=True)
+class ProcessNoise:
+    """Random walk of the velocities between ticks.
+
+    Attributes:
+        estimate: whether a calibration estimates the densities.
+        model: "integrated" (the positions follow from the velocities) or "independent" (eq. 36).
+        link_velocity: density of each link equation, shape (n_joints,) [rad/s/sqrt(s)].
+        motor_velocity: density of each motor equation, shape (n_joints,) [rad/s/sqrt(s)].
+        position: density of the positions for model "independent" [rad/sqrt(s)].
+    """
+
+    estimate: bool
+    model: str
+    link_velocity: Array
+    motor_velocity: Array
+    position: float = 0.0
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Everything that is known about a robot.
+
+    Attributes:
+        name: short name.
+        description: one sentence.
+        tree: rigid bodies.
+        joints: names of the joints, base to tip.
+        choices: model choices.
+        constants: known numbers by name ("motor.supply_voltage" [V]).
+        command: where the commands are; its unit is "duty", "V" or "N m".
+        sensors: by name.
+        parameters: by full name, in the order of the file.
+        noise: process noise.
+        path: the file it was read from.
+        document: the file's content with comments, for writing it again.
+    """
+
+    name: str
+    description: str
+    tree: RigidTree
+    joints: tuple[str, ...]
+    choices: ModelChoices
+    constants: Mapping[str, float]
+    command: Topic
+    sensors: Mapping[str, Sensor]
+    parameters: Mapping[str, Parameter]
+    noise: ProcessNoise
+    path: Path
+    document: Any
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def motor_encoder(self) -> MotorEncoder:
+        """The encoders on the motors."""
+        for sensor in self.sensors.values():
+            if isinstance(sensor, MotorEncoder):
+                return sensor
+        raise RobotError(f"robot {self.name!r} has no sensor of kind motor_encoder")
+
+    @property
+    def gyros(self) -> tuple[Gyro, ...]:
+        """All gyroscopes."""
+        return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, Gyro))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of all measured channels."""
+        return tuple(channel for sensor in self.sensors.values() for channel in sensor.channels)
+
+    @property
+    def command_volts(self) -> float:
+        """Volts per unit of command, where the command is a duty cycle or a voltage."""
+        return self.constants.get("motor.supply_voltage", 1.0) if self.command.unit == "duty" else 1.0
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name.
+
+        Raises:
+            RobotError: there is none; the message lists the names.
+        """
+        if name not in self.parameters:
+            raise RobotError(f"robot {self.name!r} has no parameter {name!r}; it has {', '.join(self.parameters)}")
+        return self.parameters[name]
+
+    def drive_parameter(self, joint: str, name: str) -> Parameter:
+        """A parameter of a joint's drive: the joint's own if it has one, else the one all motors share."""
+        own = f"{joint}.{name}"
+        return self.parameters[own] if own in self.parameters else self.parameter(f"motor.{name}")
+
+    def with_values(self, values: Mapping[str, float]) -> Robot:
+        """The same robot with other parameter values, given by full name."""
+        parameters = dict(self.parameters)
+        for name, value in values.items():
+            parameters[name] = replace(self.parameter(name), value=float(value))
+        return replace(self, parameters=parameters)
+
+    def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
+        """The same robot with some sensors replaced."""
+        return replace(self, sensors={**self.sensors, **sensors})

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robot files: YAML in, Robot out, and back again with all comments.
+
+Ready robots are the YAML files below `robots/`; every other name is a path.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml import YAML, YAMLError
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.parameter import Parameter
+from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
+from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+from jointscope.robots.units import UNITS, si_unit
+from jointscope.robots.yaml_section import Section, did_you_mean
+
+FORMAT = 1
+READY_ROOT = Path(__file__).parent
+READY_PREFIX = "ready:"
+
+INTEGRATORS = ("euler", "midpoint", "simpson")
+GYRO_FORMS = ("full", "vertical", "relative")
+COMMAND_UNITS = ("duty", "V", "N m")
+DRIVE_PARAMETERS = ("k_pwm", "k_mi", "inertia")
+JOINT_PARAMETERS = ("coulomb_torque", "stiffness", "damping")
+
+
+def ready_robots() -> dict[str, Path]:
+    """The robots that come with the package: name and file."""
+    return {path.stem: path for path in sorted(READY_ROOT.glob("*/*.yaml"))}
+
+
+def load_robot(name_or_path: str | Path) -> Robot:
+    """Reads a robot.
+
+    Args:
+        name_or_path: name of a ready robot, or path of a robot file.
+
+    Returns:
+        The robot.
+
+    Raises:
+        RobotError: no such robot, not YAML, unknown keys, wrong types, impossible values.
+    """
+    path = _find(str(name_or_path))
+    document = read_document(path)
+    top = Section(document, path.name)
+    format_number = top.number("format")
+    if format_number != FORMAT:
+        raise RobotError(f"{path.name}: format {format_number:g} is not known; this version reads format {FORMAT}")
+    joints = top.texts("joints")
+    if len(set(joints)) != len(joints) or not joints:
+        raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
+    choices = top.section("model", {}).build(_model_choices)
+    gravity = top.array("gravity", (3,))
+    tree = RigidTree(_urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis)
+    constants = {key: top.section("constants", {}).number(key) for key in top.section("constants", {}).keys()}
+    command = top.section("command").build(lambda s: _topic(s, joints, COMMAND_UNITS))
+    sensors = {name: section.build(_sensor(name, joints)) for name, section in top.section("sensors").sections()}
+    parameters = {
+        name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()
+    }
+    noise = top.section("noise").build(lambda s: _noise(s, len(joints)))
+    robot = Robot(
+        name=top.text("name"),
+        description=top.text("description", ""),
+        tree=tree,
+        joints=joints,
+        choices=choices,
+        constants=constants,
+        command=command,
+        sensors=sensors,
+        parameters=parameters,
+        noise=noise,
+        path=path,
+        document=document,
+    )
+    top.raw("calibration")
+    top.finish()
+    _check(robot)
+    return robot
+
+
+def read_document(path: Path) -> Any:
+    """The content of a YAML file with its comments.
+
+    Raises:
+        RobotError: the file cannot be read or is not YAML.
+    """
+    try:
+        document = _yaml().load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as err:
+        raise RobotError(f"cannot read the robot file {path}: {err}") from err
+    except YAMLError as err:
+        raise RobotError(f"{path.name} is not YAML: {' '.join(str(err).split())[:200]}") from err
+    return document
+
+
+def dump_document(document: Any) -> str:
+    """A YAML document as text, comments included."""
+    stream = io.StringIO()
+    _yaml().dump(document, stream)
+    return stream.getvalue()
+
+
+def urdf_reference(urdf: Path, folder: Path) -> str:
+    """How a robot file in `folder` names a URDF: "ready:..." for those of the package, else a relative path."""
+    urdf = urdf.resolve()
+    if urdf.is_relative_to(READY_ROOT.resolve()):
+        return READY_PREFIX + urdf.relative_to(READY_ROOT.resolve()).as_posix()
+    return Path(os.path.relpath(urdf, folder.resolve())).as_posix()
+
+
+def _yaml() -> YAML:
+    yaml = YAML()
+    yaml.width = 160
+    yaml.preserve_quotes = True
+    return yaml
+
+
+def _find(name_or_path: str) -> Path:
+    ready = ready_robots()
+    if name_or_path in ready:
+        return ready[name_or_path]
+    path = Path(name_or_path)
+    if not path.is_file():
+        raise RobotError(
+            f"no robot {name_or_path!r}: neither a file nor a ready robot ({', '.join(ready)})"
+        )
+    return path
+
+
+def _urdf_path(reference: str, robot_file: Path) -> Path:
+    if reference.startswith(READY_PREFIX):
+        return READY_ROOT / reference.removeprefix(READY_PREFIX)
+    return robot_file.parent / reference
+
+
+def _model_choices(section: Section) -> ModelChoices:
+    return ModelChoices(
+        integrator=section.text("integrator", "simpson", INTEGRATORS),
+        coriolis=section.flag("coriolis", True),
+        friction_velocity=section.text("friction_velocity", "motor", ("motor", "link")),
+        friction_sharpness=section.number("friction_sharpness", 200.0, positive=True),
+        bias_at_rest=section.flag("bias_at_rest", False),
+    )
+
+
+def _topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = ()) -> Topic:
+    unit = section.text("unit", choices=units or tuple(UNITS))
+    names = section.texts("names", joints)
+    if joints and len(names) != len(joints):
+        raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
+    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names)
+
+
+def _sensor(name: str, joints: tuple[str, ...]) -> Any:
+    def make(section: Section) -> Sensor:
+        kind = section.text("kind", choices=("motor_encoder", "gyro"))
+        return _motor_encoder(name, section, joints) if kind == "motor_encoder" else _gyro(name, section)
+
+    return make
+
+
+def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
+    topic = _topic(section, joints)
+    if si_unit(topic.unit) != "rad":
+        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {topic.unit!r}")
+    zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
+    return MotorEncoder(name, topic, section.number("sigma", positive=True), zero, joints)
+
+
+def _gyro(name: str, section: Section) -> Gyro:
+    topic = _topic(section)
+    if si_unit(topic.unit) != "rad/s":
+        raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {topic.unit!r}")
+    form = section.text("form", "full", GYRO_FORMS)
+    bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
+    rotation = section.section("R_imu_body")
+    R = _rotation(rotation.array("value", (3, 3)), rotation.place)
+    gyro = Gyro(
+        name=name,
+        source=topic,
+        body=section.text("body"),
+        form=form,
+        sigma=section.number("sigma", positive=True),
+        bias=bias.array("value", (3,)),
+        bias_prior_sigma=bias.number("prior_sigma", 0.1, positive=True),
+        R_imu_body=R,
+        R_prior=_rotation(rotation.array("prior", (3, 3), R), rotation.place),
+        R_prior_sigma=rotation.number("prior_sigma", 0.1, positive=True),
+        reference=section.text("reference") if form == "relative" else None,
+        bias_sigma=bias.array("sigma", (3,), None),
+        R_sigma=rotation.array("sigma", (3,), None),
+    )
+    bias.finish()
+    rotation.finish()
+    return gyro
+
+
+def _rotation(R: np.ndarray, place: str) -> np.ndarray:
+    """The rotation nearest to a printed matrix, which has few digits."""
+    U, _, Vt = np.linalg.svd(R)
+    nearest = U @ Vt
+    if np.linalg.det(nearest) < 0 or np.abs(nearest - R).max() > 0.02:
+        raise RobotError(f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1")
+    return nearest
+
+
+def _parameter(name: str) -> Any:
+    def make(section: Section) -> Parameter:
+        fixed = section.flag("fixed", False)
+        positive = section.flag("positive", True)
+        value = section.number("value", positive=positive)
+        return Parameter(
+            name=name,
+            value=value,
+            unit=section.text("unit"),
+            prior=section.number("prior", value, positive=positive),
+            prior_sigma=section.number("prior_sigma", abs(value) or 1.0, positive=True),
+            positive=positive,
+            fixed=fixed,
+            sigma=section.number("sigma", None),
+            published=section.number("published", None),
+        )
+
+    return make
+
+
+def _noise(section: Section, n: int) -> ProcessNoise:
+    model = section.text("model", "integrated", ("integrated", "independent"))
+    noise = ProcessNoise(
+        estimate=section.flag("estimate", True),
+        model=model,
+        link_velocity=section.array("link_velocity", (n,)),
+        motor_velocity=section.array("motor_velocity", (n,)),
+        position=section.number("position", positive=True) if model == "independent" else 0.0,
+    )
+    for key in ("link_velocity", "motor_velocity"):
+        if np.any(getattr(noise, key) <= 0):
+            raise RobotError(f"{section.place}.{key}: expected numbers above zero")
+    return noise
+
+
+def _check(robot: Robot) -> None:
+    """Checks what only the whole robot shows."""
+    place = robot.path.name
+    for gyro in robot.gyros:
+        if gyro.body not in robot.tree.bodies:
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.body: no link {gyro.body!r}{did_you_mean(gyro.body, robot.tree.bodies)}"
+            )
+        if gyro.reference is not None and gyro.reference not in {g.name for g in robot.gyros}:
+            raise RobotError(f"{place}: sensors.{gyro.name}.reference: no gyro {gyro.reference!r}")
+    robot.motor_encoder  # noqa: B018  raises where there is none
+    known = {f"{owner}.{name}" for owner in ("motor", *robot.joints) for name in DRIVE_PARAMETERS}
+    known |= {f"{joint}.{name}" for joint in robot.joints for name in JOINT_PARAMETERS}
+    for name in robot.parameters:
+        if name not in known:
+            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, known)}")
+    needed = DRIVE_PARAMETERS if robot.command.unit != "N m" else ("inertia",)
+    for joint in robot.joints:
+        for name in needed:
+            robot.drive_parameter(joint, name)
+        for name in JOINT_PARAMETERS:
+            robot.parameter(f"{joint}.{name}")
+    if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
+        raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sensors of a robot: where their samples are in a bag, and what they measure of the state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Topic:
+    """Where the samples of one stream are in a bag.
+
+    Attributes:
+        topic: name of the topic.
+        msgtype: ROS type, for example "sensor_msgs/msg/JointState".
+        field: field of the message that holds the sample, dots descend ("angular_velocity").
+        unit: unit in the bag; converted to SI when read.
+        names: name in the message for each joint of the robot, in the robot's order; empty for streams without names.
+    """
+
+    topic: str
+    msgtype: str
+    field: str
+    unit: str
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MotorEncoder:
+    """Encoders on all motors, in link units: theta_measured = q_motor + zero + noise (eq. 20).
+
+    Attributes:
+        name: key in the robot file.
+        source: topic.
+        sigma: standard deviation of the noise [rad].
+        zero: reading at q_motor = 0, shape (n_joints,) [rad].
+        joints: names of the joints.
+    """
+
+    name: str
+    source: Topic
+    sigma: float
+    zero: NDArray[np.float64]
+    joints: tuple[str, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per joint."""
+        return tuple(f"{joint}.motor_position" for joint in self.joints)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of a sample."""
+        return "rad"
+
+
+@dataclass(frozen=True)
+class Gyro:
+    """A three-axis gyroscope on a body: omega_imu = R_imu_body omega_body + bias + noise.
+
+    Attributes:
+        name: key in the robot file ("imu1").
+        source: topic.
+        body: URDF link that carries the sensor.
+        form: "full" (three components predicted from the state), "vertical" (eq. 22: only the component along the
+            joint axis) or "relative" (eq. 26: predicted from the measured rate of the gyro named in `reference`).
+        sigma: standard deviation of the noise of each component [rad/s].
+        bias: offset in the sensor frame, shape (3,) [rad/s].
+        bias_prior_sigma: standard deviation of the prior of the bias [rad/s].
+        R_imu_body: rotation from body to sensor coordinates, shape (3, 3).
+        R_prior: mean of the rotation's prior, shape (3, 3).
+        R_prior_sigma: standard deviation of the rotation's prior about each axis of the body [rad].
+        reference: for form "relative": the gyro whose measured rate is used.
+        bias_sigma, R_sigma: standard deviations after calibration, shape (3,) [rad/s], [rad]; None before.
+    """
+
+    name: str
+    source: Topic
+    body: str
+    form: str
+    sigma: float
+    bias: NDArray[np.float64]
+    bias_prior_sigma: float
+    R_imu_body: NDArray[np.float64]
+    R_prior: NDArray[np.float64]
+    R_prior_sigma: float
+    reference: str | None = None
+    bias_sigma: NDArray[np.float64] | None = None
+    R_sigma: NDArray[np.float64] | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per axis."""
+        return tuple(f"{self.name}.{axis}" for axis in AXES)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of a sample."""
+        return "rad/s"
+
+
+Sensor = MotorEncoder | Gyro
