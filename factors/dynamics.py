@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the dynamics factors have in common, and the choice between them by the robot's integrator."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.factor import Linearization
+from jointscope.factors.step import Steps, row_names
+from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.robots.robot import ProcessNoise
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DynamicsFactor(ABC):
+    """The equations of motion between two ticks; residual = integrated motion that the model does not explain.
+
+    Attributes:
+        model: accelerations.
+        steps: step lengths, commands and noise.
+        joints: names of the joints.
+    """
+
+    model: ElasticJoints
+    steps: Steps
+    joints: tuple[str, ...]
+
+    name = "dynamics"
+    states = 2
+    blocks = (DYNAMICS,)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows: velocities, then positions; link before motor."""
+        return row_names(self.joints)
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations of the rows, shape (m, 4n) [rad/s], [rad]."""
+        return self.steps.sigmas
+
+    def select(self, samples: slice) -> DynamicsFactor:
+        """The same factor for some of the steps."""
+        return replace(self, steps=self.steps.select(samples))
+
+    def with_noise(self, noise: ProcessNoise) -> DynamicsFactor:
+        """The same factor with another process noise."""
+        return replace(self, steps=replace(self.steps, noise=noise))
+
+    def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
+        """Defects of velocities and positions over each step, shape (m, 4n)."""
+        d_v, d_q = self.defects(x[0], x[1], calibration.values)
+        return self.steps.combine(d_v, d_q)
+
+    def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
+        """Defects and derivatives."""
+        return self.linearize_pairs(x[0], x[1], calibration)
+
+    def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
+        """As `linearize` for consecutive ticks, x of shape (m + 1, 4n); may share work between steps."""
+        return self.linearize_pairs(x[:-1], x[1:], calibration)
+
+    @abstractmethod
+    def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
+        """Velocity and position defects, shape (m, 2n) each."""
+
+    @abstractmethod
+    def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
+        """Defects and derivatives for m pairs of states."""
+
+    def assemble(
+        self,
+        defects: tuple[Array, Array],
+        by_x0: tuple[Array, Array],
+        by_x1: tuple[Array, Array],
+        by_parameter: tuple[Array, Array],
+        calibration: Calibration,
+    ) -> Linearization:
+        """Puts the velocity and position halves together and changes parameters to coordinates."""
+        dynamics = self.steps.combine(*by_parameter) * calibration.value_by_coordinate
+        return Linearization(
+            self.steps.combine(*defects),
+            (self.steps.combine(*by_x0), self.steps.combine(*by_x1)),
+            {DYNAMICS: dynamics},
+        )

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gyroscope on any body, all three components predicted from the state.
+
+    residual = R_imu_body omega_body(q_link, v_link) + bias - omega_measured
+
+Variables: X at the time of the sample, rotation and bias of the gyro. A rotation changes as R exp(delta), so the
+derivative by delta is -R [omega_body]x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration, bias_block, rotation_block
+from jointscope.factors.factor import Linearization
+from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.sensors import Gyro
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GyroFactor:
+    """Residual = predicted - measured angular rate in the sensor frame.
+
+    Attributes:
+        sensor: the gyro.
+        tree: rigid bodies.
+        measured: rates, shape (m, 3) [rad/s].
+    """
+
+    sensor: Gyro
+    tree: RigidTree
+    measured: Array
+
+    states = 1
+
+    def __len__(self) -> int:
+        return len(self.measured)
+
+    @property
+    def name(self) -> str:
+        """Name of the sensor."""
+        return self.sensor.name
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.sensor.channels
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Rotation and bias of this gyro."""
+        return (rotation_block(self.name), bias_block(self.name))
+
+    @property
+    def sigmas(self) -> Array:
+        """Noise of each component, shape (3,) [rad/s]."""
+        return np.full(3, self.sensor.sigma)
+
+    def select(self, samples: slice) -> GyroFactor:
+        """The same factor for some of the samples."""
+        return replace(self, measured=self.measured[samples])
+
+    def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
+        """Predicted - measured, shape (m, 3) [rad/s]."""
+        n = self.tree.n
+        omega_body = self.tree.body_rate(self.sensor.body, x[0][:, :n], x[0][:, n : 2 * n])[0]
+        R = calibration.rotations[self.name]
+        return omega_body @ R.T + calibration.biases[self.name] - self.measured
+
+    def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
+        """Residual and derivatives."""
+        m, n = len(self.measured), self.tree.n
+        omega_body, by_q, by_v = self.tree.body_rate(self.sensor.body, x[0][:, :n], x[0][:, n : 2 * n])
+        R = calibration.rotations[self.name]
+        by_state = np.zeros((m, 3, 4 * n))
+        by_state[:, :, :n] = R @ by_q
+        by_state[:, :, n : 2 * n] = R @ by_v
+        by_block = {
+            rotation_block(self.name): -R @ skew(omega_body),
+            bias_block(self.name): np.broadcast_to(np.eye(3), (m, 3, 3)),
+        }
+        residual = omega_body @ R.T + calibration.biases[self.name] - self.measured
+        return Linearization(residual, (by_state,), by_block)
+
+
+def skew(w: Array) -> Array:
+    """Matrices [w]x with [w]x u = w x u, for vectors of shape (m, 3); shape (m, 3, 3)."""
+    matrix = np.zeros((len(w), 3, 3))
+    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
+    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = w[:, 2], -w[:, 1], w[:, 0]
+    return matrix

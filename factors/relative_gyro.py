@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The paper's second gyro: predicted from the measured rate of the first, eqs. (25) to (29).
+
+    residual = R_imu2 (R_body_reference(q) omega_1 + omega_relative(q, v)) + bias_2 - omega_2_measured
+    omega_1  = R_imu1^T (omega_1_measured - bias_1)
+
+Variables: X at the time of the sample, rotations and biases of both gyros. Feeding measured rates into the
+prediction hides every motion of the first body that the model does not know. The frames are those of the chain
+z, y, -x: eq. (29) as printed is not a rotation, and (26) as printed forgets the bias that (23) subtracts.
+Schuethe, Wenk, Frese (2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration, bias_block, rotation_block
+from jointscope.factors.factor import Linearization
+from jointscope.factors.gyro import skew
+from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.sensors import Gyro
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RelativeGyroFactor:
+    """Residual = rate predicted from another gyro and the joints in between - measured rate.
+
+    Attributes:
+        sensor: the gyro.
+        reference: the gyro further down the tree, on the body that the first joint moves.
+        tree: rigid bodies.
+        measured: rates of `sensor`, shape (m, 3) [rad/s].
+        measured_reference: rates of `reference` at the same times, shape (m, 3) [rad/s].
+    """
+
+    sensor: Gyro
+    reference: Gyro
+    tree: RigidTree
+    measured: Array
+    measured_reference: Array
+
+    states = 1
+
+    def __len__(self) -> int:
+        return len(self.measured)
+
+    @property
+    def name(self) -> str:
+        """Name of the sensor."""
+        return self.sensor.name
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Channels."""
+        return self.sensor.channels
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Rotations and biases of both gyros."""
+        own, other = self.name, self.reference.name
+        return (rotation_block(other), rotation_block(own), bias_block(other), bias_block(own))
+
+    @property
+    def sigmas(self) -> Array:
+        """Noise of each component, shape (3,) [rad/s]."""
+        return np.full(3, self.sensor.sigma)
+
+    def select(self, samples: slice) -> RelativeGyroFactor:
+        """The same factor for some of the samples."""
+        return replace(
+            self, measured=self.measured[samples], measured_reference=self.measured_reference[samples]
+        )
+
+    def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
+        """Predicted - measured, shape (m, 3) [rad/s]."""
+        return self.linearize(x, calibration).residual
+
+    def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
+        """Residual and derivatives."""
+        m, n = len(self.measured), self.tree.n
+        q, v = x[0][:, :n], x[0][:, n : 2 * n]
+        own, other = self.name, self.reference.name
+        R_own, R_other = calibration.rotations[own], calibration.rotations[other]
+        v_between = v.copy()
+        v_between[:, 0] = 0.0
+        omega_relative, by_q, by_v = self.tree.body_rate(self.sensor.body, q, v_between)
+        by_q, by_v = by_q.copy(), by_v.copy()
+        omega_1 = (self.measured_reference - calibration.biases[other]) @ R_other
+        R_body_reference = self._R_body_reference(q)
+        carried = np.einsum("kij,kj->ki", R_body_reference, omega_1)
+        # turning a joint in between turns the body away from the carried rate, about the joint's axis in the body
+        for j in range(1, n):
+            by_q[:, :, j] -= np.cross(by_v[:, :, j], carried)
+        by_v[:, :, 0] = 0.0
+        omega_body = carried + omega_relative
+        by_state = np.zeros((m, 3, 4 * n))
+        by_state[:, :, :n] = R_own @ by_q
+        by_state[:, :, n : 2 * n] = R_own @ by_v
+        by_block = {
+            rotation_block(own): -R_own @ skew(omega_body),
+            bias_block(own): np.broadcast_to(np.eye(3), (m, 3, 3)),
+            rotation_block(other): R_own @ R_body_reference @ skew(omega_1),
+            bias_block(other): -R_own @ R_body_reference @ R_other.T,
+        }
+        residual = omega_body @ R_own.T + calibration.biases[own] - self.measured
+        return Linearization(residual, (by_state,), by_block)
+
+    def _R_body_reference(self, q: Array) -> Array:
+        """Rotation from the reference gyro's body to this body, shape (m, 3, 3)."""
+        R_base_body, _ = self.tree.body_poses(self.sensor.body, q)
+        R_base_reference, _ = self.tree.body_poses(self.reference.body, q)
+        return R_base_body.transpose(0, 2, 1) @ R_base_reference

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Levenberg-Marquardt over all samples of all recordings, linearised in batches.
+
+It minimises the same cost as the GTSAM graph of reference_graph.py; a test shows that both end in the same point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.factor import Factor
+from jointscope.factors.priors import DynamicsPrior, RotationPrior
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.banded_solver import Elimination, eliminate
+from jointscope.graphs.normal_equations import NormalEquations, build, cost
+from jointscope.graphs.shared_layout import SharedLayout
+from jointscope.robots.errors import SolveError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+LAMBDA_START = 1e-9
+LAMBDA_FACTOR = 30.0
+LAMBDA_LARGEST = 1e8
+STEP_TOLERANCE = 0.02  # [sigma] a shared value that moves less has arrived
+COST_TOLERANCE = 1e-7  # relative fall of the cost
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """States and shared values of all recordings.
+
+    Attributes:
+        states: states of each recording, shape (m + 1, 4n).
+        calibrations: shared values with the biases of each recording.
+    """
+
+    states: tuple[Array, ...]
+    calibrations: tuple[Calibration, ...]
+
+    def moved(self, dx: Sequence[Array], dp: Array, shared: SharedLayout) -> Estimate:
+        """The estimate after a step."""
+        return Estimate(
+            tuple(x + d for x, d in zip(self.states, dx, strict=True)),
+            tuple(c.retract(shared.step(dp, i)) for i, c in enumerate(self.calibrations)),
+        )
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """What happened in one iteration: cost before and after, damping, largest step in sigmas."""
+
+    cost_before: float
+    cost_after: float
+    damping: float
+    step_in_sigmas: float
+
+
+@dataclass
+class Solution:
+    """Result of a batch solve.
+
+    Attributes:
+        estimate: the minimum.
+        cost: half the sum of squared whitened residuals.
+        iterations: history.
+        hessian: Hessian on the shared values with all states eliminated, at the last linearization, shape (s, s).
+        shared: layout of the shared values.
+        converged: False if the iterations ended before the step became small.
+    """
+
+    estimate: Estimate
+    cost: float
+    hessian: Array
+    shared: SharedLayout
+    iterations: list[Iteration] = field(default_factory=list)
+    converged: bool = False
+
+
+def priors_of(problem: BagProblem) -> list[Factor]:
+    """The priors that all recordings share: dynamics and rotations."""
+    robot = problem.robot
+    return [DynamicsPrior.of(robot), *(RotationPrior(gyro) for gyro in robot.gyros)]
+
+
+def solve(
+    problems: Sequence[BagProblem],
+    start: Estimate,
+    *,
+    max_iterations: int = 30,
+    step_tolerance: float = STEP_TOLERANCE,
+    hold: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Solution:
+    """Minimises the cost of all recordings together.
+
+    Args:
+        problems: factors of each recording, all of one robot.
+        start: where to begin.
+        max_iterations: linearizations at the most; the solution says whether it converged.
+        step_tolerance: largest step of a shared value, in its sigmas, at which it has converged.
+        hold: blocks that stay at their start, for example "dynamics".
+        progress: called with a text and the share done.
+
+    Raises:
+        SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
+    """
+    shared = SharedLayout.of(start.calibrations[0], len(problems))
+    free = _free(shared, hold)
+    estimate, damping = start, LAMBDA_START
+    solution = Solution(start, total_cost(problems, start), np.zeros((shared.size, shared.size)), shared)
+    if not np.isfinite(solution.cost):
+        raise SolveError("the cost at the start is not finite; check start values and recording")
+    for i in range(max_iterations):
+        if progress:
+            progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
+        systems = [build(p, x, c) for p, x, c in zip(problems, estimate.states, estimate.calibrations, strict=True)]
+        while True:
+            eliminations = [eliminate(system, damping) for system in systems]
+            H, g = reduced_system(problems[0], systems, eliminations, shared, estimate.calibrations[0])
+            dp, step_in_sigmas = _step(H, g, free, damping)
+            dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
+            trial = estimate.moved(dx, dp, shared)
+            trial_cost = total_cost(problems, trial)
+            if np.isfinite(trial_cost) and trial_cost <= solution.cost * (1.0 + 1e-12):
+                break
+            damping *= LAMBDA_FACTOR
+            if damping > LAMBDA_LARGEST:
+                if step_in_sigmas < step_tolerance:
+                    solution.converged = True
+                    return solution
+                raise SolveError(
+                    f"the cost {solution.cost:.6g} cannot be lowered any further although the next step is "
+                    f"{step_in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
+                )
+        fall = (solution.cost - trial_cost) / max(solution.cost, 1e-300)
+        solution.iterations.append(Iteration(solution.cost, trial_cost, damping, step_in_sigmas))
+        estimate, damping = trial, max(damping / LAMBDA_FACTOR, 1e-12)
+        solution.estimate, solution.cost, solution.hessian = estimate, trial_cost, H
+        if step_in_sigmas < step_tolerance and fall < 1e-3 or fall < COST_TOLERANCE and damping < LAMBDA_START:
+            solution.converged = True
+            break
+    return solution
+
+
+def total_cost(problems: Sequence[BagProblem], estimate: Estimate) -> float:
+    """Cost of all recordings and of the priors they share."""
+    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
+    total = sum(cost(problem, x, calibration) for problem, x, calibration in bags)
+    for prior in priors_of(problems[0]):
+        total += 0.5 * float(np.sum((prior.residual((), estimate.calibrations[0]) / prior.sigmas) ** 2))
+    return total
+
+
+def reduced_system(
+    problem: BagProblem,
+    systems: Sequence[NormalEquations],
+    eliminations: Sequence[Elimination],
+    shared: SharedLayout,
+    calibration: Calibration,
+) -> tuple[Array, Array]:
+    """Hessian and gradient on the shared values of all recordings, states eliminated, priors added."""
+    H, g = np.zeros((shared.size, shared.size)), np.zeros(shared.size)
+    for bag, elimination in enumerate(eliminations):
+        index = shared.indices(bag)
+        H[np.ix_(index, index)] += elimination.S
+        g[index] += elimination.s
+    for prior in priors_of(problem):
+        linear = prior.linearize((), calibration)
+        for block, J in linear.by_block.items():
+            columns = shared.columns[block]
+            J = J[0] / prior.sigmas[:, None]
+            H[columns, columns] += J.T @ J
+            g[columns] += J.T @ (linear.residual[0] / prior.sigmas)
+    return H, g
+
+
+def _free(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
+    """Indices of the shared values that may change."""
+    held = np.zeros(shared.size, dtype=bool)
+    for bag in range(shared.bags):
+        for block in hold:
+            held[shared.indices(bag)[shared.columns[block]]] = True
+    return np.flatnonzero(~held)
+
+
+def _step(H: Array, g: Array, free: NDArray[np.intp], damping: float) -> tuple[Array, float]:
+    """Damped step of the shared values, and the largest undamped one in sigmas."""
+    dp = np.zeros(len(g))
+    if len(free) == 0:
+        return dp, 0.0
+    block = H[np.ix_(free, free)]
+    try:
+        factor = cho_factor(block + damping * np.diag(np.diag(block)))
+    except np.linalg.LinAlgError as err:
+        raise SolveError("the shared values are not determined: their Hessian is not positive definite") from err
+    dp[free] = -cho_solve(factor, g[free])
+    # Newton decrement per value: step over its conditional-free sigma
+    sigma = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(free)))), 0.0))
+    return dp, float(np.max(np.abs(dp[free]) / sigma))

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a comparison of models with a recording found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+OPEN_LOOP = "open_loop"
+
+
+@dataclass(frozen=True)
+class ChannelComparison:
+    """How well one channel is predicted.
+
+    Attributes:
+        horizons: root mean square of measured - predicted by horizon: "0.01", "0.1", "1.0" [s] and "open_loop".
+        fit_percent: 100 (1 - |measured - predicted| / |measured - mean|), norms over the recording, 0.1 s ahead.
+        noise_sigma: standard deviation of the sensor.
+        unit: SI unit of rmse and sigma.
+    """
+
+    horizons: dict[str, float]
+    fit_percent: float
+    noise_sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class WorstWindow:
+    """A stretch of time in which one channel is predicted badly.
+
+    Attributes:
+        channel: name of the channel.
+        t0, t1: limits [s].
+        share: share of the whole squared error (0.1 s ahead, all channels) that falls into the window.
+    """
+
+    channel: str
+    t0: float
+    t1: float
+    share: float
+
+
+@dataclass(frozen=True)
+class SensorPrediction:
+    """Measured and predicted samples of one sensor.
+
+    Attributes:
+        channels: names of the columns.
+        unit: SI unit.
+        sigma: standard deviation of the sensor.
+        times: sample times, shape (m,) [s].
+        measured: shape (m, c).
+        open_loop: predicted from the first state with the recorded commands alone, shape (m, c).
+        ahead: predicted 0.1 s ahead from the causal state, shape (m, c); NaN where no prediction ends.
+    """
+
+    channels: tuple[str, ...]
+    unit: str
+    sigma: float
+    times: Array
+    measured: Array
+    open_loop: Array
+    ahead: Array
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """One model against the recording.
+
+    Attributes:
+        label: how the user named it.
+        robot: the model.
+        error: root mean square over all channels of the 0.1 s ahead error in sensor sigmas.
+        floor: the same from sensor noise and state uncertainty alone.
+        channels: by name.
+        worst: worst windows first.
+        sensors: predictions by sensor name.
+    """
+
+    label: str
+    robot: Robot
+    error: float
+    floor: float
+    channels: dict[str, ChannelComparison]
+    worst: tuple[WorstWindow, ...]
+    sensors: dict[str, SensorPrediction]
+
+
+@dataclass(frozen=True)
+class ComparisonResult:
+    """All models against one recording."""
+
+    recording: Recording
+    models: tuple[ModelComparison, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of `--json` as INTERFACE promises it."""
+        return {"models": {model.label: _model_json(model) for model in self.models}}
+
+
+def _model_json(model: ModelComparison) -> dict[str, Any]:
+    return {
+        "error": model.error,
+        "floor": model.floor,
+        "channels": {
+            name: {"horizons": c.horizons, "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
+            for name, c in model.channels.items()
+        },
+        "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in model.worst],
+    }

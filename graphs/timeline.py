@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The ticks at which states are estimated: the command stamps, so that the command is constant over every step.
+
+Steps longer than wanted (a slow or interrupted command stream) are divided; the command then acts on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recording import Recording
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP = 2.5e-3  # [s] friction changes sign within a few milliseconds
+SHORTEST_STEP = 2e-5  # [s] below this two commands are one; the later one counts
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Ticks and what acts between them.
+
+    Attributes:
+        ticks: times of the states, shape (m + 1,) [s].
+        u: command of each step, shape (m, n), SI unit of the command.
+    """
+
+    ticks: Array
+    u: Array
+
+    @property
+    def h(self) -> Array:
+        """Length of each step, shape (m,) [s]."""
+        return np.diff(self.ticks)
+
+    @staticmethod
+    def of(recording: Recording) -> Timeline:
+        """Ticks from the first command to the last sample of any sensor.
+
+        Raises:
+            RecordingError: commands and sensors do not overlap in time.
+        """
+        command = recording.command
+        sensors = [stream for name, stream in recording.streams.items() if name != "command"]
+        period = float(np.median(np.diff(command.times)))
+        end = min(max(float(s.times[-1]) for s in sensors), float(command.times[-1]) + period)
+        keep = np.append(np.diff(command.times) >= SHORTEST_STEP, True) & (command.times < end)
+        times, u = command.times[keep], command.values[keep]
+        if len(times) < 2:
+            raise RecordingError(
+                f"{recording.path}: commands ({command.times[0]:.3f} to {command.times[-1]:.3f} s) and sensors (until "
+                f"{end:.3f} s) do not overlap; check that their stamps come from one clock"
+            )
+        edges = np.append(times, end) if end - times[-1] >= SHORTEST_STEP else times
+        u = u[: len(edges) - 1]
+        wanted = min(period, LONGEST_STEP)
+        parts = np.maximum(np.round(np.diff(edges) / wanted - 0.3), 1).astype(int)
+        if np.all(parts == 1):
+            return Timeline(edges, u)
+        fraction = np.concatenate([np.arange(p) / p for p in parts])
+        ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
+        return Timeline(ticks, np.repeat(u, parts, axis=0))
+
+    def locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+        """Step that holds each time, and the fraction of the step that has passed, shape (k,) each."""
+        step = np.clip(np.searchsorted(self.ticks, times, side="right") - 1, 0, len(self.ticks) - 2)
+        return step, (times - self.ticks[step]) / self.h[step]

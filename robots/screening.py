@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Can this recording be a measurement of this robot? Errors for what cannot be, notices for what looks odd."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.gyro_plausibility import check_gyros
+from jointscope.robots.joint_motion import JointMotion, joint_motion
+from jointscope.robots.recording import Notice, Recording, Stream
+from jointscope.robots.robot import Robot
+from jointscope.robots.units import UNITS, si_factor, si_unit
+
+Array = NDArray[np.float64]
+
+MIN_SECONDS = 0.3  # [s]
+MIN_SAMPLES = 100  # of each sensor
+MOVED_SIGMAS = 20.0  # an encoder that spans less than this many sigmas shows noise, not motion
+MOVED_ANGLE = 1e-3  # [rad]
+BEYOND_LIMIT = 1.2  # times the robot's limit: odd
+IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
+DUTY_LIMIT = 1.0 + 1e-6
+PERCENT = 100.0
+OVER_VOLTAGE = 1.2  # times the supply
+JOINT_PARAMETERS = ("coulomb_torque", "stiffness", "damping")
+
+
+def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
+    """Screens a recording.
+
+    Args:
+        recording: what was measured.
+        robot: what it was measured on.
+        every_joint: demand that every joint moves, as a calibration from this recording alone does; otherwise a
+            joint at rest is a notice.
+
+    Returns:
+        What looks odd.
+
+    Raises:
+        RecordingError: a stream is empty, too short, not finite, constant, outside the others' time or in the wrong
+            unit, or nothing moves.
+    """
+    for stream in recording.streams.values():
+        _check_samples(stream)
+    notices = _check_overlap(recording)
+    _check_command(recording.command, robot)
+    motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
+    for name in robot.sensors:
+        _check_changes(recording, recording.streams[name], robot)
+    notices += _check_limits(motion, robot)
+    notices += _check_motion(recording, robot, every_joint)
+    return notices + check_gyros(recording, robot, motion)
+
+
+def joints_without_motion(recording: Recording, robot: Robot) -> tuple[str, ...]:
+    """Joints whose motor encoder shows nothing but noise."""
+    encoder = robot.motor_encoder
+    span = np.ptp(recording.streams[encoder.name].values, axis=0)
+    moved = span > max(MOVED_ANGLE, MOVED_SIGMAS * encoder.sigma)
+    return tuple(joint for joint, yes in zip(robot.joints, moved, strict=True) if not yes)
+
+
+def _check_samples(stream: Stream) -> None:
+    """Checks one stream by itself."""
+    if not len(stream):
+        raise RecordingError(f"{stream.name} is empty: it holds no sample")
+    bad = ~np.isfinite(stream.values)
+    for column, channel in zip(bad.T, stream.channels, strict=True):
+        if column.any():
+            first = stream.times[np.argmax(column)]
+            raise RecordingError(
+                f"{channel} holds {np.count_nonzero(column)} values that are not finite (NaN or infinite), the first "
+                f"at {first:.3f} s; expected a number in every sample: check the field, or remove those messages"
+            )
+    if stream.name != "command" and len(stream) < MIN_SAMPLES:
+        raise RecordingError(f"{stream.name} is too short: {len(stream)} samples; expected at least {MIN_SAMPLES}")
+
+
+def _check_overlap(recording: Recording) -> list[Notice]:
+    """All streams must show the same stretch of time; a command holds until the next one."""
+    first = {name: float(s.times[0]) for name, s in recording.streams.items()}
+    last = {name: float(s.times[-1]) for name, s in recording.streams.items()}
+    late, early = max(first, key=first.__getitem__), min(last, key=last.__getitem__)
+    common = last[early] - first[late]
+    if common <= 0:
+        raise RecordingError(
+            f"{early} ends at {last[early]:.3f} s, before {late} begins at {first[late]:.3f} s; expected streams of "
+            "the same stretch of time: check that both are stamped by the same clock"
+        )
+    if common < MIN_SECONDS:
+        raise RecordingError(f"the recording is too short: {common:.3f} s; expected at least {MIN_SECONDS:g} s")
+    whole = recording.duration
+    if common < 0.95 * whole:
+        text = (
+            f"all streams together cover only {common:.3f} of {whole:.3f} s: {late} begins late or {early} ends early"
+        )
+        return [Notice(late, "info", 0, text)]
+    return []
+
+
+def _check_command(command: Stream, robot: Robot) -> None:
+    largest = np.abs(command.values).max(axis=0)
+    if not largest.any():
+        raise RecordingError("the command is zero in all samples; expected a robot that is driven: check the topic")
+    channel, value = command.channels[int(np.argmax(largest))], float(largest.max())
+    unit = robot.command.unit
+    if unit == "duty" and value > DUTY_LIMIT:
+        hint = "it looks like percent: divide by 100" if 2.0 < value <= PERCENT else "check `command.unit`"
+        raise RecordingError(f"{channel} reaches {value:.4g}; expected a duty cycle from -1 to 1; {hint}")
+    supply = robot.constants.get("motor.supply_voltage", np.inf)
+    if unit == "V" and value > OVER_VOLTAGE * supply:
+        raise RecordingError(
+            f"{channel} reaches {value:.4g} V; the supply gives {supply:g} V; check `command.unit` or "
+            "`motor.supply_voltage`"
+        )
+
+
+def _check_changes(recording: Recording, stream: Stream, robot: Robot) -> None:
+    """No channel may be dead; a joint that nobody drives may stand still."""
+    constant = np.ptp(stream.values, axis=0) == 0
+    if stream.name == robot.motor_encoder.name:
+        constant &= np.ptp(recording.command.values, axis=0) > 0
+    for dead, channel, value in zip(constant, stream.channels, stream.values[0], strict=True):
+        if dead:
+            raise RecordingError(
+                f"{channel} never changes: {value:.6g} {stream.unit} in all {len(stream)} samples; expected at least "
+                "noise: the sensor is dead or another field holds its values"
+            )
+
+
+def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
+    """Angles and speeds against the limits of the URDF: degrees instead of radians show here."""
+    limits = robot.tree.limits
+    notices = []
+    for what, unit, seen, allowed in (
+        ("spans", "rad", np.ptp(motion.q, axis=0), limits[:, 1] - limits[:, 0]),
+        ("moves at", "rad/s", np.abs(motion.v).max(axis=0), robot.tree.velocity_limits),
+    ):
+        share = seen / allowed
+        k = int(np.argmax(share))
+        channel = f"{robot.joints[k]}.motor_position"
+        text = f"{channel} {what} {seen[k]:.4g} {unit}; {robot.tree.urdf.name} allows {allowed[k]:.4g} {unit}"
+        if share[k] > IMPOSSIBLE:
+            raise RecordingError(f"{text}; {_unit_hint(robot, float(share[k]))}")
+        if share[k] > BEYOND_LIMIT:
+            notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
+    return notices
+
+
+def _unit_hint(robot: Robot, excess: float) -> str:
+    """Which unit would bring the angles back to what is allowed."""
+    source = robot.motor_encoder.source
+    place = f"`unit` of sensors.{robot.motor_encoder.name} in the robot file (now {source.unit})"
+    for unit in UNITS:
+        if si_unit(unit) == "rad" and excess * si_factor(unit) / si_factor(source.unit) <= BEYOND_LIMIT:
+            word = {"deg": "degrees", "rad": "radians"}.get(unit, unit)
+            return f"the angles look like {word}: set {place} to {unit}"
+    return f"check {place}"
+
+
+def _check_motion(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:
+    resting = joints_without_motion(recording, robot)
+    if not resting:
+        return []
+    if len(resting) == robot.n:
+        raise RecordingError("no joint moves in this recording; expected motion: nothing can be learned from rest")
+    lost = ", ".join(f"{joint}.{name}" for joint in resting for name in JOINT_PARAMETERS)
+    verb = "does" if len(resting) == 1 else "do"
+    text = f"{', '.join(resting)} {verb} not move in this recording, so it cannot tell {lost}"
+    if every_joint:
+        raise RecordingError(f"{text}; record a motion of every joint")
+    return [Notice(robot.motor_encoder.name, "info", len(resting), text)]

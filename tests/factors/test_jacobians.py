@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One finite-difference test for the Jacobians of every factor, and GTSAM's own check of the wrapped ones."""
+
+import gtsam
+import numpy as np
+import pytest
+
+from jointscope.factors.bias_at_rest import BiasAtRestFactor
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.custom_factor import custom_factor, insert_calibration, state_key
+from jointscope.factors.euler_dynamics import EulerDynamics
+from jointscope.factors.gyro import GyroFactor
+from jointscope.factors.initial_state import InitialStateFactor
+from jointscope.factors.interpolated import InterpolatedFactor
+from jointscope.factors.midpoint_dynamics import MidpointDynamics
+from jointscope.factors.motor_encoder import MotorEncoderFactor
+from jointscope.factors.priors import BiasPrior, DynamicsPrior, RotationPrior
+from jointscope.factors.relative_gyro import RelativeGyroFactor
+from jointscope.factors.simpson_dynamics import SimpsonDynamics
+from jointscope.factors.step import Steps
+from jointscope.factors.vertical_gyro import VerticalGyroFactor
+from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.robots.robot_file import load_robot
+
+ROBOT = load_robot("doggy")
+PAPER = load_robot("doggy_paper")
+M = 5
+ROUNDING = 1e-5  # a residual of size 0.1 differenced at 1e-6 keeps 2e-11 of noise, 2e-6 of this
+
+
+def _factors():
+    rng = np.random.default_rng(1)
+    imu1, imu2 = ROBOT.gyros
+    tree = ROBOT.tree
+    rates, other = rng.normal(size=(M, 3)), rng.normal(size=(M, 3))
+    fraction, h = rng.uniform(size=M), rng.uniform(5e-4, 2e-3, size=M)
+    steps = {robot.name: Steps(h, rng.uniform(-1, 1, (M, 3)), robot.noise) for robot in (ROBOT, PAPER)}
+    encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)))
+    gyro = GyroFactor(imu2, tree, rates)
+    yield "encoder", encoder
+    yield "gyro on the first body", GyroFactor(imu1, tree, rates)
+    yield "gyro on the last body", gyro
+    yield "vertical gyro", VerticalGyroFactor(imu1, tree, rates)
+    yield "relative gyro", RelativeGyroFactor(imu2, imu1, tree, rates, other)
+    yield "bias at rest", BiasAtRestFactor(imu1, rates)
+    yield "interpolated encoder", InterpolatedFactor(encoder, fraction, h)
+    yield "interpolated gyro", InterpolatedFactor(gyro, fraction, h)
+    yield "initial state", InitialStateFactor(ROBOT.joints, 0.1, 1e-3)
+    yield "dynamics prior", DynamicsPrior.of(ROBOT)
+    yield "bias prior", BiasPrior(imu1)
+    yield "rotation prior", RotationPrior(imu2)
+    for robot in (ROBOT, PAPER):
+        for kind in (EulerDynamics, MidpointDynamics, SimpsonDynamics):
+            yield f"{kind.__name__} {robot.name}", kind(ElasticJoints(robot), steps[robot.name], robot.joints)
+
+
+FACTORS = dict(_factors())
+
+
+def _point(factor):
+    """Random states, slow enough that the friction's slope matters, and a calibration away from the start."""
+    rng = np.random.default_rng(2)
+    x0 = np.hstack([rng.normal(size=(len(factor), 3)) * s for s in (0.5, 0.4, 0.5, 0.004)])
+    x1 = x0 + rng.normal(size=x0.shape) * 1e-3
+    calibration = Calibration.of(ROBOT)
+    calibration = calibration.retract({b: rng.normal(size=calibration.block_size(b)) * 0.1 for b in calibration.blocks})
+    return (x0, x1)[: factor.states], calibration
+
+
+def _difference(function, size, step=1e-6):
+    """Central differences of a function of a small vector; the last axis is the vector."""
+    columns = []
+    for i in range(size):
+        d = np.zeros(size)
+        d[i] = step
+        columns.append((function(d) - function(-d)) / (2 * step))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_jacobians_equal_finite_differences(name):
+    factor = FACTORS[name]
+    x, calibration = _point(factor)
+    linear = factor.linearize(x, calibration)
+    np.testing.assert_allclose(linear.residual, factor.residual(x, calibration), rtol=1e-12, atol=1e-13)
+    scale = np.broadcast_to(factor.sigmas, linear.residual.shape)[:, :, None]
+    assert linear.residual.shape == (len(factor), len(factor.rows))
+    assert len(linear.by_state) == factor.states
+    assert set(linear.by_block) == set(factor.blocks)
+    for i, J in enumerate(linear.by_state):
+
+        def moved(d, i=i):
+            return factor.residual(tuple(s + d if j == i else s for j, s in enumerate(x)), calibration)
+
+        # rows differ in size by their units: compare row by row
+        expected = _difference(moved, x[i].shape[1])
+        size = np.abs(expected).max(axis=2, keepdims=True) + scale * 1e-3 + ROUNDING
+        assert np.max(np.abs(J - expected) / size) < 2e-6, f"derivative by state {i}"
+    for block in factor.blocks:
+        expected = _difference(
+            lambda d, b=block: factor.residual(x, calibration.retract({b: d})), calibration.block_size(block)
+        )
+        size = np.abs(expected).max(axis=2, keepdims=True) + scale * 1e-3 + ROUNDING
+        assert np.max(np.abs(linear.by_block[block] - expected) / size) < 2e-6, f"derivative by {block}"
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_gtsam_linearizes_the_wrapped_factor_to_the_whitened_jacobians(name):
+    factor = FACTORS[name]
+    x, calibration = _point(factor)
+    sample = len(factor) - 1
+    wrapped = custom_factor(factor, sample, tuple(range(factor.states)), calibration)
+    values = gtsam.Values()
+    insert_calibration(values, calibration)
+    for k, states in enumerate(x):
+        values.insert(state_key(k), states[sample])
+    linear = factor.linearize(x, calibration)
+    sigmas = np.broadcast_to(factor.sigmas, linear.residual.shape)[sample]
+    A, b = wrapped.linearize(values).jacobian()
+    stacked = [J[sample] for J in linear.by_state] + [linear.by_block[block][sample] for block in factor.blocks]
+    np.testing.assert_allclose(A, np.hstack(stacked) / sigmas[:, None], rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(b, -linear.residual[sample] / sigmas, rtol=1e-9)
+    assert wrapped.error(values) == pytest.approx(0.5 * np.sum((linear.residual[sample] / sigmas) ** 2))
+
+
+def test_gtsam_moves_a_rotation_from_the_right_as_the_calibration_does():
+    calibration = Calibration.of(ROBOT)
+    values = gtsam.Values()
+    insert_calibration(values, calibration)
+    step = np.array([0.1, -0.2, 0.3])
+    delta = gtsam.VectorValues()
+    delta.insert(gtsam.symbol("r", 1), step)
+    moved = values.retract(delta).atRot3(gtsam.symbol("r", 1)).matrix()
+    np.testing.assert_allclose(moved, calibration.retract({"imu2.rotation": step}).rotations["imu2"], atol=1e-12)

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Bags that can be opened but hold something else than expected, message by message."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.robot_file import load_robot
+from jointscope.tools.bags.message_type import known_message_type
+from jointscope.tools.bags.read_recording import needed_streams, read_recording
+from jointscope.tools.bags.write_bag import write_bag
+
+JOINTS = ("joint1", "joint2", "joint3")
+ENCODER = "/joint_states"
+SECOND = 1_000_000_000
+MILLISECOND = 1_000_000
+COUNT = 300
+
+
+@pytest.fixture(scope="module")
+def doggy():
+    return load_robot("doggy")
+
+
+@dataclasses.dataclass
+class JointMessage:
+    """A JointState to be written: stamp [ns], names, positions."""
+
+    stamp: int
+    names: tuple[str, ...]
+    position: tuple[float, ...]
+    frame: str = ""
+
+
+def joint_messages(names=JOINTS, count=COUNT):
+    return [
+        JointMessage(SECOND + k * MILLISECOND, names, tuple(100.0 * j + k for j in range(len(names))))
+        for k in range(count)
+    ]
+
+
+def write_with(path, robot, messages, msgtype="sensor_msgs/msg/JointState", garbage=None):
+    """A bag with ordinary command and gyros, and with the given messages on the encoder's topic."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+
+    ros2 = path.suffix != ".bag"
+    kind = known_message_type(msgtype, ros2)
+    writer = Writer2(path, version=9, storage_plugin=StoragePlugin.MCAP) if ros2 else Writer1(path)
+    imu, joint = (known_message_type(f"sensor_msgs/msg/{name}", ros2) for name in ("Imu", "JointState"))
+    with writer:
+        for need in needed_streams(robot):
+            if need.name == "motor_encoder":
+                continue
+            other = joint if need.name == "command" else imu
+            connection = writer.add_connection(need.source.topic, other.name, typestore=other.typestore)
+            for k in range(COUNT):
+                stamp = SECOND + k * MILLISECOND
+                raw = joint_state(other, JointMessage(stamp, JOINTS, ()), effort=(0.1, 0.2, 0.3 + k))
+                writer.write(connection, stamp, raw if other is joint else imu_bytes(imu, stamp, k))
+        connection = writer.add_connection(ENCODER, kind.name, typestore=kind.typestore)
+        for k, message in enumerate(messages):
+            raw = joint_state(kind, message) if kind.name == joint.name else imu_bytes(imu, message.stamp, k)
+            writer.write(connection, SECOND + k * MILLISECOND, raw if garbage != k else raw[: len(raw) // 2])
+
+
+def header(kind, stamp, frame=""):
+    types = kind.typestore.types
+    time = types["builtin_interfaces/msg/Time"](sec=stamp // SECOND, nanosec=stamp % SECOND)
+    rest = {} if kind.ros2 else {"seq": 7}
+    return types["std_msgs/msg/Header"](stamp=time, frame_id=frame, **rest)
+
+
+def joint_state(kind, message, effort=()):
+    return kind.encode(
+        kind.typestore.types[kind.name](
+            header=header(kind, message.stamp, message.frame),
+            name=list(message.names),
+            position=np.array(message.position, dtype=float),
+            velocity=np.empty(0),
+            effort=np.array(effort, dtype=float),
+        )
+    )
+
+
+def imu_bytes(kind, stamp, k):
+    types, zeros = kind.typestore.types, np.zeros(9)
+    vector = types["geometry_msgs/msg/Vector3"]
+    return kind.encode(
+        types[kind.name](
+            header=header(kind, stamp),
+            orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+            orientation_covariance=zeros,
+            angular_velocity=vector(x=0.1 * k, y=1.0, z=-k * 1.0),
+            angular_velocity_covariance=zeros,
+            linear_acceleration=vector(x=0.0, y=0.0, z=9.81),
+            linear_acceleration_covariance=zeros,
+        )
+    )
+
+
+def error_of(path, robot):
+    with pytest.raises(RecordingError) as error:
+        read_recording(path, robot)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+@pytest.fixture(params=("run", "run.bag"))
+def path(request, tmp_path):
+    return tmp_path / request.param
+
+
+def test_joints_in_another_order_are_put_into_the_robots_order(doggy, path):
+    write_with(path, doggy, joint_messages(("joint3", "joint1", "joint2")))
+    stream = read_recording(path, doggy).streams["motor_encoder"]
+    assert stream.channels == ("joint1.motor_position", "joint2.motor_position", "joint3.motor_position")
+    assert stream.values[0].tolist() == [100.0, 200.0, 0.0]
+
+
+def test_more_joints_than_the_robot_has_are_ignored_and_noted(doggy, path):
+    write_with(path, doggy, joint_messages(("joint1", "gripper", "joint2", "joint3")))
+    recording = read_recording(path, doggy)
+    assert recording.streams["motor_encoder"].values[0].tolist() == [0.0, 200.0, 300.0]
+    assert [n.text for n in recording.notices if n.kind == "info"] == [
+        "motor_encoder: joints of the bag that the robot does not have are ignored: gripper"
+    ]
+
+
+def test_unknown_joint_names_are_listed(doggy, path):
+    write_with(path, doggy, joint_messages(("a1", "a2", "a3")))
+    assert error_of(path, doggy) == (
+        "topic /joint_states, field 'position': no joint 'joint1' in the messages, which name a1, a2, a3; "
+        "set `names` of motor_encoder in the robot file"
+    )
+
+
+def test_a_joint_name_that_stands_twice_is_refused(doggy, path):
+    write_with(path, doggy, joint_messages(("joint1", "joint2", "joint3", "joint1")))
+    assert error_of(path, doggy) == "topic /joint_states, field 'position': the joint name 'joint1' stands 2 times"
+
+
+def test_a_changing_order_of_joints_is_refused_with_the_message(doggy, path):
+    messages = joint_messages()
+    messages[17].names = ("joint2", "joint1", "joint3")
+    write_with(path, doggy, messages)
+    assert error_of(path, doggy) == (
+        "topic /joint_states, message 17: the order of the joint names changes: expected joint1, joint2, joint3 "
+        "as in message 0, got joint2, joint1, joint3"
+    )
+
+
+def test_a_changing_number_of_values_is_refused_with_the_message(doggy, path):
+    messages = joint_messages()
+    messages[5].position = (1.0,)
+    write_with(path, doggy, messages)
+    assert error_of(path, doggy) == (
+        "topic /joint_states, message 5: the field 'position' holds 1 values; expected 3 as in message 0"
+    )
+
+
+def test_a_field_that_is_always_empty_is_refused(doggy, path):
+    messages = [dataclasses.replace(message, position=()) for message in joint_messages()]
+    write_with(path, doggy, messages)
+    assert error_of(path, doggy) == (
+        "topic /joint_states, field 'position': 0 values for 3 joint names (joint1, joint2, joint3)"
+    )
+
+
+def test_a_message_that_cannot_be_decoded_is_named(doggy, path):
+    write_with(path, doggy, joint_messages(), garbage=9)
+    assert error_of(path, doggy).startswith("topic /joint_states, message 9: its ")
+    assert error_of(path, doggy).endswith(" bytes are not a sensor_msgs/msg/JointState; the bag is damaged")
+
+
+def test_a_changing_frame_takes_the_slow_path_to_the_same_numbers(doggy, path):
+    messages = joint_messages()
+    write_with(path, doggy, messages)
+    expected = read_recording(path, doggy).streams["motor_encoder"]
+    messages[40].frame = "another"
+    other = path.with_name("other" + path.suffix)
+    write_with(other, doggy, messages)
+    assert read_recording(other, doggy).streams["motor_encoder"].values.tobytes() == expected.values.tobytes()
+
+
+def test_a_topic_of_the_wrong_type_is_refused(doggy, path):
+    write_with(path, doggy, joint_messages(), msgtype="sensor_msgs/msg/Imu")
+    assert error_of(path, doggy) == (
+        f"{path}: topic /joint_states holds sensor_msgs/msg/Imu; the robot file expects sensor_msgs/msg/JointState"
+    )
+
+
+def test_an_empty_topic_is_refused(doggy, path):
+    write_with(path, doggy, [])
+    assert error_of(path, doggy) == (
+        f"{path}: topic /joint_states is empty: it holds no message; check that its driver ran while recording"
+    )
+
+
+def test_a_missing_topic_is_refused_with_the_nearest_name(doggy, path):
+    write_with(path, doggy, joint_messages())
+    source = dataclasses.replace(doggy.motor_encoder.source, topic="/joint_state")
+    robot = doggy.with_sensors({"motor_encoder": dataclasses.replace(doggy.motor_encoder, source=source)})
+    assert error_of(path, robot) == (
+        f"{path}: topic /joint_state is missing; did you mean '/joint_states'?; or change the robot file"
+    )
+
+
+def test_a_missing_field_is_refused_with_those_there_are(doggy, path):
+    write_with(path, doggy, joint_messages())
+    source = dataclasses.replace(doggy.gyros[0].source, field="angular_velocity.w")
+    robot = doggy.with_sensors({"imu1": dataclasses.replace(doggy.gyros[0], source=source)})
+    assert error_of(path, robot) == (
+        "topic /imu1/data_raw: sensor_msgs/msg/Imu has no field 'angular_velocity.w': no 'w'; it has x, y, z; "
+        "set `field` in the robot file"
+    )
+
+
+def test_a_text_is_not_a_number(doggy, path):
+    write_with(path, doggy, joint_messages())
+    source = dataclasses.replace(doggy.gyros[0].source, field="header.frame_id")
+    robot = doggy.with_sensors({"imu1": dataclasses.replace(doggy.gyros[0], source=source)})
+    assert error_of(path, robot) == "topic /imu1/data_raw, message 0: the field 'header.frame_id' holds no numbers"
+
+
+def test_a_gyro_needs_three_values(doggy, path):
+    write_with(path, doggy, joint_messages())
+    source = dataclasses.replace(doggy.gyros[0].source, field="orientation")
+    robot = doggy.with_sensors({"imu1": dataclasses.replace(doggy.gyros[0], source=source)})
+    assert error_of(path, robot) == (
+        "topic /imu1/data_raw, field 'orientation': imu1 expects 3 values (imu1.x, imu1.y, imu1.z), got 4"
+    )
+
+
+def test_stamps_that_nobody_fills_are_refused(doggy, path):
+    write_with(path, doggy, [dataclasses.replace(message, stamp=0) for message in joint_messages()])
+    assert error_of(path, doggy) == (
+        "motor_encoder: all 300 messages have the same stamp 0.000000000 s; expected the time of measurement in "
+        "header.stamp: the driver does not fill it"
+    )
+
+
+def test_stamps_far_in_the_epoch_keep_their_nanoseconds(doggy, tmp_path):
+    times = np.array([0, 1, 3, 1_000_000_007]) / 1e9
+    streams = {
+        need.name: Stream(need.name, times, np.zeros((4, 3)), need.channels, "") for need in needed_streams(doggy)
+    }
+    start = 1_999_999_999_999_999_999
+    write_bag(tmp_path / "run.mcap", Recording("", "", start, streams), doggy)
+    recording = read_recording(tmp_path / "run.mcap", doggy)
+    assert recording.start_ns == start
+    assert np.rint(recording.command.times * 1e9).astype(int).tolist() == [0, 1, 3, 1_000_000_007]

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One field of one topic over all messages, as arrays, before names, units and order are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+STAMP = "header.stamp"
+NAMES = "name"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the messages of a topic say.
+
+    Attributes:
+        stamps: header stamps, shape (n,) [ns]; None where the message type has no header.
+        values: the field's numbers in the order of the message, shape (n, m), in the unit of the bag.
+        names: entries of the message's `name` field, the same in all messages; None where there is no such field.
+    """
+
+    stamps: NDArray[np.int64] | None
+    values: NDArray[np.float64]
+    names: tuple[str, ...] | None

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Looks at a bag without needing to know the robot, and at how it fits one if it is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.robot import Robot
+from jointscope.robots.screening import screen
+from jointscope.tools.bags.bag_description import (
+    BagDescription,
+    FieldDescription,
+    NeedDescription,
+    TopicDescription,
+)
+from jointscope.tools.bags.columns import Columns
+from jointscope.tools.bags.message_type import MessageType, inner_type
+from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
+from jointscope.tools.bags.read_recording import (
+    check_topic,
+    full_type_name,
+    needed_streams,
+    read_columns,
+    read_recording,
+)
+from jointscope.tools.bags.stream_notices import clipping_notices, timing
+from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+
+FLOATS = ("float32", "float64")
+NOT_SHOWN = "covariance"
+AXES = {3: ("x", "y", "z"), 4: ("x", "y", "z", "w")}
+
+
+def describe_bag(path: str | Path, robot: Robot | None = None, progress: Progress | None = None) -> BagDescription:
+    """Describes a bag.
+
+    Args:
+        path: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
+        robot: what to compare the bag with; None to look at the bag alone.
+        progress: called with the number of messages read and expected.
+
+    Returns:
+        The description. What is missing for the robot is part of it, not an error.
+
+    Raises:
+        RecordingError: the bag itself cannot be read.
+    """
+    path = Path(path)
+    with open_bag(path) as bag:
+        types = {topic: _type_with_floats(bag, topic) for topic in bag.topics}
+        raw = bag.read([topic for topic, kind in types.items() if isinstance(kind, MessageType)], progress)
+        topics = tuple(_topic(bag, name, types[name], raw.get(name)) for name in bag.topics)
+        times = [t.received_ns for t in raw.values() if t.received]
+        duration = (max(t.max() for t in times) - min(t.min() for t in times)) / 1e9 if times else 0.0
+        needs = _needs(bag, robot, {topic.topic: topic for topic in topics}) if robot else ()
+        kind = "ROS 2" if bag.ros2 else "ROS 1"
+    size = sum(file.stat().st_size for file in storage_files(path))
+    problem, notices = _judge(path, robot, needs) if robot else (None, ())
+    return BagDescription(
+        path=str(path),
+        sha256=bag_sha256(path),
+        kind=kind,
+        size=size,
+        duration=float(duration),
+        topics=topics,
+        robot=robot.name if robot else None,
+        needs=needs,
+        usable=problem is None if robot else None,
+        problem=problem,
+        notices=notices,
+    )
+
+
+def _type_with_floats(bag: Bag, topic: str) -> MessageType | str | None:
+    """The type of a topic if it holds numbers worth describing; a text where it cannot be understood."""
+    if len(bag.type_names(topic)) != 1:
+        return "its messages are of more than one type"
+    try:
+        message_type = bag.message_type(topic)
+        return message_type if _float_fields(message_type) else None
+    except RecordingError as err:
+        return str(err)
+
+
+def _float_fields(message_type: MessageType) -> list[str]:
+    """Dotted paths of the largest fields that hold nothing but floats."""
+    return [
+        path
+        for name, kind in message_type.fields
+        if name != "header"
+        for path in _floats_below(message_type, kind, name)
+    ]
+
+
+def _floats_below(message_type: MessageType, kind: Any, path: str) -> list[str]:
+    from rosbags.interfaces import Nodetype
+
+    if NOT_SHOWN in path:
+        return []
+    if kind[0] == Nodetype.NAME:
+        inside = message_type.fields_of(kind[1])
+        below = [p for name, sub in inside for p in _floats_below(message_type, sub, f"{path}.{name}")]
+        return [path] if below == [f"{path}.{name}" for name, _ in inside] and len(below) > 1 else below
+    if inner_type(kind) is not None:
+        return []
+    primitive = kind[1][0] if kind[0] == Nodetype.BASE else kind[1][0][1][0]
+    return [path] if primitive in FLOATS else []
+
+
+def _topic(bag: Bag, name: str, kind: MessageType | str | None, raw: RawTopic | None) -> TopicDescription:
+    msgtype = " and ".join(bag.type_names(name))
+    if not isinstance(kind, MessageType) or raw is None or not raw.data:
+        return TopicDescription(name, msgtype, bag.count(name), trouble=kind if isinstance(kind, str) else None)
+    try:
+        return _numeric_topic(name, kind, raw)
+    except RecordingError as err:
+        return TopicDescription(name, msgtype, len(raw.data), trouble=str(err))
+
+
+def _numeric_topic(name: str, message_type: MessageType, raw: RawTopic) -> TopicDescription:
+    columns = {field: read_columns(raw, message_type, field) for field in _float_fields(message_type)}
+    first = next(iter(columns.values()))
+    stamps = raw.received_ns if first.stamps is None else first.stamps
+    index = np.arange(len(stamps))[:, None].astype(float)
+    samples, notices = in_time_order(name, TimedSamples(stamps, raw.received_ns, index))
+    order = samples.values[:, 0].astype(int)
+    seen = timing((samples.stamps - samples.stamps[0]) / 1e9)
+    counts = {notice.kind: notice.count for notice in notices}
+    return TopicDescription(
+        topic=name,
+        msgtype=message_type.name,
+        count=len(raw.data),
+        rate=seen.rate,
+        jitter=seen.jitter,
+        gaps=seen.gaps,
+        missing=seen.missing,
+        longest_gap=seen.longest_gap,
+        out_of_order=counts.get("out_of_order", 0),
+        duplicates=counts.get("duplicate", 0),
+        stamped=first.stamps is not None,
+        names=first.names or (),
+        fields=tuple(_field(field, part, order) for field, part in columns.items()),
+    )
+
+
+def _field(field: str, columns: Columns, order: NDArray[np.intp]) -> FieldDescription:
+    values = columns.values[order]
+    width = values.shape[1]
+    names = columns.names or ()
+    labels = names if len(names) == width else AXES.get(width, tuple(map(str, range(width))))
+    finite = np.isfinite(values)
+    low = np.where(finite, values, np.inf).min(axis=0)
+    high = np.where(finite, values, -np.inf).max(axis=0)
+    some = finite.any(axis=0)
+    clipping = clipping_notices(field, np.where(finite, values, np.nan), labels, "1")
+    return FieldDescription(
+        field=field,
+        columns=tuple(labels),
+        minimum=tuple(np.where(some, low, np.nan).tolist()),
+        maximum=tuple(np.where(some, high, np.nan).tolist()),
+        not_finite=int(np.count_nonzero(~finite)),
+        clipping=tuple(notice.text for notice in clipping),
+    )
+
+
+def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple[NeedDescription, ...]:
+    needs = []
+    for need in needed_streams(robot):
+        source = need.source
+        msgtype = full_type_name(source.msgtype)
+        problem = None
+        try:
+            check_topic(bag, source)
+            names = topics[source.topic].names
+            missing = [name for name in source.names if names and name not in names]
+            if missing:
+                problem = f"no joint {missing[0]!r} on {source.topic}, which names {', '.join(names)}"
+        except RecordingError as err:
+            problem = str(err)
+        candidates = tuple(topic for topic in bag.topics if bag.type_names(topic) == (msgtype,))
+        needs.append(NeedDescription(need.name, source.topic, msgtype, source.field, source.unit, problem, candidates))
+    return tuple(needs)
+
+
+def _judge(path: Path, robot: Robot, needs: tuple[NeedDescription, ...]) -> tuple[str | None, tuple[str, ...]]:
+    """Why the recording cannot be used for a robot, and what was odd."""
+    missing = [need.stream for need in needs if need.problem is not None]
+    if missing:
+        return f"{', '.join(missing)} cannot be read", ()
+    try:
+        recording = read_recording(path, robot)
+    except RecordingError as err:
+        return str(err), ()
+    notices = recording.notices
+    try:
+        notices = [*notices, *screen(recording, robot)]
+        problem = None
+    except RecordingError as err:
+        problem = str(err)
+    return problem, tuple(notice.text for notice in notices)

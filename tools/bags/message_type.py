@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A message type as a bag defines it: its fields, and how its bytes become a message and back."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+from jointscope.robots.errors import RecordingError
+
+NUMPY_TYPES = {
+    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
+    "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
+}  # fmt: skip
+"""ROS primitive: numpy type of its little-endian bytes."""
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """A type with the definitions it needs.
+
+    Attributes:
+        name: for example "sensor_msgs/msg/Imu".
+        typestore: definitions of this type and of all types inside it.
+        ros2: True for CDR bytes, False for ROS 1 serialization.
+    """
+
+    name: str
+    typestore: Any
+    ros2: bool
+
+    @property
+    def fields(self) -> list[tuple[str, Any]]:
+        """Name and description of each field, in order."""
+        return self.fields_of(self.name)
+
+    def fields_of(self, msgtype: str) -> list[tuple[str, Any]]:
+        """Name and description of each field of a type inside this one."""
+        return list(self.typestore.get_msgdef(msgtype).fields)
+
+    @property
+    def has_header(self) -> bool:
+        """Whether the messages carry a stamp of their own."""
+        return any(name == "header" and str(kind[1]) == "std_msgs/msg/Header" for name, kind in self.fields)
+
+    @property
+    def has_names(self) -> bool:
+        """Whether the messages name their columns, as JointState does."""
+        return any(name == "name" and is_sequence_of_texts(kind) for name, kind in self.fields)
+
+    def decode(self, raw: bytes) -> Any:
+        """The message with these bytes."""
+        if self.ros2:
+            return self.typestore.deserialize_cdr(raw, self.name)
+        return self.typestore.deserialize_ros1(raw, self.name)
+
+    def encode(self, message: Any) -> bytes:
+        """The bytes of a message."""
+        if self.ros2:
+            return bytes(self.typestore.serialize_cdr(message, self.name))
+        return bytes(self.typestore.serialize_ros1(message, self.name))
+
+    def check_field(self, field: str, topic: str) -> None:
+        """Checks that a dotted field exists.
+
+        Raises:
+            RecordingError: it does not; the message lists the fields at that level.
+        """
+        msgtype: str | None = self.name
+        for part in field.split("."):
+            if part.isdecimal():
+                continue
+            fields = dict(self.fields_of(msgtype)) if msgtype else {}
+            if part not in fields:
+                there = f"it has {', '.join(fields)}" if fields else "there is nothing below"
+                raise RecordingError(
+                    f"topic {topic}: {self.name} has no field {field!r}: no {part!r}; {there}; "
+                    "set `field` in the robot file"
+                )
+            msgtype = inner_type(fields[part])
+
+
+def inner_type(kind: Any) -> str | None:
+    """The message type inside a field or its elements; None for primitives."""
+    from rosbags.interfaces import Nodetype
+
+    if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        kind = kind[1][0]
+    return str(kind[1]) if kind[0] == Nodetype.NAME else None
+
+
+def is_sequence_of_texts(kind: Any) -> bool:
+    """Whether a field is a list of texts."""
+    from rosbags.interfaces import Nodetype
+
+    return bool(kind[0] == Nodetype.SEQUENCE and kind[1][0][0] == Nodetype.BASE and kind[1][0][1][0] == "string")
+
+
+def known_message_type(name: str, ros2: bool) -> MessageType:
+    """A type from the definitions that ROS itself ships, for bags that carry none and for writing.
+
+    Raises:
+        RecordingError: ROS ships no such type.
+    """
+    typestore = _shipped(ros2)
+    if name not in typestore.fielddefs:
+        raise RecordingError(
+            f"the message type {name!r} is unknown: neither the bag nor ROS {2 if ros2 else 1} itself defines it"
+        )
+    return MessageType(name, typestore, ros2)
+
+
+def defined_message_type(name: str, definition: Any, ros2: bool) -> MessageType:
+    """A type from the definition that a bag carries.
+
+    Args:
+        name: the type.
+        definition: rosbags' MessageDefinition of the connection; without text, ROS's own definition is used.
+        ros2: whether the bag is one of ROS 2.
+    """
+    from rosbags.interfaces import MessageDefinitionFormat
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    if definition.format == MessageDefinitionFormat.NONE or not definition.data.strip():
+        return known_message_type(name, ros2)
+    if definition.format == MessageDefinitionFormat.MSG:
+        types = get_types_from_msg(definition.data, name)
+    else:
+        rule = "=" * 80 + "\n"
+        types = {}
+        for part in definition.data.split(rule) if definition.data.startswith(rule) else [definition.data]:
+            types.update(get_types_from_idl(part.split("\n", 1)[1] if part.startswith("IDL: ") else part))
+    typestore = get_typestore(Stores.EMPTY)
+    typestore.register(types)
+    return MessageType(name, typestore, ros2)
+
+
+@functools.cache
+def _shipped(ros2: bool) -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE if ros2 else Stores.ROS1_NOETIC)

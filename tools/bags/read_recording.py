@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads what a robot needs from a bag: the command and every sensor, in SI units, each at its own times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recording import Notice, Recording, Stream
+from jointscope.robots.robot import Robot
+from jointscope.robots.sensors import Topic
+from jointscope.robots.units import si_factor, si_unit
+from jointscope.robots.yaml_section import did_you_mean
+from jointscope.tools.bags.columns import Columns
+from jointscope.tools.bags.fast_columns import fast_columns
+from jointscope.tools.bags.message_type import MessageType
+from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
+from jointscope.tools.bags.slow_columns import slow_columns
+from jointscope.tools.bags.stream_notices import clipping_notices, timing_notices
+from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+
+
+@dataclass(frozen=True)
+class StreamSource:
+    """A stream that a robot needs.
+
+    Attributes:
+        name: "command" or the sensor's name.
+        source: where it is in the bag.
+        channels: name of each column.
+    """
+
+    name: str
+    source: Topic
+    channels: tuple[str, ...]
+
+
+def needed_streams(robot: Robot) -> list[StreamSource]:
+    """All streams a robot needs, the command first."""
+    command = StreamSource("command", robot.command, tuple(f"{joint}.command" for joint in robot.joints))
+    return [command, *(StreamSource(s.name, s.source, s.channels) for s in robot.sensors.values())]
+
+
+def read_recording(
+    path: str | Path, robot: Robot, progress: Progress | None = None, decode_all: bool = False
+) -> Recording:
+    """Reads a bag.
+
+    Args:
+        path: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
+        robot: says which topics, fields, units and joint names.
+        progress: called with the number of messages read and expected.
+        decode_all: decode every message in full, as a reference for the fast path; the result is the same.
+
+    Returns:
+        The streams, with notices of what was dropped or looked odd.
+
+    Raises:
+        RecordingError: the bag cannot be read, or does not hold what the robot needs.
+    """
+    needed = needed_streams(robot)
+    with open_bag(path) as bag:
+        types = {need.name: check_topic(bag, need.source) for need in needed}
+        raw = bag.read(sorted({need.source.topic for need in needed}), progress)
+        samples: dict[str, TimedSamples] = {}
+        notices: list[Notice] = []
+        for need in needed:
+            topic = raw[need.source.topic]
+            samples[need.name], found = _samples(need, topic, types[need.name], decode_all)
+            notices += found
+            notices += _surplus(need.name, topic, bag.count(topic.name))
+    start_ns = min(int(s.stamps[0]) for s in samples.values())
+    streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
+    for stream in streams.values():
+        notices += timing_notices(stream.name, stream.times)
+        notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
+    return Recording(str(path), bag_sha256(path), start_ns, streams, notices)
+
+
+def check_topic(bag: Bag, source: Topic) -> MessageType:
+    """Checks that a bag has a topic with messages of the right type, and the field in it.
+
+    Raises:
+        RecordingError: it does not; the message says what is there instead.
+    """
+    place = f"{bag.path}: topic {source.topic}"
+    if source.topic not in bag.topics:
+        raise RecordingError(f"{place} is missing{did_you_mean(source.topic, bag.topics)}; or change the robot file")
+    types = bag.type_names(source.topic)
+    if types != (full_type_name(source.msgtype),):
+        raise RecordingError(
+            f"{place} holds {' and '.join(types)}; the robot file expects {full_type_name(source.msgtype)}"
+        )
+    if bag.count(source.topic) == 0:
+        raise RecordingError(f"{place} is empty: it holds no message; check that its driver ran while recording")
+    message_type = bag.message_type(source.topic)
+    message_type.check_field(source.field, source.topic)
+    return message_type
+
+
+def full_type_name(name: str) -> str:
+    """The ROS 2 spelling of a message type: "sensor_msgs/Imu" is "sensor_msgs/msg/Imu"."""
+    package, _, rest = name.partition("/")
+    return name if "/" in rest else f"{package}/msg/{rest}"
+
+
+def read_columns(topic: RawTopic, message_type: MessageType, field: str, decode_all: bool = False) -> Columns:
+    """One field of a topic: on the fast path where all messages are laid out alike, else by full decoding."""
+    columns = None if decode_all else fast_columns(topic.data, message_type, field)
+    return columns or slow_columns(topic.data, message_type, field, topic.name)
+
+
+def _samples(
+    need: StreamSource, topic: RawTopic, message_type: MessageType, decode_all: bool
+) -> tuple[TimedSamples, list[Notice]]:
+    """The samples of one stream in SI units and in the order of their stamps."""
+    columns = read_columns(topic, message_type, need.source.field, decode_all)
+    order, notices = _column_order(need, columns)
+    stamps = columns.stamps
+    if stamps is None:
+        stamps = topic.received_ns
+        text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
+        notices.append(Notice(need.name, "info", len(stamps), text))
+    values = columns.values[:, order] * si_factor(need.source.unit)
+    samples, found = in_time_order(need.name, TimedSamples(stamps, topic.received_ns, values))
+    return samples, notices + found
+
+
+def _column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp], list[Notice]]:
+    """Which column of the message belongs to which channel."""
+    place = f"topic {need.source.topic}, field {need.source.field!r}"
+    width, wanted = columns.values.shape[1], need.source.names
+    names = columns.names or ()
+    if not wanted or not names:
+        if width != len(need.channels):
+            raise RecordingError(
+                f"{place}: {need.name} expects {len(need.channels)} values ({', '.join(need.channels)}), got {width}"
+            )
+        return np.arange(width), []
+    if width != len(names):
+        raise RecordingError(f"{place}: {width} values for {len(names)} joint names ({', '.join(names)})")
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        raise RecordingError(
+            f"{place}: no joint {missing[0]!r} in the messages, which name {', '.join(names)}; "
+            f"set `names` of {need.name} in the robot file"
+        )
+    _refuse_repeated(names, place)
+    extra = [name for name in names if name not in wanted]
+    text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
+    notices = [Notice(need.name, "info", len(extra), text)] if extra else []
+    return np.array([names.index(name) for name in wanted]), notices
+
+
+def _refuse_repeated(names: Sequence[str], place: str) -> None:
+    repeated = [name for name in names if names.count(name) > 1]
+    if repeated:
+        raise RecordingError(f"{place}: the joint name {repeated[0]!r} stands {names.count(repeated[0])} times")
+
+
+def _surplus(name: str, topic: RawTopic, promised: int) -> list[Notice]:
+    more = len(topic.data) - promised
+    text = f"{name}: {more} messages more than the bag's index promises; all are used"
+    return [Notice(name, "info", more, text)] if more > 0 else []
+
+
+def _stream(need: StreamSource, samples: TimedSamples, start_ns: int) -> Stream:
+    """Floats begin here: stamps stay integers until the start is subtracted."""
+    return Stream(
+        name=need.name,
+        times=(samples.stamps - start_ns) / 1e9,
+        values=samples.values,
+        channels=need.channels,
+        unit=si_unit(need.source.unit),
+        received=(samples.received - start_ns) / 1e9,
+    )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The reference: every message is decoded in full. It also knows which message is to blame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jointscope.robots.errors import RecordingError
+from jointscope.tools.bags.columns import Columns
+from jointscope.tools.bags.message_type import MessageType
+
+
+def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, topic: str) -> Columns:
+    """One field over all messages.
+
+    Args:
+        raw: bytes of each message.
+        message_type: their type.
+        field: dotted path of the numbers.
+        topic: name of the topic, for messages to the user.
+
+    Returns:
+        The columns.
+
+    Raises:
+        RecordingError: a message cannot be decoded, holds no numbers there, or differs in the joint names or in the
+            number of values.
+    """
+    rows: list[list[float]] = []
+    stamps = np.zeros(len(raw), dtype=np.int64)
+    names: tuple[str, ...] | None = None
+    for k, data in enumerate(raw):
+        message = _decode(data, message_type, topic, k)
+        if message_type.has_header:
+            stamps[k] = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        if message_type.has_names:
+            names = _same_names(names, tuple(message.name), topic, k)
+        row: list[float] = []
+        try:
+            _flatten(_descend(message, field), row)
+        except (AttributeError, IndexError, TypeError, ValueError) as err:
+            raise RecordingError(f"topic {topic}, message {k}: the field {field!r} holds no numbers") from err
+        if rows and len(row) != len(rows[0]):
+            raise RecordingError(
+                f"topic {topic}, message {k}: the field {field!r} holds {len(row)} values; "
+                f"expected {len(rows[0])} as in message 0"
+            )
+        rows.append(row)
+    values = np.array(rows, dtype=np.float64).reshape(len(raw), len(rows[0]) if rows else 0)
+    return Columns(stamps if message_type.has_header else None, values, names)
+
+
+def _decode(data: bytes, message_type: MessageType, topic: str, k: int) -> Any:
+    try:
+        return message_type.decode(data)
+    except Exception as err:  # the decoder leaks errors of many kinds on damaged bytes
+        raise RecordingError(
+            f"topic {topic}, message {k}: its {len(data)} bytes are not a {message_type.name}; the bag is damaged"
+        ) from err
+
+
+def _same_names(before: tuple[str, ...] | None, now: tuple[str, ...], topic: str, k: int) -> tuple[str, ...]:
+    if before is not None and now != before:
+        what = "order of the joint names changes" if sorted(before) == sorted(now) else "joint names change"
+        raise RecordingError(
+            f"topic {topic}, message {k}: the {what}: expected {', '.join(before)} as in message 0, "
+            f"got {', '.join(now) or 'none'}"
+        )
+    return now
+
+
+def _descend(message: Any, field: str) -> Any:
+    for part in field.split("."):
+        message = message[int(part)] if part.isdecimal() else getattr(message, part)
+    return message
+
+
+def _flatten(value: Any, row: list[float]) -> None:
+    if isinstance(value, np.ndarray):
+        row.extend(float(x) for x in value.tolist())
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _flatten(item, row)
+    elif hasattr(value, "__dataclass_fields__"):
+        for name, kind in value.__dataclass_fields__.items():
+            if "ClassVar" not in str(kind.type):
+                _flatten(getattr(value, name), row)
+    elif isinstance(value, str):
+        raise TypeError("a text is not a number")
+    else:
+        row.append(float(value))

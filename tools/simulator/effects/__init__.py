@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The effects that can be simulated, one file each; a new file is found by being here."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from functools import cache
+
+from jointscope.robots.errors import EffectError
+from jointscope.robots.robot import Robot
+from jointscope.tools.simulator.effect import SimulatedEffect
+
+
+@cache
+def simulated_effects() -> dict[str, type[SimulatedEffect]]:
+    """All effects of this folder by id."""
+    found: dict[str, type[SimulatedEffect]] = {}
+    for module_info in sorted(pkgutil.iter_modules(__path__), key=lambda info: info.name):
+        module = importlib.import_module(f"{__name__}.{module_info.name}")
+        for _, member in inspect.getmembers(module, inspect.isclass):
+            if issubclass(member, SimulatedEffect) and member.__module__ == module.__name__:
+                found[member.id] = member
+    return found
+
+
+def make_effect(text: str, robot: Robot) -> SimulatedEffect:
+    """An effect from its text ID@OWNER[:param=value,...].
+
+    Args:
+        text: for example "bearing_flexibility@joint1:damping_x=10,damping_y=12".
+        robot: the robot with its true parameters.
+
+    Returns:
+        The effect, ready to be built into a simulation.
+
+    Raises:
+        EffectError: unknown id, owner or parameter, or text of another form.
+    """
+    head, _, tail = text.partition(":")
+    effect_id, at, owner = head.partition("@")
+    known = simulated_effects()
+    if effect_id not in known:
+        raise EffectError(f"effect {effect_id!r} cannot be simulated; known are {', '.join(known)}")
+    if not at or not owner:
+        raise EffectError(f"effect {text!r}: expected ID@OWNER[:param=value,...], for example {effect_id}@joint1")
+    return known[effect_id](owner, _parameters(text, tail), robot)
+
+
+def _parameters(text: str, tail: str) -> dict[str, float]:
+    parameters: dict[str, float] = {}
+    for item in filter(None, tail.split(",")):
+        name, _, number = item.partition("=")
+        try:
+            parameters[name.strip()] = float(number)
+        except ValueError as err:
+            raise EffectError(f"effect {text!r}: expected param=number, got {item!r}") from err
+    return parameters

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The base of a joint tilts: two more hinges x, y with spring and damper sit before the joint.
+
+The hinges turn about the two coordinate axes of the joint's frame that are across the joint's axis, first x, then y,
+before the joint's own rotation. The moved body needs its transverse inertia, which motion about the joint alone never
+shows; it may be given here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import EffectError
+from jointscope.robots.robot import Robot
+from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.mujoco_module import load_mujoco
+from jointscope.tools.simulator.specification import link_body, set_linear
+
+PASSIVE = ("stiffness", "damping", "frictionloss", "armature")  # what another effect may have given the joint
+
+
+class BearingFlexibility(SimulatedEffect):
+    """Two sprung hinges across the axis of a joint; a compliance of zero is a rigid direction."""
+
+    id = "bearing_flexibility"
+    acts_on = "joint"
+    defaults: ClassVar[Mapping[str, float]] = {
+        "compliance_x": 1.0 / 2500.0,  # [rad/(N m)]
+        "compliance_y": 1.0 / 3200.0,  # [rad/(N m)]
+        "damping_x": 12.0,  # [N m s/rad]
+        "damping_y": 14.0,  # [N m s/rad]
+        "inertia_x": 2.4,  # [kg m2] of the moved body about x
+        "inertia_y": 2.7,  # [kg m2] of the moved body about y
+    }
+
+    def __init__(self, owner: str, parameters: Mapping[str, float], robot: Robot):
+        super().__init__(owner, parameters, robot)
+        for name, value in self.parameters.items():
+            if not np.isfinite(value) or value < 0 or (value == 0 and name.startswith("inertia")):
+                raise EffectError(f"effect {self.id}@{owner}: {name} must not be negative, got {value:g}")
+
+    def edit(self, spec: Any) -> None:
+        """Puts the hinges before the joint, and the transverse inertia on its body."""
+        mujoco = load_mujoco()
+        joint = spec.joint(self.owner)
+        kind, axis = joint.type, np.array(joint.axis)
+        passive = {name: np.copy(getattr(joint, name)) for name in PASSIVE}
+        body = spec.body(link_body(self.owner))
+        across = np.sort(np.argsort(np.abs(axis))[:2])
+        self._override_inertia(body, across)
+        spec.delete(joint)  # joints of a body act in the order in which they were added
+        for name, k in zip("xy", across, strict=True):
+            compliance = self.parameters[f"compliance_{name}"]
+            if compliance > 0:
+                hinge_name = f"{self.owner}.bearing_{name}"
+                hinge = body.add_joint(name=hinge_name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=np.eye(3)[k])
+                set_linear(hinge, "stiffness", 1.0 / compliance)
+                set_linear(hinge, "damping", self.parameters[f"damping_{name}"])
+        again = body.add_joint(name=self.owner, type=kind, axis=axis)
+        for name, value in passive.items():
+            setattr(again, name, value)
+
+    def _override_inertia(self, body: Any, across: NDArray[np.intp]) -> None:
+        inertia = np.array(body.fullinertia)
+        inertia[across] = self.parameters["inertia_x"], self.parameters["inertia_y"]
+        moments = np.linalg.eigvalsh(_matrix(inertia))
+        if moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+            raise EffectError(
+                f"effect {self.id}@{self.owner}: transverse inertias {inertia[across][0]:g} and "
+                f"{inertia[across][1]:g} kg m2 are impossible beside the rest of the body's inertia"
+            )
+        body.fullinertia = inertia
+
+
+def _matrix(full: NDArray[np.float64]) -> NDArray[np.float64]:
+    xx, yy, zz, xy, xz, yz = full
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the sensors make of a trajectory: samples at their own times, with bias, mounting error, noise and steps.
+
+An encoder is quantized. Its step and the noise before it are chosen so that together they have the standard deviation
+of the robot file: step^2 / 12 + noise^2 = sigma^2, with noise = 0.3 sigma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from jointscope.robots.errors import SimulationError
+from jointscope.robots.recording import Stream
+from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
+from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.engine import TICK, Engine
+from jointscope.tools.simulator.random_streams import random_stream
+from jointscope.tools.simulator.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+ANALOG_SHARE = 0.3  # noise before quantization, share of the encoder's sigma
+MOUNTING_SIGMA = np.deg2rad(2.0)  # [rad] about each axis
+BIAS_SIGMA = 2e-3  # [rad/s] of the true bias about that of the robot file
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How samples are taken and sent.
+
+    Attributes:
+        encoder_rate, gyro_rate: samples per second [Hz].
+        jitter: standard deviation of a sample's time about its nominal one; the value is that of its own time [s].
+        drop: probability that a sensor sample is lost. Commands are never lost.
+        transport_delay: mean time from stamp to arrival [s].
+        quantized: False gives encoders white Gaussian noise of the same sigma instead of steps.
+    """
+
+    encoder_rate: float = 1.0 / TICK
+    gyro_rate: float = 1.0 / TICK
+    jitter: float = 0.0
+    drop: float = 0.0
+    transport_delay: float = 5e-4
+    quantized: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("encoder_rate", "gyro_rate"):
+            if not 1.0 <= getattr(self, name) <= 1e5:
+                raise SimulationError(f"{name}: expected 1 to 100000 Hz, got {getattr(self, name):g}")
+        for name in ("jitter", "transport_delay"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise SimulationError(f"{name}: expected 0 to 1 s, got {getattr(self, name):g}")
+        if not 0.0 <= self.drop <= 0.95:
+            raise SimulationError(f"drop: expected a probability of 0 to 0.95, got {self.drop:g}")
+
+    def stamps(self, rate: float, seconds: float, rng: np.random.Generator) -> Array:
+        """Times at which a sensor is sampled in [0, seconds], strictly increasing, shape (m,) [s]."""
+        nominal = np.arange(int(np.ceil(seconds * rate - 1e-9))) / rate
+        shift = np.clip(self.jitter * rng.standard_normal(len(nominal)), -0.45 / rate, 0.45 / rate)
+        return np.clip(nominal + shift, 0.0, seconds)
+
+    def kept(self, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+        """Which samples are not lost, shape (count,)."""
+        return rng.random(count) >= self.drop
+
+    def received(self, stamps: Array, rng: np.random.Generator) -> Array:
+        """Times of arrival, shape (m,) [s]: half the delay is fixed, half is random."""
+        return stamps + self.transport_delay * (0.5 + rng.exponential(0.5, len(stamps)))
+
+
+@dataclass(frozen=True)
+class MountedGyro:
+    """A gyro as it really is.
+
+    Attributes:
+        sensor: as in the robot file.
+        bias: true bias, shape (3,) [rad/s].
+        R_imu_body: true mounting, shape (3, 3).
+    """
+
+    sensor: Gyro
+    bias: Array
+    R_imu_body: Array
+
+    @classmethod
+    def draw(cls, sensor: Gyro, bias_rng: np.random.Generator, mounting_rng: np.random.Generator) -> MountedGyro:
+        """A bias and a mounting error about those of the robot file."""
+        bias = sensor.bias + BIAS_SIGMA * bias_rng.standard_normal(3)
+        error = Rotation.from_rotvec(MOUNTING_SIGMA * mounting_rng.standard_normal(3)).as_matrix()
+        return cls(sensor, bias, sensor.R_imu_body @ error)
+
+
+def read_encoder(encoder: MotorEncoder, q_motor: Array, noise: Array, quantized: bool) -> Array:
+    """What encoders read.
+
+    Args:
+        encoder: the sensor.
+        q_motor: angles that they are at, shape (m, n_joints) [rad].
+        noise: standard normal numbers of the same shape.
+        quantized: steps and a little noise, or noise only.
+
+    Returns:
+        Readings, shape (m, n_joints) [rad].
+    """
+    if not quantized:
+        return q_motor + encoder.zero + encoder.sigma * noise
+    step = np.sqrt(12.0 * (1.0 - ANALOG_SHARE**2)) * encoder.sigma
+    return step * np.rint((q_motor + encoder.zero + ANALOG_SHARE * encoder.sigma * noise) / step)
+
+
+def encoder_stream(
+    encoder: MotorEncoder,
+    engine: Engine,
+    trajectory: Trajectory,
+    stamps: Array,
+    noise: Array,
+    sampling: Sampling,
+    seed: int,
+) -> Stream:
+    """The stream of the motor encoders; `noise` is standard normal, shape (m, n_joints)."""
+    q, _ = trajectory.at(taken_at(engine.effects, encoder, stamps))
+    angles = distort(engine.effects, encoder, stamps, q[:, engine.motor])
+    return _stream(encoder, stamps, read_encoder(encoder, angles, noise, sampling.quantized), sampling, seed)
+
+
+def gyro_stream(
+    gyro: MountedGyro, engine: Engine, trajectory: Trajectory, stamps: Array, sampling: Sampling, seed: int
+) -> Stream:
+    """The stream of one gyro."""
+    sensor = gyro.sensor
+    q, v = trajectory.at(taken_at(engine.effects, sensor, stamps))
+    rates = engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T + gyro.bias
+    noise = sensor.sigma * random_stream(seed, "noise", sensor.name).standard_normal(rates.shape)
+    return _stream(sensor, stamps, distort(engine.effects, sensor, stamps, rates) + noise, sampling, seed)
+
+
+def taken_at(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array) -> Array:
+    """When samples with these stamps were really taken [s]."""
+    for effect in effects:
+        stamps = effect.taken_at(sensor, stamps)
+    return stamps
+
+
+def distort(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array, values: Array) -> Array:
+    """What the effects make of true values, before noise."""
+    for effect in effects:
+        values = effect.reading(sensor, stamps, values)
+    return values
+
+
+def _stream(sensor: Sensor, stamps: Array, values: Array, sampling: Sampling, seed: int) -> Stream:
+    kept = sampling.kept(len(stamps), random_stream(seed, "drop", sensor.name))
+    received = sampling.received(stamps, random_stream(seed, "transport", sensor.name))
+    return Stream(sensor.name, stamps[kept], values[kept], sensor.channels, sensor.unit, received[kept])

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The MuJoCo model of a robot with elastic joints, built from parts that the engine already has.
+
+Each link is a body with its joint. Each rotor is a body of its own in the world, so it feels nothing of the link's
+motion but the spring: a fixed tendon of "length" q_link - q_motor with stiffness and damping. The motor is an actuator
+on the rotor whose gain is the voltage constant and whose bias is the back-EMF. Dry friction is the engine's own
+friction loss. No equation of motion is written here; the engine makes them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.robot import Robot
+from jointscope.tools.simulator.mujoco_module import load_mujoco
+
+Array = NDArray[np.float64]
+
+DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
+DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # almost rigid
+
+
+def link_body(joint: str) -> str:
+    """Name of the body that a joint moves."""
+    return f"{joint}.link"
+
+
+def motor_joint(joint: str) -> str:
+    """Name of the rotor's hinge."""
+    return f"{joint}.motor"
+
+
+def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
+    """The editable model: chain, rotors, springs, motors, one site per gyro.
+
+    Args:
+        robot: the robot with the true parameter values.
+        friction: "dry" for the engine's friction loss on the rotors; anything else leaves them without friction.
+        timestep: of the integration [s].
+
+    Returns:
+        A `mujoco.MjSpec`, not yet compiled. Joints carry the robot's joint names, rotors `motor_joint(name)`.
+    """
+    mujoco = load_mujoco()
+    spec = mujoco.MjSpec()
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.timestep = timestep
+    spec.option.gravity = robot.tree.gravity
+    # The engine would otherwise shift a body's inertia to satisfy inequalities that the robot file has passed already.
+    spec.compiler.balanceinertia = False
+    _add_links(mujoco, spec, robot)
+    for joint in robot.joints:
+        _add_rotor(mujoco, spec, robot, joint, friction)
+        _add_spring(spec, robot, joint)
+        _add_motor(mujoco, spec, robot, joint)
+    for gyro in robot.gyros:
+        _add_site(spec, robot, gyro.name, gyro.body)
+    return spec
+
+
+def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
+    model = robot.tree.model
+    for j in range(1, model.njoints):
+        name, parent = model.names[j], model.parents[j]
+        placement, inertia = model.jointPlacements[j], model.inertias[j]
+        parent_body = spec.body(link_body(model.names[parent])) if parent else spec.worldbody
+        I = inertia.inertia  # noqa: E741  about the centre of mass, in the axes of the joint
+        body = parent_body.add_body(
+            name=link_body(name),
+            pos=placement.translation,
+            quat=_quaternion_wxyz(placement.rotation),
+            explicitinertial=True,
+            mass=max(inertia.mass, 1e-9),  # [kg] the engine refuses a moving body without any
+            ipos=inertia.lever,
+            fullinertia=[I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]],
+        )
+        axis, kind = _joint_axis(mujoco, model, j)
+        body.add_joint(name=name, type=kind, axis=axis)
+
+
+def _joint_axis(mujoco: Any, model: pin.Model, j: int) -> tuple[Array, Any]:
+    """Axis of a joint in its own frame, and its type: what pinocchio made of the URDF's <axis>."""
+    column = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), j)[:, model.joints[j].idx_v]
+    if np.any(column[3:]):
+        return column[3:], mujoco.mjtJoint.mjJNT_HINGE
+    return column[:3], mujoco.mjtJoint.mjJNT_SLIDE
+
+
+def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) -> None:
+    inertia = robot.drive_parameter(joint, "inertia").value
+    rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
+    hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+    if friction == "dry":
+        hinge.frictionloss = robot.parameter(f"{joint}.coulomb_torque").value
+        hinge.solref_friction = [DRY_TIME_CONSTANT, 1.0]
+        hinge.solimp_friction = DRY_IMPEDANCE
+
+
+def _add_spring(spec: Any, robot: Robot, joint: str) -> None:
+    tendon = spec.add_tendon(name=f"{joint}.spring")
+    tendon.wrap_joint(joint, 1.0)
+    tendon.wrap_joint(motor_joint(joint), -1.0)
+    tendon.springlength = [0.0, 0.0]
+    set_linear(tendon, "stiffness", robot.parameter(f"{joint}.stiffness").value)
+    set_linear(tendon, "damping", robot.parameter(f"{joint}.damping").value)
+
+
+def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
+    gain, back_emf = 1.0, 0.0
+    if robot.command.unit != "N m":
+        gain = robot.drive_parameter(joint, "k_pwm").value * robot.command_volts
+        back_emf = robot.drive_parameter(joint, "k_mi").value
+    motor = spec.add_actuator(
+        name=f"{joint}.drive",
+        target=motor_joint(joint),
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    motor.gainprm[0] = gain
+    motor.biasprm[2] = -back_emf
+
+
+def _add_site(spec: Any, robot: Robot, name: str, body: str) -> None:
+    frame = robot.tree.model.frames[robot.tree.frame_id(body)]
+    joint = robot.tree.model.names[frame.parentJoint]
+    parent = spec.body(link_body(joint)) if frame.parentJoint else spec.worldbody
+    placement = frame.placement
+    parent.add_site(name=name, pos=placement.translation, quat=_quaternion_wxyz(placement.rotation))
+
+
+def set_linear(element: Any, name: str, value: float) -> None:
+    """Sets a stiffness or damping, which is a number in MuJoCo 3 and the coefficients of a polynomial in MuJoCo 4."""
+    if np.ndim(getattr(element, name)):
+        getattr(element, name)[:] = [value, 0.0, 0.0]
+    else:
+        setattr(element, name, value)
+
+
+def _quaternion_wxyz(R: Array) -> Array:
+    x, y, z, w = pin.Quaternion(R).coeffs()
+    return np.array([w, x, y, z])

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the engine did, on its fine grid, and at any time between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Positions and velocities of all coordinates of the engine at equal steps from time zero.
+
+    Attributes:
+        step: of the grid [s].
+        q: positions, shape (m, nq) [rad].
+        v: velocities, shape (m, nq) [rad/s].
+    """
+
+    step: float
+    q: Array
+    v: Array
+
+    @property
+    def end(self) -> float:
+        """Last time of the grid [s]."""
+        return self.step * (len(self.q) - 1)
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities at any times, from the cubic through positions and velocities of two grid points.
+
+        Times outside the grid get its ends; on a grid point the result is that point exactly.
+
+        Args:
+            times: shape (k,) [s].
+
+        Returns:
+            Positions and velocities, each of shape (k, nq) [rad], [rad/s].
+        """
+        place = np.clip(np.asarray(times) / self.step, 0.0, len(self.q) - 1.0)
+        nearest = np.rint(place)
+        # A stamp such as 0.3 is not a multiple of the step in floating point; within a picosecond it is meant.
+        place = np.where(np.abs(place - nearest) * self.step < 1e-12, nearest, place)
+        i = np.minimum(place.astype(int), len(self.q) - 2)
+        s = (place - i)[:, None]
+        q0, q1, h = self.q[i], self.q[i + 1], self.step
+        m0, m1 = h * self.v[i], h * self.v[i + 1]
+        rise = q1 - q0
+        c2, c3 = 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise
+        q = q0 + s * (m0 + s * (c2 + s * c3))
+        v = (m0 + s * (2.0 * c2 + 3.0 * s * c3)) / h
+        on_grid = place == nearest
+        q[on_grid], v[on_grid] = self.q[place[on_grid].astype(int)], self.v[place[on_grid].astype(int)]
+        return q, v

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope simulate`: a recording from MuJoCo as a bag, and the truth beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import SimulationError
+from jointscope.robots.robot_file import load_robot
+from jointscope.tools.bags.write_bag import write_bag
+from jointscope.tools.simulator import DEFAULT_SECONDS, Disturbance, Simulation, simulate, simulated_effects
+
+EXAMPLE = """example:
+  jointscope simulate doggy -o train.mcap --seconds 20 --seed 3 --effect bearing_flexibility@joint1
+  jointscope simulate doggy -o test.mcap --seconds 10 --seed 3 --effect bearing_flexibility@joint1 --motion moves
+
+The same seed is the same robot; the truth is written beside the bag as train.truth.json."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="a recording from an engine that is independent of the estimator's own model",
+        description="Simulates a robot with MuJoCo and writes a bag and the truth beside it.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    defaults = ", ".join(f"{seconds:g} for {motion}" for motion, seconds in DEFAULT_SECONDS.items())
+    parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
+    parser.add_argument("-o", "--output", metavar="BAG", type=Path, required=True, help=".bag, .mcap, .db3 or a folder")
+    parser.add_argument("--motion", choices=list(DEFAULT_SECONDS), default="calibration")
+    parser.add_argument("--seconds", type=float, metavar="S", help=f"duration [s]; default {defaults}")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="ID@OWNER[:param=value,...]",
+        help=f"a physical effect; may be repeated; known: {', '.join(simulated_effects())}",
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="true value of a parameter; may be repeated"
+    )
+    parser.add_argument("--friction", choices=["dry", "smooth"], default="dry", help="Coulomb friction of the motors")
+    _add_sensor_options(parser)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.set_defaults(run=run)
+
+
+def _add_sensor_options(parser: argparse.ArgumentParser) -> None:
+    sensors = parser.add_argument_group("sensors and disturbances")
+    sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
+    sensors.add_argument("--gyro-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
+    sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of the samples' times, 1 sigma [ms]")
+    sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="probability that a sample is lost")
+    sensors.add_argument(
+        "--transport-delay", type=float, default=0.5, metavar="MS", help="mean time from stamp to bag [ms]; default 0.5"
+    )
+    sensors.add_argument("--white-encoder", action="store_true", help="white encoder noise instead of quantization")
+    sensors.add_argument(
+        "--disturbance",
+        metavar="NAME=VALUE,...",
+        help="random torques: link and motor [N m, 1 sigma], correlation_time [s]; "
+        "for example link=0.3,motor=0.3,correlation_time=0.02",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulates, writes bag, truth and JSON, and says what was done."""
+    robot = load_robot(args.robot)
+    _check_folders(args.output, args.json)
+    simulation = simulate(
+        robot,
+        args.motion,
+        args.seconds,
+        args.seed,
+        parameters=_assignments(args.set),
+        effects=args.effect,
+        friction=args.friction,
+        disturbance=Disturbance.parse(args.disturbance or ""),
+        jitter=args.jitter * 1e-3,
+        drop=args.drop,
+        encoder_rate=args.encoder_rate,
+        gyro_rate=args.gyro_rate,
+        transport_delay=args.transport_delay * 1e-3,
+        quantized=not args.white_encoder,
+        progress=_progress_bar(),
+    )
+    write_bag(args.output, simulation.recording, robot)
+    truth_file = args.output.parent / f"{args.output.stem}.truth.json"
+    _write_json(truth_file, simulation.truth)
+    summary = _summary(simulation, args.output, truth_file)
+    if args.json is not None:
+        _write_json(args.json, summary)
+    print(_as_text(summary))
+    return 0
+
+
+def _assignments(texts: Sequence[str]) -> dict[str, float]:
+    values = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        try:
+            values[name.strip()] = float(number)
+        except ValueError:
+            raise SimulationError(f"--set {text}: expected NAME=VALUE, for example joint1.stiffness=180") from None
+    return values
+
+
+def _check_folders(*files: Path | None) -> None:
+    """Complains before the work is done, not after."""
+    for file in files:
+        if file is not None and not file.parent.is_dir():
+            raise SimulationError(f"cannot write {file}: the folder {file.parent} does not exist")
+
+
+def _summary(simulation: Simulation, bag: Path, truth_file: Path) -> dict[str, Any]:
+    streams = simulation.recording.streams.values()
+    return {
+        "bag": str(bag),
+        "truth_file": str(truth_file),
+        "samples": {stream.name: len(stream) for stream in streams},
+        "truth": simulation.truth,
+    }
+
+
+def _as_text(summary: dict[str, Any]) -> str:
+    truth = summary["truth"]
+    effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
+    samples = ", ".join(f"{name} {count}" for name, count in summary["samples"].items())
+    return (
+        f"{summary['bag']}: {truth['seconds']:g} s of {truth['robot']}, motion {truth['motion']}, "
+        f"seed {truth['seed']}, {truth['friction']} friction\n"
+        f"  effects: {effects}\n  samples: {samples}\n  truth:   {summary['truth_file']}"
+    )
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    """Writes a file whole or not at all."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as err:
+        raise SimulationError(f"cannot write {path}: {err.strerror or err}") from err
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _progress_bar() -> Callable[[float], None] | None:
+    if not sys.stderr.isatty():
+        return None
+
+    def show(share: float) -> None:
+        bar = "#" * round(30 * share)
+        end = "\n" if share >= 1.0 else ""
+        print(f"\rsimulating [{bar:<30}] {share:4.0%}", end=end, file=sys.stderr, flush=True)
+
+    return show
