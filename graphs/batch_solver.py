@@ -28,7 +28,7 @@ Progress = Callable[[str, float], None]
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 LAMBDA_LARGEST = 1e8
-STEP_TOLERANCE = 0.02  # [sigma] a shared value that moves less has arrived
+STEP_TOLERANCE = 0.02  # [sigma] a shared value whose last step was smaller has arrived
 COST_TOLERANCE = 1e-7  # relative fall of the cost
 
 
@@ -70,8 +70,9 @@ class Solution:
         estimate: the minimum.
         cost: half the sum of squared whitened residuals.
         iterations: history.
-        hessian: Hessian on the shared values with all states eliminated, at the last linearization, shape (s, s).
+        hessian: Hessian on the shared values with all states eliminated, where the last step began, shape (s, s).
         shared: layout of the shared values.
+        systems: normal equations of each recording at the estimate.
         converged: False if the iterations ended before the step became small.
     """
 
@@ -79,6 +80,7 @@ class Solution:
     cost: float
     hessian: Array
     shared: SharedLayout
+    systems: list[NormalEquations]
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
 
@@ -113,49 +115,87 @@ def solve(
     """
     shared = SharedLayout.of(start.calibrations[0], len(problems))
     free = _free(shared, hold)
-    estimate, damping = start, LAMBDA_START
-    solution = Solution(start, total_cost(problems, start), np.zeros((shared.size, shared.size)), shared)
+    systems = _build(problems, start)
+    solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
     if not np.isfinite(solution.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
+    damping = LAMBDA_START
     for i in range(max_iterations):
         if progress:
             progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
-        systems = [build(p, x, c) for p, x, c in zip(problems, estimate.states, estimate.calibrations, strict=True)]
-        while True:
-            eliminations = [eliminate(system, damping) for system in systems]
-            H, g = reduced_system(problems[0], systems, eliminations, shared, estimate.calibrations[0])
-            dp, step_in_sigmas = _step(H, g, free, damping)
-            dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
-            trial = estimate.moved(dx, dp, shared)
-            trial_cost = total_cost(problems, trial)
-            if np.isfinite(trial_cost) and trial_cost <= solution.cost * (1.0 + 1e-12):
-                break
+        step = _try(problems, solution, free, damping)
+        while not step.accepted:
             damping *= LAMBDA_FACTOR
             if damping > LAMBDA_LARGEST:
-                if step_in_sigmas < step_tolerance:
-                    solution.converged = True
-                    return solution
-                raise SolveError(
-                    f"the cost {solution.cost:.6g} cannot be lowered any further although the next step is "
-                    f"{step_in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
-                )
-        fall = (solution.cost - trial_cost) / max(solution.cost, 1e-300)
-        solution.iterations.append(Iteration(solution.cost, trial_cost, damping, step_in_sigmas))
-        estimate, damping = trial, max(damping / LAMBDA_FACTOR, 1e-12)
-        solution.estimate, solution.cost, solution.hessian = estimate, trial_cost, H
-        if step_in_sigmas < step_tolerance and fall < 1e-3 or fall < COST_TOLERANCE and damping < LAMBDA_START:
+                return _stuck(solution, step, step_tolerance)
+            step = _try(problems, solution, free, damping)
+        fall = (solution.cost - step.cost) / max(solution.cost, 1e-300)
+        solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
+        solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
+        small = step.in_sigmas < step_tolerance and fall < 1e-3
+        if small or (fall < COST_TOLERANCE and damping <= LAMBDA_START):
             solution.converged = True
             break
+        damping = max(damping / LAMBDA_FACTOR, 1e-12)
     return solution
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A trial step: where it leads, and whether the cost falls."""
+
+    estimate: Estimate
+    systems: list[NormalEquations]
+    cost: float
+    in_sigmas: float
+    accepted: bool
+
+
+def _try(problems: Sequence[BagProblem], solution: Solution, free: NDArray[np.intp], damping: float) -> _Step:
+    """One damped Gauss-Newton step. The trial point is linearised at once: nearly every step is accepted."""
+    shared = solution.shared
+    eliminations = [eliminate(system, damping) for system in solution.systems]
+    H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    dp, in_sigmas = _solve_shared(H, g, free, damping)
+    dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
+    solution.hessian = H
+    trial = solution.estimate.moved(dx, dp, shared)
+    systems = _build(problems, trial)
+    trial_cost = _cost(problems[0], systems, trial)
+    accepted = bool(np.isfinite(trial_cost) and trial_cost <= solution.cost * (1.0 + 1e-12))
+    return _Step(trial, systems, trial_cost, in_sigmas, accepted)
+
+
+def _stuck(solution: Solution, step: _Step, step_tolerance: float) -> Solution:
+    """No damping lowers the cost: a minimum within rounding, or an error."""
+    if step.in_sigmas >= max(step_tolerance, 0.1):
+        raise SolveError(
+            f"the cost {solution.cost:.6g} cannot be lowered any further although the next step is "
+            f"{step.in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
+        )
+    solution.converged = True
+    return solution
+
+
+def _build(problems: Sequence[BagProblem], estimate: Estimate) -> list[NormalEquations]:
+    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
+    return [build(problem, x, calibration) for problem, x, calibration in bags]
+
+
+def _cost(problem: BagProblem, systems: Sequence[NormalEquations], estimate: Estimate) -> float:
+    return sum(system.cost for system in systems) + _prior_cost(problem, estimate.calibrations[0])
+
+
+def _prior_cost(problem: BagProblem, calibration: Calibration) -> float:
+    residuals = [prior.residual((), calibration) / prior.sigmas for prior in priors_of(problem)]
+    return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
 
 
 def total_cost(problems: Sequence[BagProblem], estimate: Estimate) -> float:
     """Cost of all recordings and of the priors they share."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
     total = sum(cost(problem, x, calibration) for problem, x, calibration in bags)
-    for prior in priors_of(problems[0]):
-        total += 0.5 * float(np.sum((prior.residual((), estimate.calibrations[0]) / prior.sigmas) ** 2))
-    return total
+    return total + _prior_cost(problems[0], estimate.calibrations[0])
 
 
 def reduced_system(
@@ -190,7 +230,7 @@ def _free(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero(~held)
 
 
-def _step(H: Array, g: Array, free: NDArray[np.intp], damping: float) -> tuple[Array, float]:
+def _solve_shared(H: Array, g: Array, free: NDArray[np.intp], damping: float) -> tuple[Array, float]:
     """Damped step of the shared values, and the largest undamped one in sigmas."""
     dp = np.zeros(len(g))
     if len(free) == 0:

@@ -86,7 +86,7 @@ def build(problem: BagProblem, x: Array, calibration: Calibration) -> NormalEqua
 
 
 def linearize_all(
-    problem: BagProblem, x: Array, calibration: Calibration
+    problem: BagProblem, x: Array, calibration: Calibration, dynamics_only: bool = False
 ) -> Iterator[tuple[Factor, NDArray[np.intp], Linearization]]:
     """All factors chunk by chunk: factor, first tick of each sample, linearization."""
     m = len(problem.dynamics)
@@ -94,7 +94,7 @@ def linearize_all(
         stop = min(start + CHUNK, m)
         part = problem.dynamics.select(slice(start, stop))
         yield part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
-    for placed in problem.placed:
+    for placed in () if dynamics_only else problem.placed:
         for factor, ticks in chunks(placed):
             yield factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
 

@@ -12,17 +12,20 @@ The shared values widen them: x moves by -X dp for a change dp, X = A^-1 B.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.banded_solver import Elimination
+from jointscope.graphs.banded_solver import Elimination, eliminate
+from jointscope.graphs.batch_solver import Solution, reduced_system
 from jointscope.graphs.normal_equations import layout, linearize_all, whitened
+from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
@@ -73,6 +76,27 @@ class StatePosterior:
         return self.given_shared[tick] + X @ self.shared @ X.T
 
 
+def posteriors(problems: Sequence[BagProblem], solution: Solution) -> tuple[list[StatePosterior], Array]:
+    """Uncertainty of all recordings at a solution, and the covariance of all shared values.
+
+    Raises:
+        SolveError: the Hessian is not positive definite.
+    """
+    eliminations = [eliminate(system) for system in solution.systems]
+    H, _ = reduced_system(
+        problems[0], solution.systems, eliminations, solution.shared, solution.estimate.calibrations[0]
+    )
+    try:
+        covariance = cho_solve(cho_factor(H), np.eye(len(H)))
+    except np.linalg.LinAlgError as err:
+        raise SolveError("the shared values are not determined: their Hessian is not positive definite") from err
+    found = []
+    for i, elimination in enumerate(eliminations):
+        index = solution.shared.indices(i)
+        found.append(StatePosterior.of(elimination, covariance[np.ix_(index, index)]))
+    return found, covariance
+
+
 @dataclass(frozen=True)
 class ResidualPart:
     """Whitened residuals of some samples of a factor and what the estimate makes of them.
@@ -93,12 +117,16 @@ class ResidualPart:
 
 
 def residual_parts(
-    problem: BagProblem, x: Array, calibration: Calibration, posterior: StatePosterior
+    problem: BagProblem,
+    x: Array,
+    calibration: Calibration,
+    posterior: StatePosterior,
+    dynamics_only: bool = False,
 ) -> Iterator[ResidualPart]:
     """All residuals of a recording with leverage and score, chunk by chunk."""
     columns = layout(calibration)
     p = posterior.shared.shape[0]
-    for factor, ticks, linear in linearize_all(problem, x, calibration):
+    for factor, ticks, linear in linearize_all(problem, x, calibration, dynamics_only):
         r, J, by_block = whitened(factor, linear)
         by_shared = np.zeros((*r.shape, p))
         for block, J_block in by_block.items():

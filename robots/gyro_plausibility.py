@@ -25,8 +25,8 @@ ENOUGH_RATE = 0.05  # [rad/s] rms; below, noise decides
 SAME_RATE = 5.0  # ratios up to this are flexibility, not units
 UNIT_TOLERANCE = 2.4  # a unit explains a ratio that it meets within this factor
 SAME_MOTION = 0.5  # correlation of the two rates' norms
-BAD_FIT = 0.6  # share of the gyro's power that the expected axes leave
-GOOD_SHARE = 0.35  # other axes must leave less than this part of it
+BAD_FIT, BETTER = 0.6, 0.35  # the expected axes leave more than that share of the gyro's power, others that much less
+ODD_FIT, MUCH_BETTER = 0.2, 0.1  # where they leave less, others must be clearly better
 ENOUGH_INSTANTS = 10
 DEGREES = 180.0 / np.pi
 
@@ -131,7 +131,7 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         axes: float(np.sum((pair.measured - pair.implied @ _axes_matrix(axes).T) ** 2)) / power for axes in _ALL_AXES
     }
     expected, best = left[_ALL_AXES[0]], min(left.values())
-    if expected < BAD_FIT or best > GOOD_SHARE * expected:
+    if expected < ODD_FIT or best > expected * (BETTER if expected > BAD_FIT else MUCH_BETTER):
         return []
     # axes without motion fit either way: of the equally good answers take the one closest to the robot file
     good = [axes for axes in _ALL_AXES if left[axes] < best + 0.02]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rigid bodies of a robot: accelerations, mass matrix and body rates with derivatives, from pinocchio.
 
-All functions take many samples at once; pinocchio is called once per sample.
+All functions take many samples at once; where pinocchio has no call for many, it is called once per sample.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class RigidTree:
         self.model = _reduce(full, self.joints, urdf)
         self.model.gravity = pin.Motion(np.asarray(gravity, float), np.zeros(3))
         self.data = self.model.createData()
+        self._pool = pin.ModelPool(self.model, 1)
         self.gravity = np.asarray(gravity, float)
         self._check_inertias()
 
@@ -71,12 +72,13 @@ class RigidTree:
         Returns:
             Accelerations, shape (m, n) [rad/s^2].
         """
-        a = np.empty_like(q)
         v = v if self.coriolis else np.zeros_like(v)
-        model, data, aba = self.model, self.data, pin.aba
-        for k in range(len(q)):
-            a[k] = aba(model, data, q[k], v[k], tau[k])
-        return a
+        if len(q) == 1:
+            return np.asarray(pin.aba(self.model, self.data, q[0], v[0], tau[0]))[None]
+        a = np.empty(q.shape[::-1], order="F")
+        columns = (np.asfortranarray(part.T) for part in (q, v, tau))
+        pin.abaInParallel(1, self._pool, *columns, a)
+        return np.ascontiguousarray(a.T)
 
     def acceleration_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
         """Joint accelerations and their derivatives.

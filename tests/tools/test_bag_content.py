@@ -62,8 +62,13 @@ def write_with(path, robot, messages, msgtype="sensor_msgs/msg/JointState", garb
             connection = writer.add_connection(need.source.topic, other.name, typestore=other.typestore)
             for k in range(COUNT):
                 stamp = SECOND + k * MILLISECOND
-                raw = joint_state(other, JointMessage(stamp, JOINTS, ()), effort=(0.1, 0.2, 0.3 + k))
-                writer.write(connection, stamp, raw if other is joint else imu_bytes(imu, stamp, k))
+                command = JointMessage(stamp, JOINTS, ())
+                raw = (
+                    joint_state(joint, command, effort=(0.1, 0.2, 0.3 + k))
+                    if other is joint
+                    else imu_bytes(imu, stamp, k)
+                )
+                writer.write(connection, stamp, raw)
         connection = writer.add_connection(ENCODER, kind.name, typestore=kind.typestore)
         for k, message in enumerate(messages):
             raw = joint_state(kind, message) if kind.name == joint.name else imu_bytes(imu, message.stamp, k)
@@ -130,6 +135,16 @@ def test_more_joints_than_the_robot_has_are_ignored_and_noted(doggy, path):
     assert recording.streams["motor_encoder"].values[0].tolist() == [0.0, 200.0, 300.0]
     assert [n.text for n in recording.notices if n.kind == "info"] == [
         "motor_encoder: joints of the bag that the robot does not have are ignored: gripper"
+    ]
+
+
+def test_messages_without_joint_names_are_taken_in_the_robots_order(doggy, path):
+    messages = [dataclasses.replace(message, names=(), position=(1.0, 2.0, 3.0)) for message in joint_messages()]
+    write_with(path, doggy, messages)
+    recording = read_recording(path, doggy)
+    assert recording.streams["motor_encoder"].values[0].tolist() == [1.0, 2.0, 3.0]
+    assert [n.text for n in recording.notices if n.kind == "info"] == [
+        "motor_encoder: the messages name no joints; the order of the robot file is assumed"
     ]
 
 
@@ -208,7 +223,8 @@ def test_a_missing_topic_is_refused_with_the_nearest_name(doggy, path):
     source = dataclasses.replace(doggy.motor_encoder.source, topic="/joint_state")
     robot = doggy.with_sensors({"motor_encoder": dataclasses.replace(doggy.motor_encoder, source=source)})
     assert error_of(path, robot) == (
-        f"{path}: topic /joint_state is missing; did you mean '/joint_states'?; or change the robot file"
+        f"{path}: topic /joint_state is missing; record it, or change `topic` in the robot file; "
+        "did you mean '/joint_states'?"
     )
 
 

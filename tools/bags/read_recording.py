@@ -90,7 +90,8 @@ def check_topic(bag: Bag, source: Topic) -> MessageType:
     """
     place = f"{bag.path}: topic {source.topic}"
     if source.topic not in bag.topics:
-        raise RecordingError(f"{place} is missing{did_you_mean(source.topic, bag.topics)}; or change the robot file")
+        hint = did_you_mean(source.topic, bag.topics)
+        raise RecordingError(f"{place} is missing; record it, or change `topic` in the robot file{hint}")
     types = bag.type_names(source.topic)
     if types != (full_type_name(source.msgtype),):
         raise RecordingError(
@@ -141,7 +142,8 @@ def _column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp
             raise RecordingError(
                 f"{place}: {need.name} expects {len(need.channels)} values ({', '.join(need.channels)}), got {width}"
             )
-        return np.arange(width), []
+        text = f"{need.name}: the messages name no joints; the order of the robot file is assumed"
+        return np.arange(width), [Notice(need.name, "info", 0, text)] if columns.names == () else []
     if width != len(names):
         raise RecordingError(f"{place}: {width} values for {len(names)} joint names ({', '.join(names)})")
     missing = [name for name in wanted if name not in names]

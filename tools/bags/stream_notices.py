@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 GAP_PERIODS = 1.5  # a step longer than this many median periods, plus six times their spread, misses samples
 JITTER_SHARE = 0.02  # of the median period
 CLIPPED_RUN = 3  # equal extreme samples in a row
-CLIPPED_COUNT = 10  # samples on the plateaus of one channel
+CLIPPED_COUNT = 20  # samples on the plateaus of one channel
 
 
 @dataclass(frozen=True)
@@ -88,13 +88,13 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
 
     Args:
         name: name of the stream.
-        values: samples, shape (n, m).
+        values: samples, shape (n, m); a channel with NaN or infinite values is left out.
         channels: name of each column.
         unit: unit of the values.
     """
     parts, total = [], 0
     for column, channel in zip(values.T, channels, strict=True):
-        for extreme in (np.nanmin(column), np.nanmax(column)) if np.isfinite(column).any() else ():
+        for extreme in (column.min(), column.max()) if np.isfinite(column).all() else ():
             count = _clipped(column, extreme) if extreme else 0  # a command of zero is rest
             if count >= CLIPPED_COUNT:
                 parts.append(f"{channel} at {extreme:.6g}{'' if unit == '1' else ' ' + unit} in {count} samples")
@@ -105,19 +105,19 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
 
 
 def _clipped(column: Array, extreme: float) -> int:
-    """Number of samples on plateaus at the extreme that are entered or left at full speed.
+    """Number of samples on plateaus at the extreme that are entered or left at speed.
 
-    A slow signal that turns around, or an encoder at rest, leaves its plateau by one quantum and slower than it
+    A signal that turns around, or an encoder at rest, leaves its plateau quantum by quantum, slower than it
     typically moves.
     """
     steps = np.abs(np.diff(column))
     moving = steps[steps > 0]
-    full_speed = max(3.0 * float(moving.min()), float(np.median(moving))) if len(moving) else np.inf
+    at_speed = max(1.5 * float(moving.min()), 0.3 * float(np.median(moving))) if len(moving) else np.inf
     at_extreme = column == extreme
     edges = np.flatnonzero(np.diff(at_extreme.astype(np.int8), prepend=0, append=0))
     count = 0
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        jump = max(steps[start - 1] if start else 0.0, steps[stop - 1] if stop < len(column) else 0.0)
-        if stop - start >= CLIPPED_RUN and jump > full_speed:
+        around = np.concatenate([steps[max(start - 2, 0) : start], steps[stop - 1 : stop + 1]])
+        if stop - start >= CLIPPED_RUN and around.max(initial=0.0) > at_speed:
             count += int(stop - start)
     return count

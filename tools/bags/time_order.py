@@ -93,17 +93,17 @@ def _check_clock(name: str, stamps: NDArray[np.int64]) -> None:
 
 
 def _runs_twice(stamps: NDArray[np.int64], late: NDArray[np.bool_]) -> bool:
-    """Whether a run of late samples covers a span of time that earlier samples had covered already.
+    """Whether an orderly run of late samples covers a span of time that earlier samples had covered already.
 
     Messages that were merely delayed fill the hole that they left; a clock that was set back does not.
     """
-    edges = np.flatnonzero(np.diff(late.astype(np.int8), prepend=0, append=0))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        if stop - start < RUN_OF_LATE_SAMPLES:
+    continues = late & (np.diff(stamps, prepend=stamps[0]) > 0)
+    starts = np.flatnonzero(~continues)
+    lengths = np.diff(starts, append=len(stamps))
+    for start, length in zip(starts, lengths, strict=True):
+        if length < RUN_OF_LATE_SAMPLES or not late[start]:
             continue
-        run = stamps[start:stop]
-        before = stamps[:start]
-        covered = np.count_nonzero((before >= run.min()) & (before <= run.max()))
-        if covered > 0.5 * len(run):
+        before, first, last = stamps[:start], stamps[start], stamps[start + length - 1]
+        if np.count_nonzero((before >= first) & (before <= last)) > 0.5 * length:
             return True
     return False

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Process noise from the recording itself, one density per equation of motion.
+
+At the maximum of the marginal likelihood every density s satisfies
+
+    s^2 = sum of squared velocity defects / (m - sum of leverages)
+
+because a defect that the fit is free to absorb says nothing about the noise. The update is that of MacKay (1992),
+"Bayesian interpolation"; as it creeps where the noise is far smaller than the sensors can see, two updates are
+extrapolated (Aitken) in the logarithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.batch_solver import Estimate, Progress, Solution, solve
+from jointscope.graphs.posterior import ResidualPart, posteriors, residual_parts
+from jointscope.robots.robot import ProcessNoise
+
+Array = NDArray[np.float64]
+
+SMALLEST_DENSITY = 1e-3  # [rad/s/sqrt(s)] below this, rounding in the Hessian and the integration error take over
+CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
+LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at the most
+
+
+@dataclass
+class NoiseEvidence:
+    """Sums over dynamics residuals.
+
+    Attributes:
+        squares: whitened squared velocity defects, shape (2n,).
+        freedom: samples minus leverages, shape (2n,).
+    """
+
+    squares: Array
+    freedom: Array
+
+    @staticmethod
+    def empty(n: int) -> NoiseEvidence:
+        """No residuals yet, for n joints."""
+        return NoiseEvidence(np.zeros(2 * n), np.zeros(2 * n))
+
+    def add(self, part: ResidualPart) -> None:
+        """Takes in some residuals; those of other factors are ignored."""
+        if isinstance(part.factor, DynamicsFactor):
+            half = len(self.squares)
+            self.squares += np.sum(part.residual[:, :half] ** 2, axis=0)
+            self.freedom += np.sum(1.0 - part.leverage[:, :half], axis=0)
+
+    @property
+    def factors(self) -> Array:
+        """Factor by which each density should change, shape (2n,)."""
+        return np.sqrt(self.squares / np.maximum(self.freedom, 1.0))
+
+
+def scaled(noise: ProcessNoise, factors: Array) -> ProcessNoise:
+    """Noise with each density multiplied, not below the smallest."""
+    n = len(noise.link_velocity)
+    return replace(
+        noise,
+        link_velocity=np.maximum(noise.link_velocity * factors[:n], SMALLEST_DENSITY),
+        motor_velocity=np.maximum(noise.motor_velocity * factors[n:], SMALLEST_DENSITY),
+    )
+
+
+def densities(noise: ProcessNoise) -> Array:
+    """All densities, link before motor, shape (2n,)."""
+    return np.concatenate([noise.link_velocity, noise.motor_velocity])
+
+
+def estimate_noise(
+    problems: Sequence[BagProblem],
+    estimate: Estimate,
+    *,
+    cycles: int = 12,
+    hold: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> tuple[ProcessNoise, Estimate]:
+    """Alternates between states with parameters, and noise.
+
+    Args:
+        problems: recordings or windows of them, all with the same noise.
+        estimate: near the minimum for the present noise.
+        cycles: updates at the most.
+        hold: blocks that stay as they are.
+        progress: called with a text and the share done.
+
+    Returns:
+        The noise, and the estimate that belongs to it.
+    """
+    noise = problems[0].dynamics.steps.noise
+    before: tuple[Array, Array] | None = None
+    for cycle in range(cycles):
+        if progress:
+            progress("process noise", cycle / cycles)
+        solution = solve(problems, estimate, max_iterations=1, hold=hold)
+        estimate = solution.estimate
+        evidence = noise_evidence(problems, solution)
+        log_now, log_change = np.log(densities(noise)), np.log(evidence.factors)
+        boost = np.ones_like(log_change) if before is None else _aitken(before, (log_now, log_change))
+        step = np.clip(log_change * boost, -LARGEST_UPDATE, LARGEST_UPDATE)
+        before = (log_now, log_change)
+        new = scaled(noise, np.exp(step))
+        settled = np.abs(np.log(densities(new) / densities(noise))) < CHANGE_TOLERANCE
+        noise = new
+        problems = [problem.with_noise(noise) for problem in problems]
+        if np.all(settled):
+            break
+    return noise, estimate
+
+
+def noise_evidence(problems: Sequence[BagProblem], solution: Solution) -> NoiseEvidence:
+    """Dynamics residuals of all recordings at a solution."""
+    evidence = NoiseEvidence.empty(problems[0].robot.n)
+    for i, posterior in enumerate(posteriors(problems, solution)[0]):
+        estimate = solution.estimate
+        for part in residual_parts(
+            problems[i], estimate.states[i], estimate.calibrations[i], posterior, dynamics_only=True
+        ):
+            evidence.add(part)
+    return evidence
+
+
+def _aitken(before: tuple[Array, Array], now: tuple[Array, Array]) -> Array:
+    """How much further than one update the fixed point lies, between 1 and 5."""
+    moved = now[0] - before[0]
+    slope = 1.0 + (now[1] - before[1]) / np.where(np.abs(moved) < 1e-6, np.inf, moved)
+    return 1.0 / (1.0 - np.clip(slope, 0.0, 0.8))

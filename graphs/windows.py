@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Short pieces of long recordings, for the first stage of a calibration.
+
+Parameters and noise are found on a few windows that hold all kinds of motion; the whole recording then needs only a
+few iterations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jointscope.graphs.bag_problem import first_command_time
+from jointscope.robots.recording import Recording
+
+WINDOW = 1.0  # [s]
+TOTAL = 9.0  # [s] all windows together
+
+
+def windows_of(recordings: Sequence[Recording]) -> list[tuple[int, Recording]]:
+    """Windows with the index of their recording; a recording that is short comes whole.
+
+    Windows are spread evenly over the time after the first command.
+    """
+    wanted = TOTAL / len(recordings)
+    pieces: list[tuple[int, Recording]] = []
+    for i, recording in enumerate(recordings):
+        start = first_command_time(recording)
+        end = float(recording.command.times[-1])
+        count = int(np.ceil(wanted / WINDOW))
+        if end - start <= 1.5 * count * WINDOW:
+            pieces.append((i, recording))
+            continue
+        starts = np.linspace(start, end - WINDOW, count)
+        pieces += [(i, recording.between(float(t), float(t) + WINDOW)) for t in starts]
+    return pieces
