@@ -114,7 +114,7 @@ def solve(
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
     shared = SharedLayout.of(start.calibrations[0], len(problems))
-    free = _free(shared, hold)
+    free = free_indices(shared, hold)
     systems = _build(problems, start)
     solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
     if not np.isfinite(solution.cost):
@@ -221,7 +221,7 @@ def reduced_system(
     return H, g
 
 
-def _free(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
+def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
     """Indices of the shared values that may change."""
     held = np.zeros(shared.size, dtype=bool)
     for bag in range(shared.bags):

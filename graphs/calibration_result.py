@@ -84,6 +84,7 @@ class ResidualSeries:
         times: shape (m,) [s].
         measured, predicted: shape (m, c) [unit].
         sigma: expected standard deviation of measured - predicted, shape (m, c) [unit].
+        chi2: mean square of residual over sigma, corrected for the freedom of the states, shape (c,).
     """
 
     channels: tuple[str, ...]
@@ -92,6 +93,7 @@ class ResidualSeries:
     measured: Array
     predicted: Array
     sigma: Array
+    chi2: Array = field(default_factory=lambda: np.ones(0))
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ class CalibrationResult:
             "recording_seconds": self.recording_seconds,
             "wall_seconds": self.wall_seconds,
             "cost": self.cost,
-            "parameters": {p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit} for p in self.parameters},
+            "parameters": self._json_parameters(),
             "weak_directions": [{"parameters": d.weights, "sigma": d.sigma} for d in self.weak_directions],
             "channels": {
                 name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
@@ -190,8 +192,28 @@ class CalibrationResult:
                 "link_velocity": list(map(float, self.noise.link_velocity)),
                 "motor_velocity": list(map(float, self.noise.motor_velocity)),
             },
-            "rotations": {
-                gyro.name: {"R_imu_body": gyro.R_imu_body.tolist()} for gyro in self.robot.gyros
-            },
+            "bags": [
+                {"path": bag.recording.path, "sha256": bag.recording.sha256}
+                | {f"{name}.bias": bias.tolist() for name, bias in bag.calibration.biases.items()}
+                for bag in self.bags
+            ],
             "findings": list(self.findings),
         }
+
+    def _json_parameters(self) -> dict[str, Any]:
+        """Scalars by name; biases (of the first bag) and rotations as they stand in a robot file."""
+        found: dict[str, Any] = {
+            p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit}
+            for p in self.parameters
+            if p.name in self.robot.parameters
+        }
+        for gyro in self.robot.gyros:
+            sigmas = (gyro.bias_sigma, gyro.R_sigma)
+            bias_sigma, R_sigma = (None if sigma is None else sigma.tolist() for sigma in sigmas)
+            found[f"{gyro.name}.bias"] = {"value": gyro.bias.tolist(), "sigma": bias_sigma, "unit": "rad/s"}
+            found[f"{gyro.name}.R_imu_body"] = {
+                "value": gyro.R_imu_body.tolist(),
+                "sigma": R_sigma,
+                "unit": "1; sigma about the axes of the body [rad]",
+            }
+        return found

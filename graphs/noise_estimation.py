@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, Solution, solve
-from jointscope.graphs.posterior import ResidualPart, posteriors, residual_parts
+from jointscope.graphs.batch_solver import Estimate, Progress, solve
+from jointscope.graphs.posterior import ResidualPart, StatePosterior, posteriors, residual_parts
 from jointscope.robots.robot import ProcessNoise
 
 Array = NDArray[np.float64]
@@ -103,7 +103,7 @@ def estimate_noise(
             progress("process noise", cycle / cycles)
         solution = solve(problems, estimate, max_iterations=1, hold=hold)
         estimate = solution.estimate
-        evidence = noise_evidence(problems, solution)
+        evidence = noise_evidence(problems, estimate, posteriors(problems, solution, hold)[0])
         log_now, log_change = np.log(densities(noise)), np.log(evidence.factors)
         boost = np.ones_like(log_change) if before is None else _aitken(before, (log_now, log_change))
         step = np.clip(log_change * boost, -LARGEST_UPDATE, LARGEST_UPDATE)
@@ -117,14 +117,14 @@ def estimate_noise(
     return noise, estimate
 
 
-def noise_evidence(problems: Sequence[BagProblem], solution: Solution) -> NoiseEvidence:
-    """Dynamics residuals of all recordings at a solution."""
+def noise_evidence(
+    problems: Sequence[BagProblem], estimate: Estimate, found: Sequence[StatePosterior]
+) -> NoiseEvidence:
+    """Dynamics residuals of all recordings at an estimate, with the uncertainty of its states."""
     evidence = NoiseEvidence.empty(problems[0].robot.n)
-    for i, posterior in enumerate(posteriors(problems, solution)[0]):
-        estimate = solution.estimate
-        for part in residual_parts(
-            problems[i], estimate.states[i], estimate.calibrations[i], posterior, dynamics_only=True
-        ):
+    bags = zip(problems, estimate.states, estimate.calibrations, found, strict=True)
+    for problem, x, calibration, posterior in bags:
+        for part in residual_parts(problem, x, calibration, posterior, dynamics_only=True):
             evidence.add(part)
     return evidence
 

@@ -23,7 +23,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
-from jointscope.graphs.batch_solver import Solution, reduced_system
+from jointscope.graphs.batch_solver import Solution, free_indices, reduced_system
 from jointscope.graphs.normal_equations import layout, linearize_all, whitened
 from jointscope.robots.errors import SolveError
 
@@ -76,23 +76,31 @@ class StatePosterior:
         return self.given_shared[tick] + X @ self.shared @ X.T
 
 
-def posteriors(problems: Sequence[BagProblem], solution: Solution) -> tuple[list[StatePosterior], Array]:
+def posteriors(
+    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = ()
+) -> tuple[list[StatePosterior], Array]:
     """Uncertainty of all recordings at a solution, and the covariance of all shared values.
+
+    Args:
+        problems: the recordings.
+        solution: where the solver ended.
+        hold: blocks that were held; they have no uncertainty.
 
     Raises:
         SolveError: the Hessian is not positive definite.
     """
+    shared = solution.shared
     eliminations = [eliminate(system) for system in solution.systems]
-    H, _ = reduced_system(
-        problems[0], solution.systems, eliminations, solution.shared, solution.estimate.calibrations[0]
-    )
+    H, _ = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    free = free_indices(shared, hold)
+    covariance = np.zeros_like(H)
     try:
-        covariance = cho_solve(cho_factor(H), np.eye(len(H)))
+        covariance[np.ix_(free, free)] = cho_solve(cho_factor(H[np.ix_(free, free)]), np.eye(len(free)))
     except np.linalg.LinAlgError as err:
         raise SolveError("the shared values are not determined: their Hessian is not positive definite") from err
     found = []
     for i, elimination in enumerate(eliminations):
-        index = solution.shared.indices(i)
+        index = shared.indices(i)
         found.append(StatePosterior.of(elimination, covariance[np.ix_(index, index)]))
     return found, covariance
 

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batch calibration: recordings and a robot in, a calibrated robot with uncertainties out.
+
+Stages: 1. states from the measurements, parameters by regression; 2. windows of the recordings, where parameters and
+process noise are found; 3. all samples of all recordings; 4. uncertainties. Nothing is tuned to one robot.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.batch_solver import Estimate, Progress, Solution, solve
+from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
+from jointscope.graphs.calibration_summary import Solved, summarize
+from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
+from jointscope.graphs.noise_estimation import densities, estimate_noise, noise_evidence, scaled
+from jointscope.graphs.posterior import posteriors
+from jointscope.graphs.windows import windows_of
+from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.robots.recording import Notice, Recording
+from jointscope.robots.robot import ProcessNoise, Robot
+from jointscope.robots.screening import joints_without_motion, screen
+
+Array = NDArray[np.float64]
+
+APPROACH = 1.0 / 7.0  # [start density] noise with which the whole recording is approached
+NOISE_AGREES = 0.2  # relative difference of windows and whole recording that asks for no second pass
+MOST_ITERATIONS = 40
+
+
+@dataclass
+class _History:
+    """Iterations of all stages."""
+
+    records: list[IterationRecord]
+
+    def add(self, stage: str, solution: Solution) -> None:
+        self.records += [
+            IterationRecord(stage, i.cost_after, i.damping, i.step_in_sigmas) for i in solution.iterations
+        ]
+
+
+def calibrate(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    biases_only: bool = False,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Calibrates a robot with one or more recordings.
+
+    Args:
+        robot: model with start values and priors.
+        recordings: at least one; parameters and rotations are shared, states and biases are each recording's own.
+        biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
+        SolveError: no convergence, or a state or parameter that nothing determines.
+    """
+    started = time.perf_counter()
+    report = progress or (lambda text, share: None)
+    notices = check_recordings(robot, recordings, every_joint=not biases_only)
+    problems = [BagProblem.of(robot, recording) for recording in recordings]
+    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
+    history = _History([])
+    noise, calibrations = _windows_stage(robot, recordings, problems, hold, history, _part(report, 0.0, 0.4))
+    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 0.9))
+    report("residuals and uncertainties", 0.9)
+    result = summarize(robot, solved, tuple(history.records), notices, hold)
+    report("done", 1.0)
+    return replace(result, wall_seconds=time.perf_counter() - started)
+
+
+def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
+    """Screens all recordings; every joint must move in at least one of them.
+
+    Raises:
+        RecordingError: as the screening says, or joints that never move.
+    """
+    if not recordings:
+        raise RecordingError("no recording given; pass at least one bag")
+    notices = [notice for recording in recordings for notice in screen(recording, robot)]
+    resting = set(robot.joints)
+    for recording in recordings:
+        resting &= set(joints_without_motion(recording, robot))
+    if resting and every_joint:
+        joints = [joint for joint in robot.joints if joint in resting]
+        names = [f"{joint}.{law}" for joint in joints for law in ("coulomb_torque", "stiffness", "damping")]
+        raise RecordingError(
+            f"{recordings[0].path}: {', '.join(joints)} never moves, so {', '.join(names)} cannot be found; "
+            "add a recording in which it moves"
+        )
+    return notices
+
+
+def _windows_stage(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    problems: Sequence[BagProblem],
+    hold: tuple[str, ...],
+    history: _History,
+    progress: Progress,
+) -> tuple[ProcessNoise, list[Calibration]]:
+    """Parameters and noise from windows; returns the noise and a calibration for each recording."""
+    progress("first guess", 0.0)
+    pieces = windows_of(recordings)
+    bags = [initial_biases(problem, Calibration.of(robot)) for problem in problems]
+    windows = [BagProblem.of(robot, piece) for _, piece in pieces]
+    calibrations = [bags[i] for i, _ in pieces]
+    states = [initial_states(w, c) for w, c in zip(windows, calibrations, strict=True)]
+    if not hold:
+        guess = initial_dynamics(windows, states, calibrations[0])
+        calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
+    estimate = Estimate(tuple(states), tuple(calibrations))
+    # nearly linear in the states alone: bring them to the parameters before both move
+    solution = solve(windows, estimate, max_iterations=4, step_tolerance=0.5, hold=(DYNAMICS,))
+    history.add("states", solution)
+    if not hold:
+        solution = solve(windows, solution.estimate, max_iterations=MOST_ITERATIONS, step_tolerance=0.3)
+        history.add("windows", solution)
+        _must_converge(solution, "windows of the recording")
+    noise, estimate = robot.noise, solution.estimate
+    if noise.estimate:
+        noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
+    found = estimate.calibrations[0]
+    return noise, [replace(bag, dynamics=found.dynamics, rotations=found.rotations) for bag in bags]
+
+
+def _whole_stage(
+    problems: Sequence[BagProblem],
+    noise: ProcessNoise,
+    calibrations: Sequence[Calibration],
+    hold: tuple[str, ...],
+    history: _History,
+    progress: Progress,
+) -> Solved:
+    """All samples: first with looser noise, then with the estimated one, checked against the whole."""
+    states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
+    estimate = Estimate(tuple(states), tuple(calibrations))
+    if noise.estimate:
+        start = problems[0].robot.noise
+        loose = scaled(noise, np.maximum(APPROACH * densities(start) / densities(noise), 1.0))
+        first = solve([p.with_noise(loose) for p in problems], estimate, max_iterations=1, hold=hold)
+        history.add("approach", first)
+        estimate = first.estimate
+    for _ in range(3):
+        now = [p.with_noise(noise) for p in problems]
+        solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
+        history.add("all samples", solution)
+        _must_converge(solution, "the whole recording")
+        solved = Solved(now, solution, *posteriors(now, solution, hold))
+        if not noise.estimate:
+            break
+        better = scaled(noise, noise_evidence(now, solution.estimate, solved.posteriors).factors)
+        if np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
+            break
+        noise, estimate = better, solution.estimate
+    return solved
+
+
+def _must_converge(solution: Solution, what: str) -> None:
+    if not solution.converged:
+        last = solution.iterations[-1]
+        raise SolveError(
+            f"no convergence on {what} after {len(solution.iterations)} iterations: the last step was still "
+            f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
+            "start values may be far off, or the model may contradict the recording"
+        )
+
+
+def _part(progress: Callable[[str, float], None], start: float, stop: float) -> Progress:
+    """A progress that fills a part of another."""
+    return lambda text, share: progress(text, start + (stop - start) * share)

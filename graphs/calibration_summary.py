@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns a solved problem into a CalibrationResult: residual series, parameter table, robot, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.batch_solver import Solution
+from jointscope.graphs.calibration_result import (
+    BagFit,
+    CalibrationResult,
+    ChannelFit,
+    IterationRecord,
+    ParameterEstimate,
+    ResidualSeries,
+    WeakDirection,
+)
+from jointscope.graphs.findings import findings
+from jointscope.graphs.identifiability import weak_directions
+from jointscope.graphs.posterior import ResidualPart, StatePosterior, residual_parts
+from jointscope.graphs.robust_sigma import BlockScores, inflation
+from jointscope.robots.recording import Notice
+from jointscope.robots.robot import Robot
+from jointscope.robots.sensors import AXES, Gyro, MotorEncoder, Sensor
+
+Array = NDArray[np.float64]
+
+HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
+NEAR_ZERO = 0.5  # relative sigma from which a small positive value is called compatible with zero
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A converged problem.
+
+    Attributes:
+        problems: factors of each recording, with the final noise.
+        solution: states and shared values.
+        posteriors: uncertainty of each recording's states.
+        covariance: of all shared values, shape (s, s).
+    """
+
+    problems: list[BagProblem]
+    solution: Solution
+    posteriors: list[StatePosterior]
+    covariance: Array
+
+
+@dataclass
+class _Collector:
+    """Sums and series of one recording's residuals."""
+
+    series: dict[str, list[tuple[Array, Array, Array]]]
+    process: list[tuple[Array, Array]]
+    scores: BlockScores
+
+
+def summarize(
+    robot: Robot, solved: Solved, iterations: tuple[IterationRecord, ...], notices: Sequence[Notice], hold: Sequence[str]
+) -> CalibrationResult:
+    """Everything that users see of a calibration.
+
+    Args:
+        robot: the robot before the calibration.
+        solved: the solution.
+        iterations: history of all stages.
+        notices: what the screening saw.
+        hold: blocks that were held.
+    """
+    solution, shared = solved.solution, solved.solution.shared
+    collected = [_collect(solved, i) for i in range(len(solved.problems))]
+    factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
+    covariance = solved.covariance * np.outer(factor, factor)
+    bags = tuple(_bag_fit(solved, i, c) for i, c in enumerate(collected))
+    names = _names(robot, solution.estimate.calibrations[0], shared.bags)
+    sigmas = np.sqrt(np.diag(covariance))
+    calibration = solution.estimate.calibrations[0]
+    parameters = _parameters(robot, calibration, sigmas)
+    weak = () if hold else weak_directions(robot, calibration, shared, covariance)
+    correlation = covariance / np.maximum(np.outer(sigmas, sigmas), 1e-300)
+    noise = solved.problems[0].dynamics.steps.noise
+    result = CalibrationResult(
+        robot=_calibrated(robot, parameters, calibration, sigmas, solved),
+        start=robot,
+        bags=bags,
+        parameters=parameters,
+        names=names,
+        correlation=correlation,
+        weak_directions=weak,
+        channels=_channels(robot, bags),
+        noise=noise,
+        sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
+        iterations=iterations,
+        cost=solution.cost,
+        samples=sum(len(p.factor) for problem in solved.problems for p in problem.sensors),
+        recording_seconds=sum(problem.recording.duration for problem in solved.problems),
+        wall_seconds=0.0,
+    )
+    return replace(result, findings=findings(result, notices))
+
+
+def _collect(solved: Solved, i: int) -> _Collector:
+    """One pass over all residuals of a recording."""
+    problem, solution = solved.problems[i], solved.solution
+    ticks = problem.timeline.ticks
+    scores = BlockScores(float(ticks[0]), float(ticks[-1]), solution.shared.indices(i), solution.shared.size)
+    collector = _Collector({name: [] for name in problem.robot.sensors}, [], scores)
+    x, calibration = solution.estimate.states[i], solution.estimate.calibrations[i]
+    for part in residual_parts(problem, x, calibration, solved.posteriors[i]):
+        if part.factor.states:
+            scores.add(ticks[part.ticks], part.score)
+        sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
+        expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
+        if isinstance(part.factor, DynamicsFactor):
+            half = part.residual.shape[1] // 2
+            collector.process.append(((part.residual * sigmas)[:, :half], expected[:, :half]))
+        elif part.factor.name in collector.series:
+            collector.series[part.factor.name].append((part.residual * sigmas, expected, _one(part)))
+    return collector
+
+
+def _one(part: ResidualPart) -> Array:
+    """Squares and freedom of the part, for chi2: sum r^2 and sum (1 - leverage), shape (2, r)."""
+    return np.array([np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)])
+
+
+def _bag_fit(solved: Solved, i: int, collector: _Collector) -> BagFit:
+    problem, solution = solved.problems[i], solved.solution
+    residuals = {}
+    for name, sensor in problem.robot.sensors.items():
+        if collector.series[name]:
+            residuals[name] = _series(problem, sensor, collector.series[name])
+    process = np.concatenate([r for r, _ in collector.process])
+    process_sigma = np.concatenate([s for _, s in collector.process])
+    u = problem.timeline.u
+    return BagFit(
+        recording=problem.recording,
+        calibration=solution.estimate.calibrations[i],
+        ticks=problem.timeline.ticks,
+        commands=np.vstack([u, u[-1:]]),
+        states=solution.estimate.states[i],
+        sigmas=solved.posteriors[i].sigmas,
+        residuals=residuals,
+        process=process,
+        process_sigma=process_sigma,
+    )
+
+
+def _series(problem: BagProblem, sensor: Sensor, parts: list[tuple[Array, Array, Array]]) -> ResidualSeries:
+    """Residuals of one sensor in the order of time."""
+    placed = [p for p in problem.sensors if p.factor.name == sensor.name]
+    times = np.concatenate([p.times for p in placed])
+    order = np.argsort(times, kind="stable")
+    residual = np.concatenate([r for r, _, _ in parts])[order]
+    expected = np.concatenate([s for _, s, _ in parts])[order]
+    stream = problem.recording.streams[sensor.name]
+    index = np.searchsorted(stream.times, times[order])
+    channels = placed[0].factor.rows
+    measured = stream.values[index] if len(channels) == stream.values.shape[1] else np.zeros_like(residual)
+    return ResidualSeries(
+        channels=channels,
+        unit=sensor.unit,
+        times=times[order],
+        measured=measured,
+        predicted=measured + residual,
+        sigma=expected,
+        chi2=np.divide(*np.sum([c for _, _, c in parts], axis=0)),
+    )
+
+
+def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
+    """Fit per channel over all recordings."""
+    found = {}
+    for name, sensor in robot.sensors.items():
+        series = [bag.residuals[name] for bag in bags if name in bag.residuals]
+        for j, channel in enumerate(series[0].channels if series else ()):
+            error = np.concatenate([s.measured[:, j] - s.predicted[:, j] for s in series])
+            weights = np.array([len(s.times) for s in series], float)
+            chi2 = float(np.average([s.chi2[j] for s in series], weights=weights))
+            found[channel] = ChannelFit(float(np.sqrt(np.mean(error**2))), sensor.sigma, chi2, sensor.unit)
+    return found
+
+
+def _names(robot: Robot, calibration: Calibration, bags: int) -> tuple[str, ...]:
+    rotations = [f"{gyro}.R_imu_body.{axis}" for gyro in calibration.rotations for axis in AXES]
+    biases = [f"{gyro}.bias.{axis}" for gyro in calibration.biases for axis in AXES]
+    own = biases if bags == 1 else [f"{name} (bag {i + 1})" for i in range(bags) for name in biases]
+    return (*calibration.names, *rotations, *own)
+
+
+def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[ParameterEstimate, ...]:
+    """The table of all shared values (biases of the first recording)."""
+    found = []
+    slopes = calibration.value_by_coordinate
+    for i, name in enumerate(calibration.names):
+        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
+        note = ""
+        relative_prior = p.prior_sigma / p.prior if p.positive else p.prior_sigma
+        if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
+            note = "at its bound: compatible with zero"
+        elif sigmas[i] > HELD_BY_PRIOR * relative_prior:
+            note = "held by its prior"
+        found.append(
+            ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note)
+        )
+    start = len(calibration.names)
+    for gyro in robot.gyros:
+        angle = Rotation.from_matrix(gyro.R_prior.T @ calibration.rotations[gyro.name]).as_rotvec()
+        before = Rotation.from_matrix(gyro.R_prior.T @ gyro.R_imu_body).as_rotvec()
+        for j, axis in enumerate(AXES):
+            sigma = float(sigmas[start + j])
+            note = "not observable, held by its prior" if sigma > HELD_BY_PRIOR * gyro.R_prior_sigma else ""
+            name = f"{gyro.name}.R_imu_body.{axis}"
+            row = (float(angle[j]), sigma, "rad", float(before[j]), 0.0, gyro.R_prior_sigma, None, note)
+            found.append(ParameterEstimate(name, *row))
+        start += 3
+    for gyro in robot.gyros:
+        for j, axis in enumerate(AXES):
+            sigma = float(sigmas[start + j])
+            note = "held by its prior" if sigma > HELD_BY_PRIOR * gyro.bias_prior_sigma else ""
+            value, before_bias = float(calibration.biases[gyro.name][j]), float(gyro.bias[j])
+            row = (value, sigma, "rad/s", before_bias, before_bias, gyro.bias_prior_sigma, None, note)
+            found.append(ParameterEstimate(f"{gyro.name}.bias.{axis}", *row))
+        start += 3
+    return tuple(found)
+
+
+def _calibrated(
+    robot: Robot,
+    parameters: Sequence[ParameterEstimate],
+    calibration: Calibration,
+    sigmas: Array,
+    solved: Solved,
+) -> Robot:
+    """The robot with values, sigmas and noise found."""
+    table = {p.name: p for p in parameters}
+    new = {
+        name: replace(p, value=table[name].value, sigma=table[name].sigma) if name in table else p
+        for name, p in robot.parameters.items()
+    }
+    sensors: dict[str, Sensor] = {}
+    for name, sensor in robot.sensors.items():
+        if isinstance(sensor, MotorEncoder):
+            continue
+        sensors[name] = _calibrated_gyro(sensor, calibration, table)
+    noise = solved.problems[0].dynamics.steps.noise
+    return replace(robot, parameters=new, noise=noise).with_sensors(sensors)
+
+
+def _calibrated_gyro(gyro: Gyro, calibration: Calibration, table: dict[str, ParameterEstimate]) -> Gyro:
+    return replace(
+        gyro,
+        bias=calibration.biases[gyro.name],
+        R_imu_body=calibration.rotations[gyro.name],
+        bias_sigma=np.array([table[f"{gyro.name}.bias.{axis}"].sigma for axis in AXES]),
+        R_sigma=np.array([table[f"{gyro.name}.R_imu_body.{axis}"].sigma for axis in AXES]),
+    )

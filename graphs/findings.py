@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a calibration tells the user in words: is it good, what is weak, what looks wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jointscope.graphs.calibration_result import CalibrationResult
+from jointscope.robots.recording import Notice
+
+CHI2_LOW, CHI2_HIGH = 0.8, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
+COLOURED = 1.5  # block-robust over plain sigma from which residuals are called coloured
+
+
+def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple[str, ...]:
+    """Sentences, most important first.
+
+    Args:
+        result: a calibration without findings.
+        notices: what the screening saw.
+    """
+    said = [_verdict(result), *_sensor_noise(result), *_process_noise(result), *_coloured(result)]
+    said += [direction.text for direction in result.weak_directions]
+    said += [f"{p.name}: {p.note}" for p in result.parameters if p.note and "prior" not in p.note]
+    said += [notice.text for notice in notices]
+    return tuple(said)
+
+
+def _verdict(result: CalibrationResult) -> str:
+    dynamics = [p for p in result.parameters if p.name in result.robot.parameters]
+    relative = [p.sigma / abs(p.value) for p in dynamics if p.value]
+    if not relative:
+        return "no parameter was free"
+    worst = dynamics[int(np.argmax(relative))]
+    typical = float(np.median(relative))
+    return (
+        f"{len(dynamics)} parameters from {result.samples:,} samples: typically +-{100 * typical:.2g} %, "
+        f"worst {worst.name} with +-{100 * max(relative):.2g} %"
+    )
+
+
+def _sensor_noise(result: CalibrationResult) -> list[str]:
+    odd = {name: fit.chi2 for name, fit in result.channels.items() if not CHI2_LOW < fit.chi2 < CHI2_HIGH}
+    if not odd:
+        return ["every sensor channel is explained down to its stated noise"]
+    listed = ", ".join(f"{name} ({np.sqrt(chi2):.2g} sigma)" for name, chi2 in odd.items())
+    too_large = any(chi2 > CHI2_HIGH for chi2 in odd.values())
+    reason = (
+        "the model lacks something that these channels see, or their sigma in the robot file is too small"
+        if too_large
+        else "their sigma in the robot file is larger than their noise"
+    )
+    return [f"residuals do not have the stated size on {listed}: {reason}"]
+
+
+def _process_noise(result: CalibrationResult) -> list[str]:
+    """How much unexplained torque the noise stands for, against what the motors do."""
+    robot, said = result.robot, []
+    densities = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
+    bag = result.bags[0]
+    n = robot.n
+    v = np.hstack([bag.states[:, n : 2 * n], bag.states[:, 3 * n :]])
+    for j, side in enumerate([f"{joint} link" for joint in robot.joints] + [f"{joint} motor" for joint in robot.joints]):
+        # velocity that the model cannot explain after a tenth of a second, against the velocity itself
+        drift, size = densities[j] * np.sqrt(0.1), float(np.sqrt(np.mean(v[:, j] ** 2)))
+        if size > 0 and drift > 0.1 * size:
+            said.append(f"{side}: {100 * drift / size:.0f} % of its velocity is unexplained after 0.1 s")
+    return said
+
+
+def _coloured(result: CalibrationResult) -> list[str]:
+    names = [name for name, factor in result.sigma_inflation.items() if factor > COLOURED]
+    if not names:
+        return []
+    largest = max(result.sigma_inflation.values())
+    return [
+        f"residuals are coloured: standard deviations of {len(names)} values were widened, up to {largest:.1f} times; "
+        "an effect may be missing"
+    ]

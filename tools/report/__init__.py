@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reports as one HTML file without outside references: calibration_report, comparison_report, write_report."""
+
+from jointscope.tools.report.calibration_report import calibration_report
+from jointscope.tools.report.comparison_report import comparison_report
+from jointscope.tools.report.write_report import write_report
+
+__all__ = ["calibration_report", "comparison_report", "write_report"]

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is this calibration good? Checks with limits, each with a sentence, and the verdict that follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jointscope.graphs.calibration_result import BagFit, CalibrationResult, ParameterEstimate
+from jointscope.tools.report.numbers import percent, significant
+from jointscope.tools.report.whiteness import autocorrelation, strength
+
+LEVELS = ("good", "info", "warn", "bad")
+ANSWERS = {
+    "good": "Yes, this calibration is good.",
+    "warn": "Usable, with reservations.",
+    "bad": "No, do not rely on this calibration yet.",
+}
+CHI2 = (1.25, 2.0)  # mean square of a channel's residual in sigmas: fine up to the first, bad beyond the second
+CORRELATION = (0.1, 0.3)  # largest autocorrelation within LAGS
+UNEVEN = (3.0, 8.0)  # strongest window of the dynamics' residual against the median one
+INFLATION = (2.0, 5.0)  # sigmas from blocks against those of white noise
+HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
+WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question, its answer as a level of LEVELS, and a sentence."""
+
+    level: str
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Verdict of all checks: level, headline, and the checks."""
+
+    level: str
+    headline: str
+    checks: tuple[Check, ...]
+
+
+def judge(result: CalibrationResult) -> Judgement:
+    """Applies all checks to a calibration."""
+    checks = (
+        _noise_as_stated(result),
+        _white(result),
+        _even(result),
+        _determined(result),
+        _held(result),
+        _honest_sigmas(result),
+    )
+    worst = max((LEVELS.index(c.level) for c in checks), default=0)
+    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
+    return Judgement(level, ANSWERS[level], checks)
+
+
+def is_held(parameter: ParameterEstimate) -> bool:
+    """Whether the prior, not the recording, determines a parameter."""
+    return parameter.prior_sigma > 0.0 and parameter.sigma > HELD * parameter.prior_sigma
+
+
+def is_mounting_or_bias(parameter: ParameterEstimate) -> bool:
+    """Whether it describes how a sensor sits, not how the robot moves."""
+    return ".R_imu_body" in parameter.name or ".bias" in parameter.name
+
+
+def channel_whiteness(fit: BagFit) -> dict[str, float]:
+    """Largest autocorrelation of each channel's residual over short lags."""
+    return {
+        channel: float(np.max(np.abs(autocorrelation((s.measured - s.predicted)[:, i])), initial=0.0))
+        for s in fit.residuals.values()
+        for i, channel in enumerate(s.channels)
+    }
+
+
+def _noise_as_stated(result: CalibrationResult) -> Check:
+    name = "Residuals as large as the sensor noise"
+    if not result.channels:
+        return Check("info", name, "There are no channels to check.")
+    distance = {c: max(f.chi2, 1.0 / max(f.chi2, 1e-9)) for c, f in result.channels.items()}
+    worst = max(distance, key=lambda c: distance[c])
+    chi2 = result.channels[worst].chi2
+    level = _level(distance[worst], CHI2)
+    if level == "good":
+        low, high = min(f.chi2 for f in result.channels.values()), max(f.chi2 for f in result.channels.values())
+        return Check(level, name, f"χ² per sample is {low:.2f} to {high:.2f} over all channels; 1 is expected.")
+    reason = "the model misses something there, or its noise is larger than stated" if chi2 > 1 else (
+        "its noise is smaller than stated, or the states follow the noise"
+    )
+    count = sum(d > CHI2[0] for d in distance.values())
+    return Check(level, name, f"{worst} has χ² per sample {significant(chi2)} (1 is expected): {reason}. "
+                              f"{count} of {len(distance)} channels are off.")
+
+
+def _white(result: CalibrationResult) -> Check:
+    found: dict[str, float] = {}
+    for bag in result.bags:
+        for channel, value in channel_whiteness(bag).items():
+            found[channel] = max(found.get(channel, 0.0), value)
+    if not found:
+        return Check("info", "Residuals without memory", "There are no residuals to check.")
+    worst = max(found, key=lambda c: found[c])
+    level = _level(found[worst], CORRELATION)
+    tail = "nothing systematic is left" if level == "good" else "something systematic is left in it"
+    text = f"The largest autocorrelation over {100} samples is {found[worst]:.2f}, in {worst}: {tail}."
+    return Check(level, "Residuals without memory", text)
+
+
+def _even(result: CalibrationResult) -> Check:
+    worst, where, when = 0.0, "", 0.0
+    for bag in result.bags:
+        edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
+        usual = np.nanmedian(rms, axis=0)
+        ratio = rms / np.where(usual > 0, usual, 1.0)
+        k, i = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+        if ratio[k, i] > worst:
+            worst, where, when = float(ratio[k, i]), equation_names(result)[i], float(edges[k])
+    level = _level(worst, UNEVEN)
+    text = f"At its worst ({where} equation, around {when:.1f} s) the dynamics are off {significant(worst, 2)} times " \
+           "their usual amount" + ("." if level == "good" else ": an effect may be missing that acts there.")
+    return Check(level, "Dynamics hold throughout", text)
+
+
+def _determined(result: CalibrationResult) -> Check:
+    name = "Every parameter determined by the motion"
+    weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]
+    if weak:
+        return Check("warn" if weak[0].sigma > WEAK else "info", name, weak[0].text)
+    if result.weak_directions:
+        return Check("info", name, f"All dynamic parameters are. Weak: {result.weak_directions[0].text}")
+    return Check("good", name, "No combination of parameters is weakly determined.")
+
+
+def _held(result: CalibrationResult) -> Check:
+    name = "Values from data, not from priors"
+    noted = [p for p in result.parameters if p.note or is_held(p)]
+    dynamic = [p for p in noted if not is_mounting_or_bias(p)]
+    if not noted:
+        return Check("good", name, "No parameter leans on its prior or lies on a bound.")
+    text = "; ".join(f"{p.name}: {p.note or 'held by its prior'}" for p in (dynamic or noted)[:3])
+    more = f" and {len(dynamic or noted) - 3} more" if len(dynamic or noted) > 3 else ""
+    return Check("warn" if dynamic else "info", name, f"{text}{more}.")
+
+
+def _honest_sigmas(result: CalibrationResult) -> Check:
+    name = "Sigmas that can be trusted"
+    if not result.sigma_inflation:
+        return Check("info", name, "They assume white noise; no comparison with blocks of the recording was made.")
+    worst = max(result.sigma_inflation, key=lambda p: result.sigma_inflation[p])
+    factor = result.sigma_inflation[worst]
+    level = _level(factor, INFLATION)
+    if factor <= 1.05:
+        return Check(level, name, "Blocks of the recording scatter no more than white noise would.")
+    return Check(level, name, f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
+                              f"would ({worst}); the sigmas shown include it.")
+
+
+def equation_names(result: CalibrationResult) -> list[str]:
+    """Names of the columns of BagFit.process."""
+    return [f"{joint} {side}" for side in ("link", "motor") for joint in result.robot.joints]
+
+
+def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
+    """The dynamic parameter with the largest sigma relative to its value, and that share."""
+    shares = {p.name: p.sigma / abs(p.value) for p in result.parameters if not is_mounting_or_bias(p) and p.value}
+    if not shares:
+        return "", float("nan")
+    worst = max(shares, key=lambda name: shares[name])
+    return worst, shares[worst]
+
+
+def spread_text(result: CalibrationResult) -> str:
+    """The largest relative sigma in words."""
+    name, share = largest_relative_sigma(result)
+    return f"{name} is known to ±{percent(share)}" if name else ""
+
+
+def _is_sensor_name(name: str) -> bool:
+    return ".R_imu_body" in name or ".rotation" in name or ".bias" in name
+
+
+def _level(value: float, limits: tuple[float, float]) -> str:
+    if not np.isfinite(value):
+        return "bad"
+    return "good" if value <= limits[0] else "warn" if value <= limits[1] else "bad"

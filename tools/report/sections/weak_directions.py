@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Combinations of parameters that the recording determines badly, in words and as bars."""
+
+from __future__ import annotations
+
+from html import escape
+
+from jointscope.graphs.calibration_result import CalibrationResult, WeakDirection
+from jointscope.tools.report.numbers import minus
+from jointscope.tools.report.page import Section
+
+BAR = 130  # [px] on each side of zero
+LARGEST = 6
+
+
+def weak_directions(result: CalibrationResult) -> Section:
+    """One paragraph per direction."""
+    lead = (
+        "Parameters may trade against each other: along these directions the values can move together and "
+        "the fit hardly changes. More varied motion, or a measured value for one of them, removes a direction."
+    )
+    if not result.weak_directions:
+        return Section("weak", "Weak directions", "<p>There are none: every combination is well determined.</p>", lead)
+    return Section("weak", "Weak directions", "".join(_direction(d) for d in result.weak_directions), lead)
+
+
+def _direction(direction: WeakDirection) -> str:
+    largest = sorted(direction.weights.items(), key=lambda item: -abs(item[1]))[:LARGEST]
+    scale = max(abs(weight) for _, weight in largest) or 1.0
+    rows = []
+    for i, (name, weight) in enumerate(largest):
+        y, length = 20 * i + 10, BAR * abs(weight) / scale
+        x = 250 + BAR - (length if weight < 0 else 0)
+        rows.append(
+            f'<text class="name" x="238" y="{y}" text-anchor="end">{escape(name)}</text>'
+            f'<rect class="fill {"k0" if weight < 0 else "k2"}" x="{x:.1f}" y="{y - 6}" width="{length:.1f}" height="12"/>'
+            f'<text class="name" x="{250 + 2 * BAR + 8}" y="{y}">{minus(f"{weight:+.2f}")}</text>'
+        )
+    height = 20 * len(largest)
+    middle = f'<path class="grid" d="M{250 + BAR} 0V{height}"/>'
+    return (
+        f'<h3>{escape(direction.text)}</h3><div class="scroll"><svg width="{250 + 2 * BAR + 60}" height="{height}" '
+        f'role="img" aria-label="weights of the direction">{middle}{"".join(rows)}</svg></div>'
+    )

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much structure is left in residuals: autocorrelation over short lags, and strength over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LAGS = 100  # samples; 0.1 s at 1 kHz, longer than any elastic mode of interest takes to turn
+WINDOW = 0.25  # [s]
+
+
+def autocorrelation(residual: Array, lags: int = LAGS) -> Array:
+    """Autocorrelation at lags 1, 2, ... of one channel.
+
+    Args:
+        residual: shape (m,); values that are not finite count as zero.
+        lags: number of lags.
+
+    Returns:
+        Shape (min(lags, m - 1),).
+    """
+    r = np.where(np.isfinite(residual), residual, 0.0)
+    r = r - r.mean()
+    m = len(r)
+    lags = min(lags, max(m - 1, 0))
+    power = float(r @ r)
+    if power == 0.0 or lags == 0:
+        return np.zeros(lags)
+    size = 1 << (2 * m - 1).bit_length()
+    spectrum = np.fft.rfft(r, size)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, size)
+    return products[1 : lags + 1] / power
+
+
+def strength(times: Array, residual: Array, window: float = WINDOW) -> tuple[Array, Array]:
+    """Root mean square of residuals in windows of time.
+
+    Args:
+        times: shape (m,) [s].
+        residual: in sigmas, shape (m, c).
+        window: length of a window [s].
+
+    Returns:
+        Edges of the windows, shape (w + 1,) [s]; strength, shape (w, c), NaN where a window is empty.
+    """
+    count = max(int(np.ceil((times[-1] - times[0]) / window)), 1)
+    edges = times[0] + window * np.arange(count + 1)
+    which = np.clip(((times - times[0]) / window).astype(int), 0, count - 1)
+    squares = np.nan_to_num(residual) ** 2
+    sums = np.stack([np.bincount(which, column, count) for column in squares.T], axis=1)
+    number = np.bincount(which, minlength=count)[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return edges, np.sqrt(sums / number)

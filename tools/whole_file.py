@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files that are written whole or not at all, and checked before the long computation that fills them.
+
+A file is written beside its place under a hidden name and moved there at the end; whatever goes wrong in between
+(an error, a full disk, Ctrl-C) leaves the old file as it was and nothing else behind. Several files in one
+`contextlib.ExitStack` are moved only after all of them are complete.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import JointscopeError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Gives a path in the same folder to write to, and moves it to `path` when the block ends well.
+
+    Args:
+        path: file to write; an existing one is replaced.
+
+    Yields:
+        Where to write; same folder (relative references stay right) and same suffix.
+
+    Raises:
+        JointscopeError: the file cannot be written: no such folder, no permission, disk full.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    try:
+        yield unfinished
+        os.replace(unfinished, target)
+    except OSError as err:
+        raise JointscopeError(_cannot_write(target, err)) from err
+    except JointscopeError as err:
+        # the user knows nothing of the hidden name
+        raise type(err)(str(err).replace(str(unfinished), str(target))) from err
+    finally:
+        _remove(unfinished)
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Writes JSON that every reader accepts (no NaN), whole or not at all.
+
+    Raises:
+        JointscopeError: the file cannot be written.
+    """
+    with whole_file(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[str | Path] = ()) -> None:
+    """Finds out before the work whether its results can be written after it.
+
+    Args:
+        outputs: files to be written; None for one that nobody asked for.
+        inputs: files that must not be overwritten.
+
+    Raises:
+        JointscopeError: a folder is missing or not writable, a file is a folder, or two files are the same.
+    """
+    taken = {Path(file).resolve(): "is also an input" for file in inputs}
+    for path in outputs:
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in taken:
+            raise JointscopeError(f"cannot write {path}: it {taken[place]}; give it another name")
+        taken[place] = "is named for two outputs"
+        if path.is_dir():
+            raise JointscopeError(f"cannot write {path}: it is a folder; expected the name of a file")
+        if not path.parent.is_dir():
+            raise JointscopeError(f"cannot write {path}: the folder {path.parent} does not exist; create it first")
+        try:
+            with tempfile.TemporaryFile(dir=path.parent):
+                pass
+        except OSError as err:
+            raise JointscopeError(_cannot_write(path, err)) from err
+
+
+def _cannot_write(path: Path, err: OSError) -> str:
+    return f"cannot write {path}: {err.strerror or err}"
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        pass  # its folder is gone or is a file: then there is nothing to remove, and the first error counts
