@@ -49,7 +49,7 @@ class DynamicsFactor(ABC):
         """Standard deviations of the rows, shape (m, 4n) [rad/s], [rad]."""
         return self.steps.sigmas
 
-    def select(self, samples: slice) -> DynamicsFactor:
+    def select(self, samples: slice | NDArray[np.intp]) -> DynamicsFactor:
         """The same factor for some of the steps."""
         return replace(self, steps=self.steps.select(samples))
 

@@ -64,26 +64,16 @@ class InterpolatedFactor:
         """The same factor for some of the samples."""
         return replace(self, inner=self.inner.select(samples), fraction=self.fraction[samples], h=self.h[samples])
 
-    def state_at_sample(self, x0: Array, x1: Array) -> Array:
-        """The state at the time of each sample, shape (m, 4n)."""
-        x = np.empty_like(x0)
-        weights = self._weights()
-        for q, v in _position_velocity_columns(x0.shape[1]):
-            pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
-            x[:, q] = sum(w[:, None] * part for w, part in zip(weights[0], pairs, strict=True))
-            x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
-        return x
-
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
-        return self.inner.residual((self.state_at_sample(*x),), calibration)
+        return self.inner.residual((interpolate(*x, self.fraction, self.h),), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives by both states."""
-        inner = self.inner.linearize((self.state_at_sample(*x),), calibration)
+        inner = self.inner.linearize((interpolate(*x, self.fraction, self.h),), calibration)
         J = inner.by_state[0]
         J0, J1 = np.empty_like(J), np.empty_like(J)
-        position, velocity = ([w[:, None, None] for w in part] for part in self._weights())
+        position, velocity = ([w[:, None, None] for w in part] for part in _weights(self.fraction, self.h))
         for q, v in _position_velocity_columns(J.shape[2]):
             J0[:, :, q] = position[0] * J[:, :, q] + velocity[0] * J[:, :, v]
             J0[:, :, v] = position[1] * J[:, :, q] + velocity[1] * J[:, :, v]
@@ -91,13 +81,33 @@ class InterpolatedFactor:
             J1[:, :, v] = position[3] * J[:, :, q] + velocity[3] * J[:, :, v]
         return Linearization(inner.residual, (J0, J1), inner.by_block)
 
-    def _weights(self) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Weights of (q0, v0, q1, v1) in the position and in the velocity, shape (m,) each."""
-        s, h = self.fraction, self.h
-        position = ((1 + 2 * s) * (1 - s) ** 2, h * s * (1 - s) ** 2, s**2 * (3 - 2 * s), h * s**2 * (s - 1))
-        slope = 6 * s * (s - 1) / h
-        velocity = (slope, (1 - s) * (1 - 3 * s), -slope, s * (3 * s - 2))
-        return position, velocity
+
+def interpolate(x0: Array, x1: Array, fraction: Array, h: Array) -> Array:
+    """States between two ticks.
+
+    Args:
+        x0, x1: states at the ticks, shape (m, 4n).
+        fraction: (t - t_k) / h, in [0, 1], shape (m,).
+        h: distance of the ticks, shape (m,) [s].
+
+    Returns:
+        Shape (m, 4n).
+    """
+    x = np.empty_like(x0)
+    weights = _weights(fraction, h)
+    for q, v in _position_velocity_columns(x0.shape[1]):
+        pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
+        x[:, q] = sum(w[:, None] * part for w, part in zip(weights[0], pairs, strict=True))
+        x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
+    return x
+
+
+def _weights(s: Array, h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Weights of (q0, v0, q1, v1) in the position and in the velocity, shape (m,) each."""
+    position = ((1 + 2 * s) * (1 - s) ** 2, h * s * (1 - s) ** 2, s**2 * (3 - 2 * s), h * s**2 * (s - 1))
+    slope = 6 * s * (s - 1) / h
+    velocity = (slope, (1 - s) * (1 - 3 * s), -slope, s * (3 * s - 2))
+    return position, velocity
 
 
 def _position_velocity_columns(size: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:

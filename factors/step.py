@@ -36,7 +36,7 @@ class Steps:
     def __len__(self) -> int:
         return len(self.h)
 
-    def select(self, samples: slice) -> Steps:
+    def select(self, samples: slice | NDArray[np.intp]) -> Steps:
         """Some of the steps."""
         return Steps(self.h[samples], self.u[samples], self.noise)
 

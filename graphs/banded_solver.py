@@ -46,6 +46,16 @@ class Elimination:
         """Change of all states for a change dp of the shared values, shape (m, d)."""
         return self.solve_transposed(-(self.w + self.W @ dp)[:, None])[:, 0].reshape(-1, self.d)
 
+    def blocks(self) -> tuple[Array, Array]:
+        """Blocks of L on and below the diagonal, shape (m, d, d) and (m - 1, d, d)."""
+        columns = self.L.T.reshape(-1, self.d, 2 * self.d)
+        m, d = len(columns), self.d
+        diagonal, below = np.zeros((m, d, d)), np.zeros((m - 1, d, d))
+        for b in range(d):
+            diagonal[:, b:, b] = columns[:, b, : d - b]
+            below[:, :, b] = columns[:-1, b, d - b : 2 * d - b]
+        return diagonal, below
+
     def solve_transposed(self, right: Array) -> Array:
         """L^-T times a matrix of shape (m d, k)."""
         x, info = lapack.dtbtrs(self.L, right, uplo="L", trans="T")

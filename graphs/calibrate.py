@@ -30,7 +30,8 @@ from jointscope.robots.screening import joints_without_motion, screen
 
 Array = NDArray[np.float64]
 
-APPROACH = 1.0 / 7.0  # [start density] noise with which the whole recording is approached
+LOOSE = 0.3  # [rad/s/sqrt(s)] densities at which every calibration begins; the paper's are 0.35 and 0.26
+APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approached
 NOISE_AGREES = 0.2  # relative difference of windows and whole recording that asks for no second pass
 MOST_ITERATIONS = 40
 
@@ -69,10 +70,11 @@ def calibrate(
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
-    problems = [BagProblem.of(robot, recording) for recording in recordings]
+    noise = _loose(robot.noise) if robot.noise.estimate else robot.noise
+    problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = _History([])
-    noise, calibrations = _windows_stage(robot, recordings, problems, hold, history, _part(report, 0.0, 0.4))
+    noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
     solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 0.9))
     report("residuals and uncertainties", 0.9)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
@@ -103,7 +105,6 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
 
 
 def _windows_stage(
-    robot: Robot,
     recordings: Sequence[Recording],
     problems: Sequence[BagProblem],
     hold: tuple[str, ...],
@@ -112,6 +113,7 @@ def _windows_stage(
 ) -> tuple[ProcessNoise, list[Calibration]]:
     """Parameters and noise from windows; returns the noise and a calibration for each recording."""
     progress("first guess", 0.0)
+    robot = problems[0].robot
     pieces = windows_of(recordings)
     bags = [initial_biases(problem, Calibration.of(robot)) for problem in problems]
     windows = [BagProblem.of(robot, piece) for _, piece in pieces]
@@ -144,14 +146,9 @@ def _whole_stage(
     progress: Progress,
 ) -> Solved:
     """All samples: first with looser noise, then with the estimated one, checked against the whole."""
-    states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
-    estimate = Estimate(tuple(states), tuple(calibrations))
-    if noise.estimate:
-        start = problems[0].robot.noise
-        loose = scaled(noise, np.maximum(APPROACH * densities(start) / densities(noise), 1.0))
-        first = solve([p.with_noise(loose) for p in problems], estimate, max_iterations=1, hold=hold)
-        history.add("approach", first)
-        estimate = first.estimate
+    first = approach(problems, noise, calibrations, hold)
+    history.add("approach", first)
+    estimate = first.estimate
     for _ in range(3):
         now = [p.with_noise(noise) for p in problems]
         solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
@@ -165,6 +162,21 @@ def _whole_stage(
             break
         noise, estimate = better, solution.estimate
     return solved
+
+
+def approach(
+    problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration], hold: tuple[str, ...]
+) -> Solution:
+    """One iteration over all samples with noise that is loose enough for states straight from the measurements."""
+    states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
+    loose = scaled(noise, np.maximum(APPROACH * LOOSE / densities(noise), 1.0))
+    estimate = Estimate(tuple(states), tuple(calibrations))
+    return solve([p.with_noise(loose) for p in problems], estimate, max_iterations=1, hold=hold)
+
+
+def _loose(noise: ProcessNoise) -> ProcessNoise:
+    """Noise with which any start value can be approached; the estimation goes down from there."""
+    return scaled(noise, np.maximum(LOOSE / densities(noise), 1.0))
 
 
 def _must_converge(solution: Solution, what: str) -> None:

@@ -36,6 +36,7 @@ class NormalEquations:
         g_x: gradient by the states, shape (m, d).
         g_p: gradient by the shared values, shape (p,).
         cost: half the sum of squared whitened residuals.
+        D_next, g_next: the part of D and g_x that comes from factors reaching on to the next state; only where asked.
     """
 
     D: Array
@@ -45,10 +46,13 @@ class NormalEquations:
     g_x: Array
     g_p: Array
     cost: float = 0.0
+    D_next: Array | None = None
+    g_next: Array | None = None
 
     @staticmethod
-    def zeros(m: int, d: int, p: int) -> NormalEquations:
+    def zeros(m: int, d: int, p: int, split: bool = False) -> NormalEquations:
         """An empty system for m states of size d and p shared values."""
+        parts = (np.zeros((m, d, d)), np.zeros((m, d))) if split else (None, None)
         return NormalEquations(
             np.zeros((m, d, d)),
             np.zeros((m - 1, d, d)),
@@ -56,6 +60,8 @@ class NormalEquations:
             np.zeros((p, p)),
             np.zeros((m, d)),
             np.zeros(p),
+            0.0,
+            *parts,
         )
 
 
@@ -69,17 +75,18 @@ def layout(calibration: Calibration) -> dict[str, slice]:
     return columns
 
 
-def build(problem: BagProblem, x: Array, calibration: Calibration) -> NormalEquations:
+def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool = False) -> NormalEquations:
     """Linearises all factors of a recording.
 
     Args:
         problem: the factors.
         x: states, shape (m, 4n).
         calibration: shared values, with the biases of this recording.
+        split: keep apart what reaches on to the next state, as a filter needs it.
     """
     columns = layout(calibration)
     p = max(c.stop for c in columns.values())
-    system = NormalEquations.zeros(len(x), x.shape[1], p)
+    system = NormalEquations.zeros(len(x), x.shape[1], p, split)
     for factor, ticks, linear in linearize_all(problem, x, calibration):
         _accumulate(system, factor, ticks, linear, columns)
     return system
@@ -145,8 +152,12 @@ def _accumulate(
         system.g_p[shared] += flat.T @ r.ravel()
     for i, J_i in enumerate(J):
         transposed = J_i.transpose(0, 2, 1)
-        add_at(system.D, ticks + i, transposed @ J_i)
-        add_at(system.g_x, ticks + i, (transposed @ r[:, :, None])[:, :, 0])
+        square, gradient = transposed @ J_i, (transposed @ r[:, :, None])[:, :, 0]
+        add_at(system.D, ticks + i, square)
+        add_at(system.g_x, ticks + i, gradient)
+        if len(J) == 2 and i == 0 and system.D_next is not None and system.g_next is not None:
+            add_at(system.D_next, ticks, square)
+            add_at(system.g_next, ticks, gradient)
         if P is not None and shared is not None:
             full = np.zeros((len(r), system.B.shape[1], system.B.shape[2]))
             full[:, :, shared] = transposed @ P

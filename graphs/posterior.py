@@ -49,7 +49,7 @@ class StatePosterior:
     @staticmethod
     def of(elimination: Elimination, shared: Array) -> StatePosterior:
         """Backward recursion over the factorised chain."""
-        L_diagonal, L_below = _blocks(elimination)
+        L_diagonal, L_below = elimination.blocks()
         d = elimination.d
         L_inverse = np.linalg.solve(L_diagonal, np.broadcast_to(np.eye(d), L_diagonal.shape))
         P = L_inverse.transpose(0, 2, 1) @ L_inverse
@@ -147,15 +147,3 @@ def residual_parts(
             leverage += 2.0 * np.einsum("kri,kri->kr", J[0] @ posterior.neighbours[ticks], J[1])
         leverage += np.einsum("krp,krp->kr", by_shared @ posterior.shared, by_shared)
         yield ResidualPart(factor, ticks, r, leverage, np.einsum("kr,krp->kp", r, by_shared))
-
-
-def _blocks(elimination: Elimination) -> tuple[Array, Array]:
-    """Dense blocks on and below the diagonal of the banded factor."""
-    d = elimination.d
-    columns = elimination.L.T.reshape(-1, d, 2 * d)
-    m = len(columns)
-    diagonal, below = np.zeros((m, d, d)), np.zeros((m - 1, d, d))
-    for b in range(d):
-        diagonal[:, b:, b] = columns[:, b, : d - b]
-        below[:, :, b] = columns[:-1, b, d - b : 2 * d - b]
-    return diagonal, below

@@ -18,9 +18,10 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
+from jointscope.robots.robot_consistency import check_robot
 from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
 from jointscope.robots.units import UNITS, si_unit
-from jointscope.robots.yaml_section import Section, did_you_mean
+from jointscope.robots.yaml_section import Section
 
 FORMAT = 1
 READY_ROOT = Path(__file__).parent
@@ -29,8 +30,7 @@ READY_PREFIX = "ready:"
 INTEGRATORS = ("euler", "midpoint", "simpson")
 GYRO_FORMS = ("full", "vertical", "relative")
 COMMAND_UNITS = ("duty", "V", "N m")
-DRIVE_PARAMETERS = ("k_pwm", "k_mi", "inertia")
-JOINT_PARAMETERS = ("coulomb_torque", "stiffness", "damping")
+CONSTANTS = ("motor.supply_voltage", "motor.gear")
 
 
 def ready_robots() -> dict[str, Path]:
@@ -62,12 +62,10 @@ def load_robot(name_or_path: str | Path) -> Robot:
     choices = top.section("model", {}).build(_model_choices)
     gravity = top.array("gravity", (3,))
     tree = RigidTree(_urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis)
-    constants = {key: top.section("constants", {}).number(key) for key in top.section("constants", {}).keys()}
+    constants = top.section("constants", {}).build(_constants)
     command = top.section("command").build(lambda s: _topic(s, joints, COMMAND_UNITS))
     sensors = {name: section.build(_sensor(name, joints)) for name, section in top.section("sensors").sections()}
-    parameters = {
-        name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()
-    }
+    parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
     noise = top.section("noise").build(lambda s: _noise(s, len(joints)))
     robot = Robot(
         name=top.text("name"),
@@ -85,7 +83,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
     )
     top.raw("calibration")
     top.finish()
-    _check(robot)
+    check_robot(robot)
     return robot
 
 
@@ -100,8 +98,15 @@ def read_document(path: Path) -> Any:
     except (OSError, UnicodeDecodeError) as err:
         raise RobotError(f"cannot read the robot file {path}: {err}") from err
     except YAMLError as err:
-        raise RobotError(f"{path.name} is not YAML: {' '.join(str(err).split())[:200]}") from err
+        raise RobotError(f"{path.name} is not YAML: {_yaml_trouble(err)}") from err
     return document
+
+
+def _yaml_trouble(err: YAMLError) -> str:
+    """The parser's complaint in one line, with the place in the file."""
+    mark, problem = getattr(err, "problem_mark", None), getattr(err, "problem", None)
+    text = " ".join(str(problem or err).split())[:160]
+    return f"line {mark.line + 1}, column {mark.column + 1}: {text}" if mark is not None else text
 
 
 def dump_document(document: Any) -> str:
@@ -132,9 +137,7 @@ def _find(name_or_path: str) -> Path:
         return ready[name_or_path]
     path = Path(name_or_path)
     if not path.is_file():
-        raise RobotError(
-            f"no robot {name_or_path!r}: neither a file nor a ready robot ({', '.join(ready)})"
-        )
+        raise RobotError(f"no robot {name_or_path!r}: neither a file nor a ready robot ({', '.join(ready)})")
     return path
 
 
@@ -152,6 +155,11 @@ def _model_choices(section: Section) -> ModelChoices:
         friction_sharpness=section.number("friction_sharpness", 200.0, positive=True),
         bias_at_rest=section.flag("bias_at_rest", False),
     )
+
+
+def _constants(section: Section) -> dict[str, float]:
+    values = {key: section.number(key, None, positive=True) for key in CONSTANTS}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = ()) -> Topic:
@@ -228,7 +236,7 @@ def _parameter(name: str) -> Any:
             prior_sigma=section.number("prior_sigma", abs(value) or 1.0, positive=True),
             positive=positive,
             fixed=fixed,
-            sigma=section.number("sigma", None),
+            sigma=section.number("sigma", None, positive=True),
             published=section.number("published", None),
         )
 
@@ -248,29 +256,3 @@ def _noise(section: Section, n: int) -> ProcessNoise:
         if np.any(getattr(noise, key) <= 0):
             raise RobotError(f"{section.place}.{key}: expected numbers above zero")
     return noise
-
-
-def _check(robot: Robot) -> None:
-    """Checks what only the whole robot shows."""
-    place = robot.path.name
-    for gyro in robot.gyros:
-        if gyro.body not in robot.tree.bodies:
-            raise RobotError(
-                f"{place}: sensors.{gyro.name}.body: no link {gyro.body!r}{did_you_mean(gyro.body, robot.tree.bodies)}"
-            )
-        if gyro.reference is not None and gyro.reference not in {g.name for g in robot.gyros}:
-            raise RobotError(f"{place}: sensors.{gyro.name}.reference: no gyro {gyro.reference!r}")
-    robot.motor_encoder  # noqa: B018  raises where there is none
-    known = {f"{owner}.{name}" for owner in ("motor", *robot.joints) for name in DRIVE_PARAMETERS}
-    known |= {f"{joint}.{name}" for joint in robot.joints for name in JOINT_PARAMETERS}
-    for name in robot.parameters:
-        if name not in known:
-            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, known)}")
-    needed = DRIVE_PARAMETERS if robot.command.unit != "N m" else ("inertia",)
-    for joint in robot.joints:
-        for name in needed:
-            robot.drive_parameter(joint, name)
-        for name in JOINT_PARAMETERS:
-            robot.parameter(f"{joint}.{name}")
-    if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
-        raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")

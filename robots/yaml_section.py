@@ -43,7 +43,7 @@ class Section:
         value = self._get(key, default)
         if value is default:
             return value
-        if isinstance(value, bool) or not isinstance(value, Real) or not np.isfinite(float(value)):
+        if not _is_number(value) or not np.isfinite(float(value)):
             raise RobotError(f"{self._at(key)}: expected a finite number, got {_show(value)}")
         if positive and float(value) <= 0:
             raise RobotError(f"{self._at(key)}: expected a number above zero, got {float(value):g}")
@@ -81,11 +81,12 @@ class Section:
         value = self._get(key, default)
         if value is default:
             return value
-        try:
-            array = np.array([[float(x) for x in row] for row in value] if len(shape) == 2 else list(map(float, value)))
-        except (TypeError, ValueError):
-            array = np.empty(0)
-        if array.shape != shape or not np.all(np.isfinite(array)):
+        rows = value if len(shape) == 2 else [value]
+        numbers = _is_list(rows) and all(_is_list(row) and all(map(_is_number, row)) for row in rows)
+        widths = [len(row) for row in rows] if numbers else []
+        fits = widths == [shape[-1]] * (shape[0] if len(shape) == 2 else 1)
+        array = np.array(rows, dtype=float).reshape(shape) if fits else np.full(1, np.nan)
+        if not np.all(np.isfinite(array)):
             size = " x ".join(map(str, shape))
             raise RobotError(f"{self._at(key)}: expected {size} finite numbers, got {_show(value)}")
         return array
@@ -119,7 +120,9 @@ class Section:
         if key in self._content:
             return self._content[key]
         if default is _REQUIRED:
-            raise RobotError(f"{self.place}: {key!r} is missing")
+            near = difflib.get_close_matches(key, [k for k in self.keys() if k not in self._used], n=1)
+            hint = f"; is {near[0]!r} meant to be it?" if near else ""
+            raise RobotError(f"{self.place}: {key!r} is missing{hint}")
         return default
 
     def _at(self, key: str) -> str:
@@ -132,6 +135,14 @@ def did_you_mean(word: str, known: Sequence[str] | set[str]) -> str:
     if near:
         return f"; did you mean {near[0]!r}?"
     return f"; expected {', '.join(sorted(known))}" if known else ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
 
 
 def _show(value: Any) -> str:

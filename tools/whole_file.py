@@ -9,10 +9,12 @@ A file is written beside its place under a hidden name and moved there at the en
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as err:
         raise JointscopeError(_cannot_write(target, err)) from err
     except JointscopeError as err:
+        if str(unfinished) not in str(err):
+            raise
         # the user knows nothing of the hidden name
         raise type(err)(str(err).replace(str(unfinished), str(target))) from err
     finally:
@@ -47,13 +51,17 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Writes JSON that every reader accepts (no NaN), whole or not at all.
+    """Writes JSON that every reader accepts (NaN and infinity become null), whole or not at all.
+
+    Args:
+        path: file to write.
+        content: dictionaries, lists, texts and numbers.
 
     Raises:
         JointscopeError: the file cannot be written.
     """
     with whole_file(path) as unfinished:
-        unfinished.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        unfinished.write_text(json.dumps(_plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[str | Path] = ()) -> None:
@@ -83,6 +91,16 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[str | Path] =
                 pass
         except OSError as err:
             raise JointscopeError(_cannot_write(path, err)) from err
+
+
+def _plain(content: Any) -> Any:
+    if isinstance(content, Mapping):
+        return {str(key): _plain(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_plain(value) for value in content]
+    if isinstance(content, Real) and not isinstance(content, Integral):
+        return float(content) if math.isfinite(content) else None
+    return content
 
 
 def _cannot_write(path: Path, err: OSError) -> str:

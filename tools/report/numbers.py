@@ -52,7 +52,7 @@ def significant(value: float, digits: int = 3) -> str:
     if value == 0.0:
         return "0"
     exponent = int(f"{value:.{digits - 1}e}".split("e")[1])
-    if exponent < -4 or exponent > 6:
+    if exponent < -4 or exponent > 5:
         mantissa = value / 10.0**exponent
         return minus(f"{mantissa:.{digits - 1}f}·10{str(exponent).translate(SUPERSCRIPTS)}")
     return minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")

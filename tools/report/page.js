@@ -14,7 +14,7 @@
     key.onclick = () => {
       const off = key.classList.toggle("off");
       for (const curve of key.closest("figure").querySelectorAll("[data-name]"))
-        if (curve.dataset.name === key.dataset.key || curve.dataset.name.startsWith(key.dataset.key + " "))
+        if (` ${curve.dataset.name} `.includes(` ${key.dataset.key} `))
           curve.classList.toggle("hidden", off);
     };
   }

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 UNITS_PER_PIXEL = 10
 BAND_POINTS = 400
-PIXELS_PER_TICK = {"x": 90, "y": 34}
+PIXELS_PER_TICK = {"x": 90, "y": 30}
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class Axes:
         x_range, y_range: limits; None: from the data.
         log_x, log_y: logarithmic axes.
         levels: horizontal guide lines: value and text.
+        shade: stretch of x to emphasise.
         zoomable: whether the page's script may zoom and read values.
     """
 
@@ -83,6 +84,7 @@ class Axes:
     log_x: bool = False
     log_y: bool = False
     levels: Sequence[tuple[float, str]] = field(default_factory=tuple)
+    shade: tuple[float, float] | None = None
     zoomable: bool = True
 
 
@@ -103,7 +105,7 @@ def plot(axes: Axes, marks: Sequence[Mark]) -> str:
     y_scale = _scale(axes.y_range, y_extents, inner_height, axes.log_y, flip=True, air=0.06)
     grid = _grid(axes, x_scale, y_scale, inner_width, inner_height)
     width, height = inner_width * UNITS_PER_PIXEL, inner_height * UNITS_PER_PIXEL
-    drawn = "".join(_draw(m, x_scale, y_scale, height) for m in marks)
+    drawn = _shade(axes, x_scale, height) + "".join(_draw(m, x_scale, y_scale, height) for m in marks)
     zoom = (
         f' data-x="{x_scale.low:.9g},{x_scale.high:.9g}" data-y="{y_scale.low:.9g},{y_scale.high:.9g}"'
         f' data-log="{int(axes.log_x)},{int(axes.log_y)}"'
@@ -154,7 +156,7 @@ def _extent_y(mark: Mark, x_scale: Scale) -> tuple[float, float]:
 
 def _grid(axes: Axes, x: Scale, y: Scale, width: float, height: float) -> str:
     parts = []
-    for value, label in y.ticks(max(int(height / PIXELS_PER_TICK["y"]), 2)):
+    for value, label in y.ticks(max(int(height / PIXELS_PER_TICK["y"]), 3)):
         at = f"{float(y(value)):.1f}"
         parts.append(f'<path class="grid" d="M0 {at}H{width}"/><text class="y" x="-7" y="{at}">{label}</text>')
     ticks = []
@@ -172,6 +174,13 @@ def _grid(axes: Axes, x: Scale, y: Scale, width: float, height: float) -> str:
     if axes.x_label:
         parts.append(f'<text class="xlabel" x="{width / 2:.0f}" y="{height + 30}">{escape(axes.x_label)}</text>')
     return "".join(parts)
+
+
+def _shade(axes: Axes, x_scale: Scale, height: float) -> str:
+    if axes.shade is None:
+        return ""
+    a, b = (round(float(x_scale(x)) * UNITS_PER_PIXEL) for x in axes.shade)
+    return f'<rect class="shade" x="{a}" width="{b - a}" height="{height}"/>'
 
 
 def _draw(mark: Mark, x_scale: Scale, y_scale: Scale, height: float) -> str:

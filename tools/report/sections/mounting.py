@@ -17,27 +17,23 @@ from jointscope.tools.report.page import Section, foldable, table
 
 def mounting(result: CalibrationResult) -> Section:
     """Angles of each gyro about its body's axes, biases, and the rotation matrices."""
-    angles = [_row(p, 180.0 / math.pi) for p in result.parameters if ".R_imu_body" in p.name]
-    biases = [_row(p, 1.0) for p in result.parameters if ".bias" in p.name]
+    angles = [_row(p, 180.0 / math.pi, "deg") for p in result.parameters if ".R_imu_body" in p.name]
+    biases = [_row(p, 1.0, p.unit) for p in result.parameters if ".bias" in p.name]
     first = result.bags[0].recording.path if len(result.bags) > 1 else ""
-    body = ""
-    if angles:
-        head = ["mounting angle, away from the prior", "value [deg]", "± sigma [deg]", "note"]
-        body += table(head, angles, [1, 2])
-    if biases:
-        where = f" (of {first})" if first else ""
-        body += "<br>" + table([f"bias{where}", "value [rad/s]", "± sigma [rad/s]", "note"], biases, [1, 2])
+    head = ["angle away from the prior, or bias", "value", "± sigma", "unit", "note"]
+    body = table(head, [*angles, *biases], [1, 2]) if angles or biases else ""
+    body += f'<p class="quiet">Biases are those of {escape(first)}.</p>' if first else ""
     matrices = "".join(_matrix(gyro) for gyro in result.robot.gyros)
     body += foldable("rotation matrices R_imu_body", f'<div class="figures">{matrices}</div>') if matrices else ""
     lead = "Angles about the axes of the body that carries the sensor, measured from the mounting that the prior states."
     return Section("mounting", "Gyro mounting and biases", body, lead)
 
 
-def _row(p: ParameterEstimate, factor: float) -> list[str]:
+def _row(p: ParameterEstimate, factor: float, unit: str) -> list[str]:
     value, sigma = with_sigma(factor * p.value, factor * p.sigma)
     text = p.note or ("held by its prior" if is_held(p) else "")
     note = f'<span class="tag info">{escape(text)}</span>' if text else ""
-    return [f"<code>{escape(p.name)}</code>", f"<b>{value}</b>", sigma, note]
+    return [f"<code>{escape(p.name)}</code>", f"<b>{value}</b>", sigma, escape(unit), note]
 
 
 def _matrix(gyro: Gyro) -> str:

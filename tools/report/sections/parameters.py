@@ -8,7 +8,7 @@ from html import escape
 
 from jointscope.graphs.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.tools.report.judgement import is_held, is_mounting_or_bias
-from jointscope.tools.report.numbers import percent, plus_minus, significant, with_sigma
+from jointscope.tools.report.numbers import percent, significant, with_sigma
 from jointscope.tools.report.page import Section, table
 
 BAR = 84  # [px]
@@ -49,7 +49,7 @@ def _row(p: ParameterEstimate, published: bool, noted: bool) -> list[str]:
         sigma,
         _share_bar(share),
         _ladder(p),
-        plus_minus(p.prior, p.prior_sigma),
+        f"{significant(p.prior)} ± {significant(p.prior_sigma, 2)}",
     ]
     if published:
         row.append("—" if p.published is None else significant(p.published, 5))

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# make demo | test | lint | bench | clean. Everything lives in .venv; a second run installs only what changed.
+
+SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	$$p -c '$(SUITABLE)' >/dev/null 2>&1 && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
+TYPES := build/types
+
+.PHONY: demo test lint bench clean
+.NOTPARALLEL:
+
+demo: $(VENV)/sim $(VENV)/code
+	$(BIN)/jointscope demo -o demo
+
+test: $(VENV)/dev $(VENV)/code
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	rm -rf $(TYPES) && mkdir -p $(TYPES)/jointscope
+	ln -s $(addprefix $(CURDIR)/,robots factors graphs tools tools/facade/__init__.py tools/facade/py.typed) $(TYPES)/jointscope/
+	cd $(TYPES) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p jointscope
+
+bench: $(VENV)/bench $(VENV)/code
+	$(BIN)/python benchmarks/bench.py
+
+clean:
+	rm -rf $(VENV) build demo *.egg-info .mypy_cache .pytest_cache .ruff_cache
+
+$(VENV)/made:
+	@test -n "$(PYTHON)" && $(PYTHON) -c '$(SUITABLE)' || { \
+		echo "jointscope needs Python 3.11 or newer, and none was found; install it, or name one: make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+		echo "$(PYTHON) cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
+	rm -rf $(VENV) && $(PYTHON) -m venv $(VENV)
+	$(PIP) install "pip>=24" "setuptools>=77"
+	touch $@
+
+# Dependencies; pyproject.toml says which.
+$(VENV)/sim $(VENV)/dev $(VENV)/bench: $(VENV)/made pyproject.toml
+	@echo "Installing into $(VENV): about 1.5 GB the first time, some minutes"
+	rm -rf build
+	$(PIP) install --no-build-isolation ".[$(notdir $@)]"
+	touch $@
+
+# The package itself, again after each change; without build/, where removed modules would live on.
+$(VENV)/code: $(VENV)/made $(SOURCES) pyproject.toml setup.py
+	rm -rf build
+	$(PIP) install --no-build-isolation --no-deps --force-reinstall .
+	touch $@

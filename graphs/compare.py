@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Measured against predicted, the verification of the paper (Sec. 5.2) and k-step-ahead predictions.
+
+Open loop starts from the first smoothed state. Predictions ahead start from causal states, which use data up to their
+start only. Biases and, for a robot that was never calibrated, process noise are fitted to the recording; everything
+else is the model's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
+from jointscope.factors.gyro import GyroFactor
+from jointscope.factors.interpolated import interpolate
+from jointscope.factors.motor_encoder import MotorEncoderFactor
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.batch_solver import Progress, solve
+from jointscope.graphs.calibrate import approach, calibrate, check_recordings
+from jointscope.graphs.causal_filter import FilteredStates, filter_states
+from jointscope.graphs.comparison_result import (
+    OPEN_LOOP,
+    ChannelComparison,
+    ComparisonResult,
+    ModelComparison,
+    SensorPrediction,
+    WorstWindow,
+)
+from jointscope.graphs.initial_guess import initial_biases
+from jointscope.graphs.noise_floor import floor_of
+from jointscope.graphs.prediction import Predictor
+from jointscope.robots.errors import RobotError
+from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.robot import Robot
+from jointscope.robots.sensors import Gyro, Sensor
+
+Array = NDArray[np.float64]
+
+HORIZON = 0.1  # [s] the horizon of `error`
+HORIZONS = (0.01, 0.1, 1.0)  # [s]
+SPACING = {0.01: 0.01, 0.1: 0.01, 1.0: 0.1}  # [s] between starts, by horizon
+WINDOW = 0.25  # [s] length of the windows among which the worst are sought
+WORST = 8
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Predictions that end near the samples of one sensor.
+
+    Attributes:
+        sample: index of the sample in its stream, shape (s,).
+        predicted: predicted measurement, shape (s, c).
+    """
+
+    sample: NDArray[np.intp]
+    predicted: Array
+
+
+def compare(
+    robots: Mapping[str, Robot], recording: Recording, *, progress: Progress | None = None
+) -> ComparisonResult:
+    """Compares models with a recording.
+
+    Args:
+        robots: models by label.
+        recording: preferably one that was not used for calibration.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: the recording cannot be a measurement of these robots.
+        RobotError: no robot given.
+        SolveError: the states of the recording cannot be estimated.
+    """
+    if not robots:
+        raise RobotError("no robot given; pass at least one")
+    models = []
+    for i, (label, robot) in enumerate(robots.items()):
+        if progress:
+            progress(f"comparing {label}", i / len(robots))
+        models.append(compare_model(label, robot, recording))
+    return ComparisonResult(recording, tuple(models))
+
+
+def compare_model(label: str, robot: Robot, recording: Recording) -> ModelComparison:
+    """Compares one model with a recording."""
+    problem, states, calibration = smooth(robot, recording)
+    robot = problem.robot
+    predictor = Predictor(robot, problem.timeline)
+    causal = filter_states(problem, states, calibration)
+    ahead = {h: _predict_ahead(problem, calibration, predictor, causal, h) for h in HORIZONS}
+    open_loop = _predict_open_loop(problem, calibration, predictor, states[0])
+    sensors = {
+        name: _sensor_prediction(recording.streams[name], robot.sensors[name], ahead[HORIZON], open_loop)
+        for name in robot.sensors
+    }
+    channels = _channels(robot, recording, ahead, open_loop)
+    error = float(np.sqrt(np.mean([(c.horizons[str(HORIZON)] / c.noise_sigma) ** 2 for c in channels.values()])))
+    return ModelComparison(
+        label=label,
+        robot=robot,
+        error=error,
+        floor=floor_of(problem, states, calibration, HORIZON),
+        channels=channels,
+        worst=_worst_windows(sensors),
+        sensors=sensors,
+    )
+
+
+def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calibration]:
+    """Smoothed states and biases of a recording under a model whose parameters stay as they are.
+
+    All three components of every gyro are predicted from the state, also where the robot calibrates with the forms of
+    the paper. A robot that was never calibrated gets process noise from the recording.
+    """
+    check_recordings(robot, [recording], every_joint=False)
+    robot = robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})
+    calibrated = any(parameter.sigma is not None for parameter in robot.parameters.values())
+    if robot.noise.estimate and not calibrated:
+        result = calibrate(robot, [recording], biases_only=True)
+        problem = BagProblem.of(replace(robot, noise=result.noise), recording)
+        return problem, result.bags[0].states, result.bags[0].calibration
+    problem = BagProblem.of(robot, recording)
+    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
+    first = approach([problem], robot.noise, [initial_biases(problem, Calibration.of(robot))], hold)
+    estimate = solve([problem], first.estimate, hold=hold).estimate
+    return problem, estimate.states[0], estimate.calibrations[0]
+
+
+def _predict_ahead(
+    problem: BagProblem, calibration: Calibration, predictor: Predictor, causal: FilteredStates, horizon: float
+) -> dict[str, Ahead]:
+    """Predictions `horizon` seconds ahead from starts all over the recording, by sensor."""
+    timeline = problem.timeline
+    ticks, h = timeline.ticks, float(np.median(timeline.h))
+    stride = max(int(round(SPACING[horizon] / h)), 1)
+    longest = int(np.ceil((horizon + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
+    start = np.arange(0, len(ticks) - 1 - longest, stride)
+    if len(start) == 0:
+        return {name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels)))) for name, s in problem.robot.sensors.items()}
+    wanted = {name: _target_samples(problem.recording.streams[name], ticks[start] + horizon) for name in problem.robot.sensors}
+    steps = {name: timeline.locate(problem.recording.streams[name].times[w])[0] for name, (w, _) in wanted.items()}
+    found = {name: np.full((len(start), causal.mean.shape[1]), np.nan) for name in wanted}
+    for step, before, after in predictor.paths(causal.mean[start], start, longest):
+        for name, (sample, _) in wanted.items():
+            here = steps[name] == step
+            if np.any(here):
+                times = problem.recording.streams[name].times[sample[here]]
+                found[name][here] = _between(timeline.ticks, step[here], times, before[here], after[here])
+    result = {}
+    for name, (sample, near) in wanted.items():
+        good = near & np.all(np.isfinite(found[name]), axis=1)
+        predicted = predict_sensor(problem.robot, name, found[name][good], calibration)
+        result[name] = Ahead(sample[good], predicted)
+    return result
+
+
+def _sums(h: Array, horizon: float) -> Array:
+    """Mean step over every stretch of about the horizon, shape (k,)."""
+    count = max(min(int(horizon / float(np.median(h))), len(h)), 1)
+    total = np.convolve(h, np.ones(count), mode="valid")
+    return total / count
+
+
+def _target_samples(stream: Stream, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Nearest sample to each time, and whether it lies within half a period."""
+    right = np.clip(np.searchsorted(stream.times, times), 1, len(stream) - 1)
+    nearest = np.where(times - stream.times[right - 1] < stream.times[right] - times, right - 1, right)
+    period = float(np.median(np.diff(stream.times)))
+    return nearest, np.abs(stream.times[nearest] - times) <= 0.5 * period + 1e-9
+
+
+def _between(ticks: Array, step: NDArray[np.intp], times: Array, before: Array, after: Array) -> Array:
+    """States between two ticks."""
+    h = ticks[step + 1] - ticks[step]
+    return interpolate(before, after, np.clip((times - ticks[step]) / h, 0.0, 1.0), h)
+
+
+def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration) -> Array:
+    """What a sensor would measure at states of shape (s, d), shape (s, c)."""
+    sensor = robot.sensors[name]
+    nothing = np.zeros((len(x), len(sensor.channels)))
+    if isinstance(sensor, Gyro):
+        return GyroFactor(sensor, robot.tree, nothing).residual((x,), calibration)
+    return MotorEncoderFactor(sensor, nothing).residual((x,), calibration)
+
+
+def _predict_open_loop(
+    problem: BagProblem, calibration: Calibration, predictor: Predictor, x0: Array
+) -> dict[str, Array]:
+    """Predictions at all samples from the first state and the commands alone; NaN outside the ticks."""
+    ticks = problem.timeline.ticks
+    path = np.empty((len(ticks), len(x0)))
+    path[0] = x0
+    for step, _, after in predictor.paths(x0[None], np.zeros(1, np.intp), len(ticks) - 1):
+        path[step[0] + 1] = after[0]
+    found = {}
+    for name, sensor in problem.robot.sensors.items():
+        times = problem.recording.streams[name].times
+        inside = (times >= ticks[0]) & (times <= ticks[-1])
+        step, _ = problem.timeline.locate(times[inside])
+        x = _between(ticks, step, times[inside], path[step], path[step + 1])
+        predicted = np.full((len(times), len(sensor.channels)), np.nan)
+        predicted[inside] = predict_sensor(problem.robot, name, x, calibration)
+        found[name] = predicted
+    return found
+
+
+def _sensor_prediction(
+    stream: Stream, sensor: Sensor, ahead: dict[str, Ahead], open_loop: dict[str, Array]
+) -> SensorPrediction:
+    predicted = np.full(stream.values.shape, np.nan)
+    predicted[ahead[sensor.name].sample] = ahead[sensor.name].predicted
+    return SensorPrediction(
+        sensor.channels, sensor.unit, sensor.sigma, stream.times, stream.values, open_loop[sensor.name], predicted
+    )
+
+
+def _channels(
+    robot: Robot, recording: Recording, ahead: dict[float, dict[str, Ahead]], open_loop: dict[str, Array]
+) -> dict[str, ChannelComparison]:
+    found = {}
+    for name, sensor in robot.sensors.items():
+        measured = recording.streams[name].values
+        for j, channel in enumerate(sensor.channels):
+            horizons = {}
+            for horizon, predictions in ahead.items():
+                p = predictions[name]
+                horizons[str(horizon)] = _rms(measured[p.sample, j] - p.predicted[:, j])
+            horizons[OPEN_LOOP] = _rms(measured[:, j] - open_loop[name][:, j])
+            p = ahead[HORIZON][name]
+            y = measured[p.sample, j]
+            spread = float(np.linalg.norm(y - y.mean())) if len(y) else 0.0
+            fit = 100.0 * (1.0 - float(np.linalg.norm(y - p.predicted[:, j])) / spread) if spread > 0 else float("nan")
+            found[channel] = ChannelComparison(horizons, fit, sensor.sigma, sensor.unit)
+    return found
+
+
+def _rms(error: Array) -> float:
+    error = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+
+
+def _worst_windows(sensors: dict[str, SensorPrediction]) -> tuple[WorstWindow, ...]:
+    """The windows with the largest share of the squared error in sigmas."""
+    found, total = [], 0.0
+    for sensor in sensors.values():
+        squares = ((sensor.measured - sensor.ahead) / sensor.sigma) ** 2
+        t0 = float(sensor.times[0])
+        index = ((sensor.times - t0) / WINDOW).astype(int)
+        for j, channel in enumerate(sensor.channels):
+            valid = np.isfinite(squares[:, j])
+            mean = float(np.mean(squares[valid, j])) if np.any(valid) else 0.0
+            total += mean
+            sums = np.bincount(index[valid], weights=squares[valid, j])
+            count = max(int(valid.sum()), 1)
+            for window in np.argsort(-sums)[:WORST]:
+                start = t0 + float(window) * WINDOW
+                found.append(WorstWindow(channel, start, start + WINDOW, float(sums[window]) / count))
+    found = [replace(w, share=w.share / max(total, 1e-300)) for w in found]
+    return tuple(sorted(found, key=lambda w: -w.share)[:WORST])

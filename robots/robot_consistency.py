@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What only a whole robot shows: sensors sit on its links, every law has its parameters, in the right unit."""
+
+from __future__ import annotations
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.robot import Robot
+from jointscope.robots.sensors import MotorEncoder
+from jointscope.robots.yaml_section import did_you_mean
+
+DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "inertia": "kg m2"}
+JOINT_PARAMETERS = {"coulomb_torque": "N m", "stiffness": "N m/rad", "damping": "N m s/rad"}
+
+
+def check_robot(robot: Robot) -> None:
+    """Checks that the parts of a robot file fit together.
+
+    Raises:
+        RobotError: a sensor on no link, no encoder, a parameter that is missing, unknown or in another unit.
+    """
+    place = robot.path.name
+    for gyro in robot.gyros:
+        if gyro.body not in robot.tree.bodies:
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.body: no link {gyro.body!r}{did_you_mean(gyro.body, robot.tree.bodies)}"
+            )
+        others = [g.name for g in robot.gyros if g.name != gyro.name]
+        if gyro.reference is not None and gyro.reference not in others:
+            known = ", ".join(others) or "there is none"
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
+            )
+    if not any(isinstance(sensor, MotorEncoder) for sensor in robot.sensors.values()):
+        raise RobotError(f"{place}: sensors: none of kind motor_encoder; the motor positions are needed")
+    if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
+        raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
+    _check_parameters(robot, place)
+
+
+def _check_parameters(robot: Robot, place: str) -> None:
+    """All parameters known, in their units, and none missing."""
+    units = {f"{owner}.{name}": unit for owner in ("motor", *robot.joints) for name, unit in DRIVE_PARAMETERS.items()}
+    units |= {f"{joint}.{name}": unit for joint in robot.joints for name, unit in JOINT_PARAMETERS.items()}
+    for name, parameter in robot.parameters.items():
+        if name not in units:
+            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
+        if parameter.unit != units[name]:
+            raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
+    needed = tuple(DRIVE_PARAMETERS) if robot.command.unit != "N m" else ("inertia",)
+    for joint in robot.joints:
+        for name in needed:
+            if not {f"{joint}.{name}", f"motor.{name}"} & set(robot.parameters):
+                raise RobotError(f"{place}: parameters: 'motor.{name}' is missing, or '{joint}.{name}'")
+        for name in JOINT_PARAMETERS:
+            if f"{joint}.{name}" not in robot.parameters:
+                raise RobotError(f"{place}: parameters: '{joint}.{name}' is missing")

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes a calibrated robot as a robot file again: same document, same comments, new numbers and their origin."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from jointscope.robots.robot import Robot
+from jointscope.robots.robot_file import dump_document, urdf_reference
+
+
+def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None = None) -> str:
+    """The robot file of a robot.
+
+    Args:
+        robot: a calibrated robot; its `document` gives layout and comments.
+        folder: where the file will lie; the URDF is named relative to it.
+        provenance: how the numbers came about (bags with hashes, version, date); becomes the section `calibration`.
+
+    Returns:
+        YAML text.
+    """
+    document = copy.deepcopy(robot.document)
+    document["urdf"] = urdf_reference(robot.tree.urdf, folder)
+    for name, parameter in robot.parameters.items():
+        if parameter.fixed:
+            continue
+        entry = document["parameters"][name]
+        entry["value"] = _rounded(parameter.value)
+        if parameter.sigma is not None:
+            entry["sigma"] = _rounded(parameter.sigma, 3)
+        entry.setdefault("prior", _rounded(parameter.prior))
+        entry.setdefault("prior_sigma", _rounded(parameter.prior_sigma))
+    for gyro in robot.gyros:
+        entry = document["sensors"][gyro.name]
+        bias = entry.setdefault("bias", _flow({}))
+        bias["value"] = _row(gyro.bias)
+        rotation = entry["R_imu_body"]
+        if "prior" not in rotation:
+            rotation.insert(1, "prior", _matrix(gyro.R_prior))
+        rotation["value"] = _matrix(gyro.R_imu_body)
+        if gyro.bias_sigma is not None:
+            bias["sigma"] = _row(gyro.bias_sigma, 3)
+        if gyro.R_sigma is not None:
+            rotation.pop("sigma", None)
+            rotation.insert(1, "sigma", _row(gyro.R_sigma, 3))
+    document["noise"]["link_velocity"] = _row(robot.noise.link_velocity, 4)
+    document["noise"]["motor_velocity"] = _row(robot.noise.motor_velocity, 4)
+    if provenance is not None:
+        document["calibration"] = _plain(provenance)
+    return dump_document(document)
+
+
+def _rounded(value: float, digits: int = 9) -> float:
+    """A number without the digits that nobody can measure."""
+    return float(f"{float(value):.{digits}g}")
+
+
+def _row(values: np.ndarray, digits: int = 9) -> CommentedSeq:
+    row = CommentedSeq([_rounded(v, digits) for v in values])
+    row.fa.set_flow_style()
+    return row
+
+
+def _matrix(values: np.ndarray) -> CommentedSeq:
+    matrix = CommentedSeq([_row(row) for row in values])
+    matrix.fa.set_flow_style()
+    return matrix
+
+
+def _flow(content: Mapping[str, Any]) -> CommentedMap:
+    mapping = CommentedMap(content)
+    mapping.fa.set_flow_style()
+    return mapping
+
+
+def _plain(value: Any) -> Any:
+    """Python values as YAML nodes."""
+    if isinstance(value, Mapping):
+        return CommentedMap({key: _plain(v) for key, v in value.items()})
+    if isinstance(value, list | tuple):
+        return CommentedSeq([_plain(v) for v in value])
+    return value

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a calibration: one page that says first whether it is good."""
+
+from __future__ import annotations
+
+from jointscope.graphs.calibration_result import CalibrationResult
+from jointscope.tools.report.page import page
+from jointscope.tools.report.sections.commands import commands
+from jointscope.tools.report.sections.convergence import convergence
+from jointscope.tools.report.sections.correlation import correlation
+from jointscope.tools.report.sections.fits import fits
+from jointscope.tools.report.sections.mounting import mounting
+from jointscope.tools.report.sections.noise import noise
+from jointscope.tools.report.sections.notices import notices
+from jointscope.tools.report.sections.parameters import parameters
+from jointscope.tools.report.sections.provenance import provenance
+from jointscope.tools.report.sections.residuals import residuals
+from jointscope.tools.report.sections.states import states
+from jointscope.tools.report.sections.verdict import verdict
+from jointscope.tools.report.sections.weak_directions import weak_directions
+
+
+def calibration_report(result: CalibrationResult) -> str:
+    """The whole page as text.
+
+    Args:
+        result: what the calibration found.
+
+    Returns:
+        HTML without references to anything outside of itself.
+    """
+    recordings = [bag.recording for bag in result.bags]
+    sections = [
+        verdict(result),
+        parameters(result),
+        mounting(result),
+        fits(result),
+        commands(result),
+        residuals(result),
+        weak_directions(result),
+        correlation(result),
+        noise(result),
+        states(result),
+        convergence(result),
+        notices(recordings),
+        provenance(recordings, [result.robot], result.wall_seconds),
+    ]
+    names = ", ".join(recording.path for recording in recordings)
+    return page(f"Calibration of {result.robot.name}", f"{names} · {result.robot.description}", sections)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a comparison: how well models predict a recording, where and when they fail."""
+
+from __future__ import annotations
+
+from jointscope.graphs.comparison_result import ComparisonResult
+from jointscope.tools.report.page import page
+from jointscope.tools.report.sections.horizon_curve import horizon_curve
+from jointscope.tools.report.sections.horizon_table import horizon_table
+from jointscope.tools.report.sections.model_scores import model_scores
+from jointscope.tools.report.sections.notices import notices
+from jointscope.tools.report.sections.predictions import predictions
+from jointscope.tools.report.sections.provenance import provenance
+from jointscope.tools.report.sections.worst_windows import worst_windows
+
+
+def comparison_report(result: ComparisonResult) -> str:
+    """The whole page as text.
+
+    Args:
+        result: what the comparison found.
+
+    Returns:
+        HTML without references to anything outside of itself.
+    """
+    sections = [
+        model_scores(result),
+        horizon_curve(result),
+        predictions(result),
+        worst_windows(result),
+        horizon_table(result),
+        notices([result.recording]),
+        provenance([result.recording], [model.robot for model in result.models]),
+    ]
+    labels = " and ".join(model.label for model in result.models)
+    return page(f"{labels} against {result.recording.path}", "Measured against predicted", sections)

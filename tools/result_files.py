@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes what a verb found as robot file, report, rerun recording and JSON: all of them, or none."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import jointscope
+from jointscope.tools.whole_file import whole_file, write_json
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """The files that the user asked for; None where not.
+
+    Attributes:
+        report: HTML.
+        rrd: rerun recording.
+        json: what the screen says, for machines.
+        robot: robot file; only a calibration has one.
+    """
+
+    report: Path | None = None
+    rrd: Path | None = None
+    json: Path | None = None
+    robot: Path | None = None
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> ResultFiles:
+        """The files named on the command line."""
+        return cls(args.report, args.rrd, args.json, getattr(args, "output", None))
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """Those that were asked for."""
+        return tuple(path for path in (self.robot, self.report, self.rrd, self.json) if path is not None)
+
+
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Adds --report, --rrd and --json, which every verb that estimates something takes."""
+    parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
+    parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+
+
+def write_calibration(result: Any, files: ResultFiles) -> None:
+    """Writes a CalibrationResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.robot_writer import robot_text
+
+            text = robot_text(result.robot, files.robot.parent, provenance(result))
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        if files.report is not None:
+            from jointscope.tools.report import calibration_report
+
+            html = calibration_report(result)
+            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+        if files.rrd is not None:
+            from jointscope.tools.rerun_log import log_calibration
+
+            log_calibration(result, stack.enter_context(whole_file(files.rrd)))
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+
+
+def write_comparison(result: Any, files: ResultFiles) -> None:
+    """Writes a ComparisonResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if files.report is not None:
+            from jointscope.tools.report import comparison_report
+
+            html = comparison_report(result)
+            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+        if files.rrd is not None:
+            from jointscope.tools.rerun_log import log_comparison
+
+            log_comparison(result, stack.enter_context(whole_file(files.rrd)))
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+
+
+def provenance(result: Any) -> dict[str, Any]:
+    """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
+    return {
+        "version": jointscope.__version__,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "start": result.start.path.name,
+        "bags": [
+            {
+                "path": bag.recording.path,
+                "sha256": bag.recording.sha256,
+                "seconds": round(bag.recording.duration, 3),
+            }
+            for bag in result.bags
+        ],
+        "samples": int(result.samples),
+        "cost": float(result.cost),
+    }

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope calibrate`: batch calibration; OUT.yaml is a robot file again, with sigmas and provenance."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from jointscope.tools.progress import progress_bar
+from jointscope.tools.result_files import ResultFiles, add_result_options, write_calibration
+from jointscope.tools.whole_file import check_outputs
+
+EXAMPLE = """example:
+  jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
+
+Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
+takes as ROBOT."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "calibrate",
+        help="batch calibration; OUT.yaml is a robot file again, with sigmas and provenance",
+        description="Finds the parameters of a robot from recordings, with their uncertainties.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
+    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    add_result_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrates, writes the files, and says what was found."""
+    files = ResultFiles.of(args)
+    check_outputs(files.all, inputs=args.bags)
+    from jointscope.graphs.calibrate import calibrate
+    from jointscope.robots.robot_file import load_robot
+    from jointscope.tools.bags import read_recording
+    from jointscope.tools.calibration_text import calibration_text
+
+    robot = load_robot(args.robot)
+    with progress_bar() as progress:
+        recordings = []
+        for bag in args.bags:
+            label = f"reading {bag.name}"
+            recordings.append(read_recording(bag, robot, lambda done, of, t=label: progress(t, done / max(of, 1))))
+        result = calibrate(robot, recordings, progress=progress)
+        if files.report is not None or files.rrd is not None:
+            progress("writing", 1.0)
+        write_calibration(result, files)
+    print(calibration_text(result))
+    print(f"\nWrote {', '.join(map(str, files.all))}")
+    return 0

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope compare`: measured against predicted, per channel and horizon; several models side by side."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.progress import progress_bar
+from jointscope.tools.result_files import ResultFiles, add_result_options, write_comparison
+from jointscope.tools.whole_file import check_outputs
+
+EXAMPLE = """example:
+  jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
+
+The last argument is the bag; all before it are robots. Use a recording that was not used for calibration."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "compare",
+        help="measured against predicted: error per channel and horizon, where and when it fails",
+        description="Predicts a recording with one or more models and shows where and when they fail.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_models_and_bag(parser)
+    add_result_options(parser)
+    parser.set_defaults(run=run)
+
+
+def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
+    """Adds ROBOT... BAG."""
+    parser.add_argument("robots", metavar="ROBOT", nargs="+", help="name of a ready robot, or a robot file")
+    parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compares, writes the files, and says what was found."""
+    files = ResultFiles.of(args)
+    names = labels(args.robots)
+    check_outputs(files.all, inputs=[args.bag, *(robot for robot in args.robots if Path(robot).is_file())])
+    from jointscope.graphs.compare import compare
+    from jointscope.robots.robot_file import load_robot
+    from jointscope.tools.bags import read_recording
+    from jointscope.tools.comparison_text import comparison_text
+
+    robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
+    check_same_streams(robots)
+    with progress_bar() as progress:
+        first = next(iter(robots.values()))
+        recording = read_recording(
+            args.bag, first, lambda done, of: progress(f"reading {args.bag.name}", done / max(of, 1))
+        )
+        result = compare(robots, recording, progress=progress)
+        write_comparison(result, files)
+    print(comparison_text(result))
+    if files.all:
+        print(f"\nWrote {', '.join(map(str, files.all))}")
+    return 0
+
+
+def labels(robots: Sequence[str]) -> list[str]:
+    """A short name for each robot: the file's stem where that is unique, else what the user typed.
+
+    Raises:
+        JointscopeError: the same robot twice.
+    """
+    stems = [Path(robot).stem for robot in robots]
+    names = [stem if stems.count(stem) == 1 else robot for stem, robot in zip(stems, robots, strict=True)]
+    for name in names:
+        if names.count(name) > 1:
+            raise JointscopeError(f"the robot {name} is named twice; name each model once")
+    return names
+
+
+def check_same_streams(robots: dict[str, Any]) -> None:
+    """All models must be about the same measurements.
+
+    Raises:
+        RobotError: two robots read other topics, fields or units.
+    """
+    from jointscope.tools.bags.read_recording import needed_streams
+
+    (first, reference), *others = ((label, needed_streams(robot)) for label, robot in robots.items())
+    for label, needed in others:
+        if needed != reference:
+            odd = next((b.name for a, b in zip(reference, needed, strict=False) if a != b), "the number of its sensors")
+            raise RobotError(
+                f"{first} and {label} cannot be compared on one recording: they differ in {odd} (topic, type, field, "
+                "unit or names)"
+            )

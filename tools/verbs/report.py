@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope report`: how well models predict a recording, as one page for the browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from jointscope.tools.verbs import compare
+
+EXAMPLE = """example:
+  jointscope report doggy doggy_calibrated.yaml moves.mcap -o comparison.html
+
+The report of a calibration itself comes from `jointscope calibrate --report F.html`."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "report",
+        help="how well models predict a recording, as one page for the browser",
+        description="Writes the report of `jointscope compare`.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    compare.add_models_and_bag(parser)
+    parser.add_argument("-o", "--output", dest="report", metavar="F.html", type=Path, required=True, help="the report")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.set_defaults(run=compare.run, rrd=None)
