@@ -16,7 +16,7 @@ from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.banded_solver import eliminate
-from jointscope.graphs.causal_filter import filter_states
+from jointscope.graphs.causal_filter import filter_around
 from jointscope.graphs.noise_estimation import scaled
 from jointscope.graphs.normal_equations import build
 from jointscope.graphs.posterior import StatePosterior, residual_parts
@@ -41,7 +41,7 @@ def floor_of(problem: BagProblem, x: Array, calibration: Calibration, horizon: f
         horizon: prediction horizon [s].
     """
     quiet = problem.with_noise(scaled(problem.dynamics.steps.noise, _quiet_factors(problem, x, calibration)))
-    filtered = filter_states(quiet, x, calibration)
+    filtered = filter_around(quiet, x, calibration)
     steps = max(int(round(horizon / float(np.median(problem.timeline.h)))), 1)
     ticks = problem.timeline.ticks
     # at rest friction hides the deflection; no prediction can know it before the first motion

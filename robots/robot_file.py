@@ -21,7 +21,7 @@ from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
 from jointscope.robots.robot_consistency import check_robot
 from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
 from jointscope.robots.units import UNITS, si_unit
-from jointscope.robots.yaml_section import Section
+from jointscope.robots.yaml_section import Section, did_you_mean
 
 FORMAT = 1
 READY_ROOT = Path(__file__).parent
@@ -95,8 +95,10 @@ def read_document(path: Path) -> Any:
     """
     try:
         document = _yaml().load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as err:
-        raise RobotError(f"cannot read the robot file {path}: {err}") from err
+    except OSError as err:
+        raise RobotError(f"cannot read the robot file {path}: {err.strerror or err}") from err
+    except UnicodeDecodeError as err:
+        raise RobotError(f"{path} is not a robot file: it is not text; a robot comes first, then the bag") from err
     except YAMLError as err:
         raise RobotError(f"{path.name} is not YAML: {_yaml_trouble(err)}") from err
     return document
@@ -137,7 +139,8 @@ def _find(name_or_path: str) -> Path:
         return ready[name_or_path]
     path = Path(name_or_path)
     if not path.is_file():
-        raise RobotError(f"no robot {name_or_path!r}: neither a file nor a ready robot ({', '.join(ready)})")
+        hint = did_you_mean(name_or_path, list(ready))
+        raise RobotError(f"no robot {name_or_path!r}: neither a file nor a ready robot{hint}")
     return path
 
 

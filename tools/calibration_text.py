@@ -31,7 +31,8 @@ def _verdict(result: CalibrationResult) -> str:
     judgement = judge(result)
     lines = [judgement.headline]
     doubts = [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
-    findings = [f"  - {finding}" for finding in result.findings if not any(finding in doubt for doubt in doubts)]
+    told_below = {direction.text for direction in result.weak_directions}
+    findings = [f"  - {finding}" for finding in result.findings if finding not in told_below]
     lines += doubts + findings[:SHOWN_FINDINGS]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"  - and {len(findings) - SHOWN_FINDINGS} more in the report")

@@ -46,9 +46,7 @@ def _channels(result: ComparisonResult) -> str:
     rows: list[list[str]] = []
     for channel, reference in first.channels.items():
         values = [model.channels[channel] for model in result.models]
-        # the shortest horizon sets the prefix: it is the one that is compared with sigma
-        shortest = max(min(c.horizons.values()) for c in values)
-        factor, unit = prefixed(max(shortest, reference.noise_sigma), reference.unit)
+        factor, unit = prefixed(reference.noise_sigma, reference.unit)
         for k, (model, c) in enumerate(zip(result.models, values, strict=True)):
             start = [channel, significant(factor * c.noise_sigma), unit] if k == 0 else ["", "", ""]
             rms = [significant(factor * c.horizons[h]) for h in horizons]

@@ -163,20 +163,22 @@ def _against_truth(result: Any, truth: dict[str, Any]) -> str:
     from jointscope.tools.report.numbers import significant, with_sigma
     from jointscope.tools.text_table import text_table
 
-    rows, errors = [], []
+    rows, errors, distances = [], [], []
     for parameter in result.parameters:
         true = truth.get(parameter.name)
         if not isinstance(true, float) or true == 0.0:
             continue
         errors.append(abs(parameter.value / true - 1.0))
         value, sigma = with_sigma(parameter.value, parameter.sigma)
-        sigmas = abs(parameter.value - true) / parameter.sigma if parameter.sigma > 0 else float("nan")
-        rows.append(
-            [parameter.name, significant(true, 5), value, sigma, parameter.unit, f"{errors[-1]:.3%}", f"{sigmas:.1f}"]
-        )
+        distances.append(abs(parameter.value - true) / parameter.sigma if parameter.sigma > 0 else float("nan"))
+        cells = [parameter.name, significant(true, 6), value, sigma, parameter.unit]
+        rows.append([*cells, f"{errors[-1]:.3%}", f"{distances[-1]:.1f}"])
     head = ["parameter", "truth", "found", "± sigma", "unit", "error", "in sigmas"]
-    good = sum(error <= ALLOWED_ERROR for error in errors)
-    sentence = f"{good} of {len(errors)} parameters within {ALLOWED_ERROR:.0%}, largest error {max(errors):.3%}."
+    good, honest = sum(e <= ALLOWED_ERROR for e in errors), sum(d <= 2.0 for d in distances)
+    sentence = (
+        f"Of {len(errors)} parameters {good} are within {ALLOWED_ERROR:.0%} of the truth (largest error "
+        f"{max(errors):.2%}) and {honest} within two of their own sigmas (95 % are expected to be)."
+    )
     return f"{text_table(head, rows, '<>>><>>')}\n\n{sentence}"
 
 

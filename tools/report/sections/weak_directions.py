@@ -9,7 +9,7 @@ from jointscope.graphs.calibration_result import CalibrationResult, WeakDirectio
 from jointscope.tools.report.numbers import minus
 from jointscope.tools.report.page import Section
 
-BAR = 130  # [px] on each side of zero
+LEFT, BAR = 190, 180  # [px] names, longest bar
 LARGEST = 6
 
 
@@ -30,15 +30,13 @@ def _direction(direction: WeakDirection) -> str:
     rows = []
     for i, (name, weight) in enumerate(largest):
         y, length = 20 * i + 10, BAR * abs(weight) / scale
-        x = 250 + BAR - (length if weight < 0 else 0)
         rows.append(
-            f'<text class="name" x="238" y="{y}" text-anchor="end">{escape(name)}</text>'
-            f'<rect class="fill {"k0" if weight < 0 else "k2"}" x="{x:.1f}" y="{y - 6}" width="{length:.1f}" height="12"/>'
-            f'<text class="name" x="{250 + 2 * BAR + 8}" y="{y}">{minus(f"{weight:+.2f}")}</text>'
+            f'<text class="end" x="{LEFT - 10}" y="{y}">{escape(name)}</text>'
+            f'<rect class="fill {"k0" if weight < 0 else "k2"}" x="{LEFT}" y="{y - 6}" width="{length:.1f}" height="12"/>'
+            f'<text class="name" x="{LEFT + length + 7:.1f}" y="{y}">{minus(f"{weight:+.2f}")}</text>'
         )
     height = 20 * len(largest)
-    middle = f'<path class="grid" d="M{250 + BAR} 0V{height}"/>'
     return (
-        f'<h3>{escape(direction.text)}</h3><div class="scroll"><svg width="{250 + 2 * BAR + 60}" height="{height}" '
-        f'role="img" aria-label="weights of the direction">{middle}{"".join(rows)}</svg></div>'
+        f'<h3>{escape(direction.text)}</h3><div class="scroll"><svg width="{LEFT + BAR + 60}" height="{height}" '
+        f'role="img" aria-label="weights of the direction">{"".join(rows)}</svg></div>'
     )

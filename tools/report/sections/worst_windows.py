@@ -8,7 +8,7 @@ from html import escape
 from jointscope.graphs.comparison_result import ComparisonResult, WorstWindow
 from jointscope.tools.report.numbers import percent
 from jointscope.tools.report.page import Key, Section, figure, table
-from jointscope.tools.report.plot import Axes, plot
+from jointscope.tools.report.plot import Axes, Curve, Mark, plot
 from jointscope.tools.report.sections.model_colours import model_colour, model_keys
 from jointscope.tools.report.sections.predictions import channel_marks
 
@@ -44,6 +44,17 @@ def _closer(result: ComparisonResult, window: WorstWindow) -> str:
                 max(window.t0 - AROUND, float(sensor.times[0])),
                 min(window.t1 + AROUND, float(sensor.times[-1])),
             )
-            picture = plot(Axes(title, height=200, x_range=limits, shade=(window.t0, window.t1)), marks)
-            return figure([picture], [Key("measured", "soft", "wide"), *model_keys(result)])
+            shade = (window.t0, window.t1)
+            above = plot(Axes(title, "", height=150, x_range=limits, shade=shade), marks)
+            errors = _errors(result, name, sensor.channels.index(window.channel))
+            below = plot(Axes("measured − predicted [sensor sigma]", height=150, x_range=limits, shade=shade), errors)
+            return figure([above, below], [Key("measured", "soft", "wide"), *model_keys(result)])
     return ""
+
+
+def _errors(result: ComparisonResult, sensor: str, i: int) -> list[Mark]:
+    predictions = [(k, m.label, m.sensors[sensor]) for k, m in enumerate(result.models) if sensor in m.sensors]
+    return [
+        Curve(label, p.times, (p.measured[:, i] - p.ahead[:, i]) / p.sigma, model_colour(k), "hair")
+        for k, label, p in predictions
+    ]

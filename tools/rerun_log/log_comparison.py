@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A comparison as an .rrd file: scores, errors in sigmas, predictions 0.1 s ahead and open loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jointscope.graphs.comparison_result import ComparisonResult
+from jointscope.tools.report.numbers import percent, significant
+from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_lines
+from jointscope.tools.rerun_log.whole_file import whole_file
+from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+MODEL_COLOURS = (JOINT_COLOURS[2], JOINT_COLOURS[0], JOINT_COLOURS[1], *JOINT_COLOURS[3:])
+KINDS = {"error": "error 0.1 s ahead [sigma]", "ahead": "0.1 s ahead", "open_loop": "open loop"}
+
+
+def log_comparison(result: ComparisonResult, path: str | Path) -> None:
+    """Writes the file; one tab per kind of prediction, one plot per channel, one colour per model.
+
+    Args:
+        result: what the comparison found.
+        path: file to write; an existing one is replaced.
+
+    Raises:
+        JointscopeError: the file cannot be written; nothing is left behind.
+    """
+    expected = 8 * sum(4 * s.measured.size for model in result.models for s in model.sensors.values())
+    with whole_file(path, _blueprint(result), expected) as stream:
+        _send_scores(stream, result)
+        for sensor, prediction in (result.models[0].sensors if result.models else {}).items():
+            for i in range(len(prediction.channels)):
+                _send_channel(stream, result, sensor, i)
+
+
+def _send_channel(stream: rr.RecordingStream, result: ComparisonResult, sensor: str, i: int) -> None:
+    """Measured and all models in one entity per kind of prediction: they share their times, which halves the file."""
+    first = result.models[0].sensors[sensor]
+    models = [m for m in result.models if sensor in m.sensors and len(m.sensors[sensor].times) == len(first.times)]
+    predictions = [m.sensors[sensor] for m in models]
+    labels = [m.label for m in models]
+    colours = [MODEL_COLOURS[result.models.index(m) % len(MODEL_COLOURS)] for m in models]
+    measured = first.measured[:, i]
+    ahead = np.column_stack([measured, *(p.ahead[:, i] for p in predictions)])
+    free = np.column_stack([measured, *(p.open_loop[:, i] for p in predictions)])
+    error = (measured[:, None] - ahead[:, 1:]) / first.sigma
+    channel = first.channels[i]
+    for kind, values in (("ahead", ahead), ("open_loop", free)):
+        send_lines(stream, entity(kind, channel), first.times, values, ["measured", *labels], [GREY, *colours], 1.3)
+    send_lines(stream, entity("error", channel), first.times, error, labels, colours)
+
+
+def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
+    import rerun.blueprint as rrb
+
+    sensors = result.models[0].sensors if result.models else {}
+    tabs = [rrb.TextDocumentView(origin="/scores", name="scores")]
+    for kind, title in KINDS.items():
+        columns = [
+            rrb.Vertical(
+                *(
+                    rrb.TimeSeriesView(origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{p.unit}]"))
+                    for c in p.channels
+                )
+            )
+            for p in sensors.values()
+        ]
+        tabs.append(rrb.Horizontal(*columns, name=title))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _send_scores(stream: rr.RecordingStream, result: ComparisonResult) -> None:
+    import rerun as rr
+
+    document = rr.TextDocument(viewer_text(scores_text(result)), media_type=rr.MediaType.MARKDOWN)
+    stream.log("scores", document, static=True)
+
+
+def scores_text(result: ComparisonResult) -> str:
+    """Error and floor of every model and the worst windows as markdown."""
+    lines = ["# Error 0.1 s ahead, in sigmas of the sensor", "", "| model | error | floor |", "| --- | ---: | ---: |"]
+    lines += [f"| {m.label} | **{significant(m.error)}** | {significant(m.floor)} |" for m in result.models]
+    for model in result.models:
+        lines += ["", f"## Worst windows of {model.label}", ""]
+        lines += [
+            f"- {w.channel}, {w.t0:.2f} to {w.t1:.2f} s: {percent(w.share)} of the squared error" for w in model.worst[:6]
+        ]
+    return "\n".join(lines)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An .rrd file that is written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jointscope.robots.errors import JointscopeError
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+APPLICATION = "jointscope"
+ROOM_FACTOR = 1.25  # the viewer's format needs a little more than the numbers themselves
+
+
+@contextmanager
+def whole_file(path: str | Path, blueprint: rrb.Blueprint, expected_bytes: int = 0) -> Iterator[rr.RecordingStream]:
+    """A stream to log to; the file appears at its place when the block ends without an error.
+
+    Args:
+        path: file to write; an existing one is replaced.
+        blueprint: layout that the viewer opens with.
+        expected_bytes: how much will be written, to find out early that the disk is too small [byte].
+
+    Yields:
+        The stream.
+
+    Raises:
+        JointscopeError: the file cannot be written; nothing is left behind.
+    """
+    import rerun as rr
+
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        _check_room(target, expected_bytes)
+        # the viewer's writer works in the background and only logs its errors: open the file ourselves first
+        temporary.touch()
+        stream = rr.RecordingStream(APPLICATION)
+        stream.set_log_time_enabled(False)
+        stream.save(temporary, default_blueprint=blueprint)
+        try:
+            yield stream
+            stream.flush()
+        finally:
+            stream.disconnect()
+        _check_complete(temporary)
+        os.replace(temporary, target)
+    except OSError as err:
+        raise JointscopeError(f"cannot write {target}: {err.strerror or err}") from err
+    finally:
+        if temporary.exists():
+            temporary.unlink()
+
+
+def _check_room(target: Path, expected_bytes: int) -> None:
+    """Asks the disk before the work, as the background writer cannot tell afterwards."""
+    disk = os.statvfs(target.parent)
+    free = disk.f_bavail * disk.f_frsize
+    if free < ROOM_FACTOR * expected_bytes:
+        raise JointscopeError(
+            f"cannot write {target}: about {expected_bytes / 1e6:.0f} MB are needed, {free / 1e6:.0f} MB are free"
+        )
+
+
+def _check_complete(file: Path) -> None:
+    """The format ends with a footer that is written last; a file without it was cut off."""
+    from rerun.chunk import RrdReader
+
+    try:
+        RrdReader(str(file)).store().schema()
+    except Exception as err:
+        raise JointscopeError(f"cannot write {file.name}: the viewer's file is not complete") from err
