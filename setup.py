@@ -14,4 +14,4 @@ for room in ROOMS:
         *(f"jointscope.{room}.{name}" for name in find_packages(room) if name != "facade"),
     ]
 
-setup(packages=packages, package_dir=package_dir, package_data={"*": ["*.yaml", "*.urdf", "*.css", "*.js", "py.typed"]})
+setup(packages=packages, package_dir=package_dir, package_data={"": ["*.yaml", "*.urdf", "*.css", "*.js", "py.typed"]})

@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration_result import (
     BagFit,
@@ -97,7 +98,15 @@ def fake_parameters(robot):
             note = "not observable here; held by its prior" if held else ""
             found.append(
                 ParameterEstimate(
-                    f"{gyro.name}.R_imu_body.{axis}", 0.0 if held else 0.03 + 0.01 * k, sigma, "rad", 0.0, 0.0, 0.1, None, note
+                    f"{gyro.name}.R_imu_body.{axis}",
+                    0.0 if held else 0.03 + 0.01 * k,
+                    sigma,
+                    "rad",
+                    0.0,
+                    0.0,
+                    0.1,
+                    None,
+                    note,
                 )
             )
     for gyro in robot.gyros:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from jointscope.graphs.comparison_result import ComparisonResult
 from jointscope.tools.report.page import page
 from jointscope.tools.report.sections.horizon_curve import horizon_curve
@@ -33,4 +35,5 @@ def comparison_report(result: ComparisonResult) -> str:
         provenance([result.recording], [model.robot for model in result.models]),
     ]
     labels = " and ".join(model.label for model in result.models)
-    return page(f"{labels} against {result.recording.path}", "Measured against predicted", sections)
+    name = Path(result.recording.path).name or result.recording.path
+    return page(f"{labels} against {name}", result.recording.path, sections)

@@ -88,12 +88,18 @@ def _noise_as_stated(result: CalibrationResult) -> Check:
     if level == "good":
         low, high = min(f.chi2 for f in result.channels.values()), max(f.chi2 for f in result.channels.values())
         return Check(level, name, f"χ² per sample is {low:.2f} to {high:.2f} over all channels; 1 is expected.")
-    reason = "the model misses something there, or its noise is larger than stated" if chi2 > 1 else (
-        "its noise is smaller than stated, or the states follow the noise"
+    reason = (
+        "the model misses something there, or its noise is larger than stated"
+        if chi2 > 1
+        else ("its noise is smaller than stated, or the states follow the noise")
     )
     count = sum(d > CHI2[0] for d in distance.values())
-    return Check(level, name, f"{worst} has χ² per sample {significant(chi2)} (1 is expected): {reason}. "
-                              f"{count} of {len(distance)} channels are off.")
+    return Check(
+        level,
+        name,
+        f"{worst} has χ² per sample {significant(chi2)} (1 is expected): {reason}. "
+        f"{count} of {len(distance)} channels are off.",
+    )
 
 
 def _white(result: CalibrationResult) -> Check:
@@ -120,8 +126,10 @@ def _even(result: CalibrationResult) -> Check:
         if ratio[k, i] > worst:
             worst, where, when = float(ratio[k, i]), equation_names(result)[i], float(edges[k])
     level = _level(worst, UNEVEN)
-    text = f"At its worst ({where} equation, around {when:.1f} s) the dynamics are off {significant(worst, 2)} times " \
-           "their usual amount" + ("." if level == "good" else ": an effect may be missing that acts there.")
+    text = (
+        f"At its worst ({where} equation, around {when:.1f} s) the dynamics are off {significant(worst, 2)} times "
+        "their usual amount" + ("." if level == "good" else ": an effect may be missing that acts there.")
+    )
     return Check(level, "Dynamics hold throughout", text)
 
 
@@ -131,7 +139,7 @@ def _determined(result: CalibrationResult) -> Check:
     if weak:
         return Check("warn" if weak[0].sigma > WEAK else "info", name, weak[0].text)
     if result.weak_directions:
-        return Check("info", name, f"All dynamic parameters are. Weak: {result.weak_directions[0].text}")
+        return Check("info", name, f"All dynamic parameters are, but: {result.weak_directions[0].text}")
     return Check("good", name, "No combination of parameters is weakly determined.")
 
 
@@ -155,8 +163,12 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
     level = _level(factor, INFLATION)
     if factor <= 1.05:
         return Check(level, name, "Blocks of the recording scatter no more than white noise would.")
-    return Check(level, name, f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
-                              f"would ({worst}); the sigmas shown include it.")
+    return Check(
+        level,
+        name,
+        f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
+        f"would ({worst}); the sigmas shown include it.",
+    )
 
 
 def equation_names(result: CalibrationResult) -> list[str]:

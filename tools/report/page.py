@@ -97,6 +97,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
         rows: cells.
         numbers: columns that hold numbers and are set flush right.
     """
+
     def cell(tag: str, i: int, text: str) -> str:
         return f'<{tag} class="n">{text}</{tag}>' if i in numbers else f"<{tag}>{text}</{tag}>"
 
@@ -108,3 +109,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
 def foldable(title: str, body: str) -> str:
     """Details that are closed at first."""
     return f"<details><summary>{escape(title)}</summary>{body}</details>"
+
+
+def sentence(text: str) -> str:
+    """A finding as the end of a line reads well: capital first letter, full stop, a real plus-minus sign."""
+    text = text.strip().replace("+-", "±")
+    first = text.split(" ", 1)[0]
+    # names such as joint1.stiffness keep their spelling
+    start = text[:1].upper() if text[:1].isascii() and "." not in first and "_" not in first else text[:1]
+    return start + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")

@@ -71,6 +71,7 @@ class Axes:
         x_range, y_range: limits; None: from the data.
         log_x, log_y: logarithmic axes.
         levels: horizontal guide lines: value and text.
+        level_at_left: where the texts of the guide lines stand.
         shade: stretch of x to emphasise.
         zoomable: whether the page's script may zoom and read values.
     """
@@ -84,6 +85,7 @@ class Axes:
     log_x: bool = False
     log_y: bool = False
     levels: Sequence[tuple[float, str]] = field(default_factory=tuple)
+    level_at_left: bool = False
     shade: tuple[float, float] | None = None
     zoomable: bool = True
 
@@ -156,7 +158,7 @@ def _extent_y(mark: Mark, x_scale: Scale) -> tuple[float, float]:
 
 def _grid(axes: Axes, x: Scale, y: Scale, width: float, height: float) -> str:
     parts = []
-    for value, label in y.ticks(max(int(height / PIXELS_PER_TICK["y"]), 3)):
+    for value, label in y.ticks(max(int(height / PIXELS_PER_TICK["y"]), 4)):
         at = f"{float(y(value)):.1f}"
         parts.append(f'<path class="grid" d="M0 {at}H{width}"/><text class="y" x="-7" y="{at}">{label}</text>')
     ticks = []
@@ -169,7 +171,8 @@ def _grid(axes: Axes, x: Scale, y: Scale, width: float, height: float) -> str:
         at = float(y(value))
         parts.append(
             f'<path class="level" d="M0 {at:.1f}H{width}"/>'
-            f'<text class="level" x="{width - 4}" y="{at - 4:.1f}">{escape(label)}</text>'
+            f'<text class="level{" left" if axes.level_at_left else ""}" '
+            f'x="{4 if axes.level_at_left else width - 4}" y="{at - 4:.1f}">{escape(label)}</text>'
         )
     if axes.x_label:
         parts.append(f'<text class="xlabel" x="{width / 2:.0f}" y="{height + 30}">{escape(axes.x_label)}</text>')
@@ -223,6 +226,4 @@ def _bars(mark: Bars, x_scale: Scale, y_scale: Scale, height: float) -> str:
     x = np.rint(x_scale(mark.edges) * UNITS_PER_PIXEL).astype(int)
     y = np.rint(y_scale(mark.heights) * UNITS_PER_PIXEL).astype(int)
     bottom = round(height)
-    return "".join(
-        f"M{x[i] + 4} {bottom}V{y[i]}H{x[i + 1] - 4}V{bottom}z" for i in range(len(y)) if y[i] < bottom
-    )
+    return "".join(f"M{x[i] + 4} {bottom}V{y[i]}H{x[i + 1] - 4}V{bottom}z" for i in range(len(y)) if y[i] < bottom)

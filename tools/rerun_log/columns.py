@@ -59,7 +59,14 @@ def send_lines(
     """
     import rerun as rr
 
-    style = rr.SeriesLines(names=[viewer_text(name) for name in names], colors=list(colours), widths=[width] * len(names))
+    # the viewer would draw averages of many samples, which hide the peaks
+    policy = rr.components.AggregationPolicy.MinMax
+    style = rr.SeriesLines(
+        names=[viewer_text(name) for name in names],
+        colors=list(colours),
+        aggregation_policy=policy,
+        widths=[width] * len(names),
+    )
     stream.log(path, style, static=True)
     if len(times):
         matrix = np.ascontiguousarray(values, dtype=float)
@@ -72,15 +79,14 @@ def send_band(
     times: Array,
     middle: Array,
     half_width: Array,
-    names: Sequence[str],
     colours: Sequence[Colour],
 ) -> None:
     """Two thin dim lines per series at middle +- half_width, shapes (m, c); fewer samples, as bands are smooth."""
     keep = thinned(len(times))
-    dim = [tuple(c // 2 + 30 for c in colour) for colour in colours]
+    dim = [tuple(c // 2 + 40 for c in colour) for colour in colours]
     edges = ((middle - half_width)[keep], (middle + half_width)[keep])
     both = np.hstack(edges)
-    labels = [f"{name} {sign}3 sigma" for sign in ("−", "+") for name in names]
+    labels = [f"{sign}3 sigma" for sign in ("−", "+") for _ in colours]
     send_lines(stream, path, times[keep], both, labels, [*dim, *dim], 0.7)  # type: ignore[list-item]
 
 

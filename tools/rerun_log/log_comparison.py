@@ -11,8 +11,8 @@ import numpy as np
 from jointscope.graphs.comparison_result import ComparisonResult
 from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_lines
-from jointscope.tools.rerun_log.whole_file import whole_file
 from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
+from jointscope.tools.rerun_log.whole_file import whole_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -41,20 +41,22 @@ def log_comparison(result: ComparisonResult, path: str | Path) -> None:
 
 
 def _send_channel(stream: rr.RecordingStream, result: ComparisonResult, sensor: str, i: int) -> None:
-    """Measured and all models in one entity per kind of prediction: they share their times, which halves the file."""
+    """Measured, and all models in one entity: they share their times, which halves the file."""
     first = result.models[0].sensors[sensor]
     models = [m for m in result.models if sensor in m.sensors and len(m.sensors[sensor].times) == len(first.times)]
     predictions = [m.sensors[sensor] for m in models]
     labels = [m.label for m in models]
     colours = [MODEL_COLOURS[result.models.index(m) % len(MODEL_COLOURS)] for m in models]
-    measured = first.measured[:, i]
-    ahead = np.column_stack([measured, *(p.ahead[:, i] for p in predictions)])
-    free = np.column_stack([measured, *(p.open_loop[:, i] for p in predictions)])
-    error = (measured[:, None] - ahead[:, 1:]) / first.sigma
-    channel = first.channels[i]
-    for kind, values in (("ahead", ahead), ("open_loop", free)):
-        send_lines(stream, entity(kind, channel), first.times, values, ["measured", *labels], [GREY, *colours], 1.3)
-    send_lines(stream, entity("error", channel), first.times, error, labels, colours)
+    measured, channel = first.measured[:, i : i + 1], first.channels[i]
+    ahead = np.column_stack([p.ahead[:, i] for p in predictions])
+    free = np.column_stack([p.open_loop[:, i] for p in predictions])
+    # predictions end at some of the samples only; rows without any are left out, or the lines would fall apart
+    some = np.isfinite(ahead).any(axis=1)
+    for kind, values, rows in (("ahead", ahead, some), ("open_loop", free, np.ones_like(some))):
+        send_lines(stream, entity(kind, channel, "measured"), first.times, measured, ["measured"], [GREY], 2.5)
+        send_lines(stream, entity(kind, channel, "predicted"), first.times[rows], values[rows], labels, colours, 1.2)
+    error = ((measured - ahead) / first.sigma)[some]
+    send_lines(stream, entity("error", channel), first.times[some], error, labels, colours)
 
 
 def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
@@ -66,7 +68,9 @@ def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
         columns = [
             rrb.Vertical(
                 *(
-                    rrb.TimeSeriesView(origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{p.unit}]"))
+                    rrb.TimeSeriesView(
+                        origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{p.unit}]")
+                    )
                     for c in p.channels
                 )
             )
@@ -96,6 +100,7 @@ def scores_text(result: ComparisonResult) -> str:
     for model in result.models:
         lines += ["", f"## Worst windows of {model.label}", ""]
         lines += [
-            f"- {w.channel}, {w.t0:.2f} to {w.t1:.2f} s: {percent(w.share)} of the squared error" for w in model.worst[:6]
+            f"- {w.channel}, {w.t0:.2f} to {w.t1:.2f} s: {percent(w.share)} of the squared error"
+            for w in model.worst[:6]
         ]
     return "\n".join(lines)

@@ -112,9 +112,9 @@ def _send_axes(stream: rr.RecordingStream, robot: Robot, root: str) -> None:
             colors=[(*JOINT_COLOURS[i % 6], 200)],
             fill_mode="solid",
         )
-        arrow = rr.Arrows3D(
-            origins=[-0.3 * axis], vectors=[0.6 * axis], colors=[JOINT_COLOURS[i % 6]], radii=0.008, labels=[viewer_text(joint)]
-        )
+        arrow = rr.Arrows3D(origins=[-0.3 * axis], vectors=[0.6 * axis], colors=[JOINT_COLOURS[i % 6]], radii=0.008)
+        label = rr.Points3D([0.36 * axis], radii=0.004, colors=[JOINT_COLOURS[i % 6]], labels=[viewer_text(joint)])
+        stream.log(entity(root, "robot", body, f"{joint}_name"), label, static=True)
         stream.log(entity(root, "robot", body, f"{joint}_drum"), drum, static=True)
         stream.log(entity(root, "robot", body, f"{joint}_axis"), arrow, static=True)
 
@@ -162,7 +162,7 @@ def _send_ellipsoid(stream: rr.RecordingStream, times: Array, p: Array, covarian
             centers=p,
             quaternions=Rotation.from_matrix(axes).as_quat(),
             colors=[(240, 110, 170, 160)] * m,
-            labels=[f"2 sigma, {magnified:g} times larger than it is" if magnified > 1 else "2 sigma"] * m,
+            labels=[f"2 sigma × {magnified:g}" if magnified > 1 else "2 sigma"] * m,
         ),
     )
     stream.log(path, rr.Ellipsoids3D.from_fields(fill_mode="solid", show_labels=True), static=True)

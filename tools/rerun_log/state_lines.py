@@ -39,7 +39,7 @@ def send_states(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str
             ("v_motor", v_motor, s_v_motor),
         ):
             send_lines(stream, f"{path}/{name}/value", t, value[:, None], [name], [colour])
-            send_band(stream, f"{path}/{name}/band", t, value[:, None], 3.0 * sigma[:, None], [name], [colour])
+            send_band(stream, f"{path}/{name}/band", t, value[:, None], 3.0 * sigma[:, None], [colour])
 
 
 def state_views(robot: Robot, root: str) -> rrb.Horizontal:
@@ -50,7 +50,9 @@ def state_views(robot: Robot, root: str) -> rrb.Horizontal:
         *(
             rrb.Vertical(
                 *(
-                    rrb.TimeSeriesView(origin="/" + entity(root, "states", joint, name), name=viewer_text(f"{joint} {name} [{unit}]"))
+                    rrb.TimeSeriesView(
+                        origin="/" + entity(root, "states", joint, name), name=viewer_text(f"{joint} {name} [{unit}]")
+                    )
                     for name, unit in PLOTS
                 )
             )

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult
 from jointscope.tools.report.page import Key, Section, figure
 from jointscope.tools.report.plot import Axes, Curve, plot
-from jointscope.tools.report.sensor_signals import COLOURS, points_per_curve
 from jointscope.tools.report.sections.per_bag import per_bag
+from jointscope.tools.report.sensor_signals import COLOURS, points_per_curve
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,9 @@ def commands(result: CalibrationResult) -> Section:
             panels.append(plot(Axes("measured motor position [rad]", x_range=_limits(bag), height=200), below))
         return figure(panels, [Key(j, COLOURS[i % 6]) for i, j in enumerate(joints)], group=group)
 
-    lead = "What the robot was asked to do. Slow motion shows friction, fast motion the motor, chirps springs and dampers."
+    lead = (
+        "What the robot was asked to do. Slow motion shows friction, fast motion the motor, chirps springs and dampers."
+    )
     return Section("commands", "Commands", per_bag(result, draw), lead)
 
 

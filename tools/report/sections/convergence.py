@@ -39,6 +39,7 @@ def convergence(result: CalibrationResult) -> Section:
                 x_range=limits,
                 log_y=True,
                 levels=[(ENOUGH, "a tenth of a sigma")],
+                level_at_left=True,
             ),
             step,
         ),

@@ -56,7 +56,7 @@ def _cell(result: CalibrationResult, i: int, j: int, size: int, top: int) -> str
     tip = f"{result.names[i]} and {result.names[j]}: {minus(f'{r:+.3f}')}"
     printed = abs(r) >= PRINTED and size >= 20
     label = (
-        f'<text class="mid" x="{x + size / 2 - 0.5:.1f}" y="{y + size / 2:.1f}">{minus(f"{r:+.1f}").replace("0.", ".")}</text>'
+        f'<text class="mid" x="{x + size / 2 - 0.5:.1f}" y="{y + size / 2:.1f}">{minus(f"{r:.1f}").replace("0.", ".")}</text>'
         if printed
         else ""
     )

@@ -49,9 +49,7 @@ def _panels(rows: list[SignalRow], limits: tuple[float, float], height: int, poi
     panels = []
     for k, row in enumerate(rows):
         last = k == len(rows) - 1
-        axes = Axes(
-            f"{row.title} [{row.unit}]", "time [s]" if last else "", height=height + 28 * last, x_range=limits
-        )
+        axes = Axes(f"{row.title} [{row.unit}]", "time [s]" if last else "", height=height + 28 * last, x_range=limits)
         panels.append(plot(axes, [*_measured(row, points), *_predicted(row, points)]))
     return panels
 

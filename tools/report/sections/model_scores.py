@@ -3,20 +3,24 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 from jointscope.graphs.comparison_result import ComparisonResult, ModelComparison
 from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.report.page import Section
+from jointscope.tools.report.scale import log_ticks
 from jointscope.tools.report.sections.model_colours import model_colour
 
 ADEQUATE, DOUBTFUL = 1.1, 2.0  # error over floor
+BLIND = 3.0  # [sensor sigma] a floor above this comes from the model's own noise, not from the sensors
 BAR = 560  # [px]
+LEAST = 0.5  # [sensor sigma] left end of the logarithmic bars
 
 
 def model_scores(result: ComparisonResult) -> Section:
     """A box with the answer, then one bar per model."""
-    best = min(result.models, key=lambda m: m.error / m.floor, default=None)
+    best = min(result.models, key=lambda m: m.error, default=None)
     if best is None:
         return Section("scores", "How good are the predictions?", "<p>There is no model to compare.</p>")
     level = _level(best)
@@ -32,11 +36,15 @@ def model_scores(result: ComparisonResult) -> Section:
 
 def _level(model: ModelComparison) -> str:
     ratio = model.error / model.floor
+    if ratio <= ADEQUATE and model.floor > BLIND:
+        return "warn"
     return "good" if ratio <= ADEQUATE else "warn" if ratio <= DOUBTFUL else "bad"
 
 
 def _answer(best: ModelComparison, count: int) -> str:
     which = "The model" if count == 1 else best.label
+    if best.floor > BLIND and best.error / best.floor <= ADEQUATE:
+        return f"{which} is as uncertain as it is wrong."
     return {
         "good": f"{which} predicts as well as the sensors allow.",
         "warn": f"{which} predicts well, but misses something.",
@@ -64,18 +72,26 @@ def _big(model: ModelComparison, index: int) -> str:
 
 
 def _bars(result: ComparisonResult) -> str:
-    """Error as a bar, the floor as a mark on it, all models on one scale."""
-    largest = max(max(m.error, m.floor) for m in result.models) or 1.0
+    """Error as a logarithmic bar, the floor as a mark on it, all models on one scale."""
+    largest = 1.15 * max(max(m.error, m.floor, 2.0) for m in result.models)
+
+    def at(value: float) -> float:
+        return BAR * max(math.log(max(value, LEAST) / LEAST), 0.01) / math.log(largest / LEAST)
+
     rows = []
     for i, model in enumerate(result.models):
-        y, length, floor = 26 * i + 4, BAR * model.error / largest, BAR * model.floor / largest
+        y = 26 * i + 6
         rows.append(
-            f'<g class="{model_colour(i)}"><rect class="fill" x="0" y="{y}" width="{length:.1f}" height="14"/>'
-            f'<path class="mark ink" stroke-width="2" d="M{floor:.1f} {y - 4}v22"/></g>'
+            f'<g class="{model_colour(i)}"><rect class="fill" x="0" y="{y}" width="{at(model.error):.1f}" height="14"/>'
+            f'<path class="mark ink" stroke-width="2" d="M{at(model.floor):.1f} {y - 4}v22"/></g>'
         )
-    height = 26 * len(result.models) + 20
-    label = f'<text x="{min(BAR * result.models[-1].floor / largest, BAR - 30):.1f}" y="{height - 4}">floor</text>'
+    height = 26 * len(result.models) + 4
+    ticks = "".join(
+        f'<path class="grid" d="M{at(v):.1f} 0V{height}"/><text class="x" x="{at(v):.1f}" y="{height + 14}">{label}</text>'
+        for v, label in log_ticks(LEAST, largest)
+    )
     return (
-        f'<svg viewBox="0 0 {BAR + 4} {height}" width="100%" style="max-width:{BAR}px;display:block;margin-top:14px" '
-        f'role="img" aria-label="error and floor per model">{"".join(rows)}{label}</svg>'
+        f'<svg viewBox="0 0 {BAR + 20} {height + 20}" width="100%" style="max-width:{BAR + 20}px;display:block;'
+        f'margin-top:14px" role="img" aria-label="error and floor per model, in sigmas">{ticks}{"".join(rows)}</svg>'
+        '<p class="quiet" style="margin:2px 0 0">bar: error, black mark: floor, in sigmas of the sensor (logarithmic)</p>'
     )

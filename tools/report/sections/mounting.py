@@ -25,7 +25,9 @@ def mounting(result: CalibrationResult) -> Section:
     body += f'<p class="quiet">Biases are those of {escape(first)}.</p>' if first else ""
     matrices = "".join(_matrix(gyro) for gyro in result.robot.gyros)
     body += foldable("rotation matrices R_imu_body", f'<div class="figures">{matrices}</div>') if matrices else ""
-    lead = "Angles about the axes of the body that carries the sensor, measured from the mounting that the prior states."
+    lead = (
+        "Angles about the axes of the body that carries the sensor, measured from the mounting that the prior states."
+    )
     return Section("mounting", "Gyro mounting and biases", body, lead)
 
 

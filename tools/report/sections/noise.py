@@ -32,9 +32,7 @@ def noise(result: CalibrationResult) -> Section:
         t = 0.5 * (edges[1:] + edges[:-1])
         panels, n = [], result.robot.n
         for k, side in enumerate(("link", "motor")):
-            curves = [
-                Curve(joint, t, rms[:, k * n + i], COLOURS[i % 6]) for i, joint in enumerate(result.robot.joints)
-            ]
+            curves = [Curve(joint, t, rms[:, k * n + i], COLOURS[i % 6]) for i, joint in enumerate(result.robot.joints)]
             title = f"residual of the {side} equations, rms over 0.25 s [sigma]"
             limits = (float(bag.ticks[0]), float(bag.ticks[-1]))
             label = "time [s]" if k else ""

@@ -43,7 +43,7 @@ def _row(p: ParameterEstimate, published: bool, noted: bool) -> list[str]:
     share = p.sigma / abs(p.value) if p.value else math.inf
     row = [
         f"<code>{escape(p.name)}</code>",
-        escape(p.unit),
+        f'<span class="nowrap">{escape(p.unit)}</span>',
         significant(p.start, 4),
         f"<b>{value}</b>",
         sigma,
@@ -70,7 +70,7 @@ def _share_bar(share: float) -> str:
     length = BAR * min(max((math.log10(max(share, 1e-6)) + 4.0) / 4.0, 0.02), 1.0)
     tone = "good" if share < 0.02 else "warn" if share < 0.2 else "bad"
     return (
-        f'<svg width="{BAR + 58}" height="16" class="{tone} tone"><rect class="faint" x="0" y="4" width="{BAR}" height="8"/>'
+        f'<svg width="{BAR + 70}" height="16" class="{tone} tone"><rect class="faint" x="0" y="4" width="{BAR}" height="8"/>'
         f'<rect class="fill" x="0" y="4" width="{length:.1f}" height="8"/>'
         f'<text class="name" x="{BAR + 6}" y="8.5">{percent(share)}</text></svg>'
     )

@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jointscope.graphs.comparison_result import ComparisonResult, SensorPrediction
 from jointscope.tools.report.page import Key, Section, figure
 from jointscope.tools.report.plot import Axes, Curve, Mark, plot
 from jointscope.tools.report.sections.model_colours import model_colour, model_keys
-
-Array = NDArray[np.float64]
+from jointscope.tools.report.sparse_series import joined
 
 
 def predictions(result: ComparisonResult) -> Section:
@@ -38,8 +36,8 @@ def channel_marks(
     for k, model in enumerate(result.models):
         if sensor in model.sensors:
             prediction = model.sensors[sensor]
-            values: Array = getattr(prediction, kind)[:, i]
-            marks.append(Curve(model.label, prediction.times, values, model_colour(k), "dashed", points))
+            times, values = joined(prediction.times, getattr(prediction, kind)[:, i])
+            marks.append(Curve(model.label, times, values, model_colour(k), "dashed", points))
     return f"{first.channels[i]} [{first.unit}]", marks
 
 

@@ -27,7 +27,13 @@ def residuals(result: CalibrationResult) -> Section:
         tone = "good" if 0.8 <= fit.chi2 <= 1.25 else "warn" if 0.5 <= fit.chi2 <= 2.0 else "bad"
         chi2 = f'<span class="{tone}" style="color:var(--tone)">{significant(fit.chi2)}</span>'
         rows.append(
-            [f"<code>{escape(name)}</code>", significant(factor * fit.rmse), significant(factor * fit.sigma), unit, chi2]
+            [
+                f"<code>{escape(name)}</code>",
+                significant(factor * fit.rmse),
+                significant(factor * fit.sigma),
+                unit,
+                chi2,
+            ]
         )
     head = ["channel", "rms residual", "sensor sigma", "unit", "χ² per sample"]
     points = points_per_curve(result.bags)

@@ -45,7 +45,9 @@ def _with_bands(bag: BagFit, joints: tuple[str, ...], limits: Limits, points: in
     deflection = q_link - q_motor
     factor, unit = prefixed(float(np.max(np.abs(deflection), initial=0.0)), "rad")
     panels = [
-        _panel(f"deflection [{unit}]", bag, factor * deflection, factor * bag.sigmas[:, :n], joints, limits, points, ""),
+        _panel(
+            f"deflection [{unit}]", bag, factor * deflection, factor * bag.sigmas[:, :n], joints, limits, points, ""
+        ),
         _panel("link velocity [rad/s]", bag, v_link, bag.sigmas[:, n : 2 * n], joints, limits, points, "time [s]"),
     ]
     return panels
@@ -78,8 +80,7 @@ def _sigmas(bag: BagFit, joints: tuple[str, ...], limits: Limits) -> list[str]:
         sigma = bag.sigmas[:, k * n : (k + 1) * n]
         factor, prefix_unit = prefixed(float(np.median(sigma)), unit)
         curves = [
-            Curve(joint, bag.ticks, factor * sigma[:, i], COLOURS[i % 6], points=500)
-            for i, joint in enumerate(joints)
+            Curve(joint, bag.ticks, factor * sigma[:, i], COLOURS[i % 6], points=500) for i, joint in enumerate(joints)
         ]
         axes = Axes(
             f"sigma of {title} [{prefix_unit}]",

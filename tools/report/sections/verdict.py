@@ -10,7 +10,7 @@ import numpy as np
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.tools.report.judgement import Check, judge, largest_relative_sigma
 from jointscope.tools.report.numbers import percent, significant
-from jointscope.tools.report.page import Section, foldable
+from jointscope.tools.report.page import Section, foldable, sentence
 
 SIGNS = {"good": "✓", "info": "i", "warn": "!", "bad": "✕"}
 FINDINGS = 5  # more than these go below a fold
@@ -19,7 +19,7 @@ FINDINGS = 5  # more than these go below a fold
 def verdict(result: CalibrationResult) -> Section:
     """Verdict box: headline, big numbers, findings of the calibration, checks."""
     judgement = judge(result)
-    findings = [f"<li>{escape(text)}</li>" for text in result.findings]
+    findings = [f"<li>{escape(sentence(text))}</li>" for text in result.findings]
     told = f'<ul class="findings">{"".join(findings[:FINDINGS])}</ul>' if findings else ""
     if len(findings) > FINDINGS:
         rest = f'<ul class="findings">{"".join(findings[FINDINGS:])}</ul>'
@@ -35,7 +35,7 @@ def verdict(result: CalibrationResult) -> Section:
 def _check(check: Check) -> str:
     return (
         f'<li class="{check.level}"><i aria-label="{check.level}">{SIGNS[check.level]}</i>'
-        f"<b>{escape(check.name)}</b><span>{escape(check.text)}</span></li>"
+        f"<b>{escape(check.name)}</b><span>{escape(sentence(check.text))}</span></li>"
     )
 
 
@@ -50,6 +50,8 @@ def _big_numbers(result: CalibrationResult) -> str:
         (f"{result.samples:,}".replace(",", " "), f"samples in {significant(result.recording_seconds)} s of recording"),
         (f"{significant(result.wall_seconds)} <small>s</small>", f"to calibrate; {start}"),
     ]
-    return '<div class="figures">' + "".join(
-        f"<div><b>{number}</b><span>{escape(text)}</span></div>" for number, text in figures
-    ) + "</div>"
+    return (
+        '<div class="figures">'
+        + "".join(f"<div><b>{number}</b><span>{escape(text)}</span></div>" for number, text in figures)
+        + "</div>"
+    )

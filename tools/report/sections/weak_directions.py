@@ -7,7 +7,7 @@ from html import escape
 
 from jointscope.graphs.calibration_result import CalibrationResult, WeakDirection
 from jointscope.tools.report.numbers import minus
-from jointscope.tools.report.page import Section
+from jointscope.tools.report.page import Section, sentence
 
 LEFT, BAR = 190, 180  # [px] names, longest bar
 LARGEST = 6
@@ -37,6 +37,6 @@ def _direction(direction: WeakDirection) -> str:
         )
     height = 20 * len(largest)
     return (
-        f'<h3>{escape(direction.text)}</h3><div class="scroll"><svg width="{LEFT + BAR + 60}" height="{height}" '
+        f'<h3>{escape(sentence(direction.text))}</h3><div class="scroll"><svg width="{LEFT + BAR + 60}" height="{height}" '
         f'role="img" aria-label="weights of the direction">{"".join(rows)}</svg></div>'
     )

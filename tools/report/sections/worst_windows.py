@@ -11,6 +11,7 @@ from jointscope.tools.report.page import Key, Section, figure, table
 from jointscope.tools.report.plot import Axes, Curve, Mark, plot
 from jointscope.tools.report.sections.model_colours import model_colour, model_keys
 from jointscope.tools.report.sections.predictions import channel_marks
+from jointscope.tools.report.sparse_series import joined
 
 SHOWN = 4
 AROUND = 0.75  # [s] before and after
@@ -53,8 +54,10 @@ def _closer(result: ComparisonResult, window: WorstWindow) -> str:
 
 
 def _errors(result: ComparisonResult, sensor: str, i: int) -> list[Mark]:
-    predictions = [(k, m.label, m.sensors[sensor]) for k, m in enumerate(result.models) if sensor in m.sensors]
-    return [
-        Curve(label, p.times, (p.measured[:, i] - p.ahead[:, i]) / p.sigma, model_colour(k), "hair")
-        for k, label, p in predictions
-    ]
+    curves: list[Mark] = []
+    for k, model in enumerate(result.models):
+        if sensor in model.sensors:
+            p = model.sensors[sensor]
+            times, error = joined(p.times, (p.measured[:, i] - p.ahead[:, i]) / p.sigma)
+            curves.append(Curve(model.label, times, error, model_colour(k), "solid"))
+    return curves
