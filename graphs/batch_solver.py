@@ -28,7 +28,7 @@ Progress = Callable[[str, float], None]
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 LAMBDA_LARGEST = 1e8
-STEP_TOLERANCE = 0.02  # [sigma] a shared value whose last step was smaller has arrived
+STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 COST_TOLERANCE = 1e-7  # relative fall of the cost
 
 
@@ -114,7 +114,6 @@ def solve(
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
     shared = SharedLayout.of(start.calibrations[0], len(problems))
-    free = free_indices(shared, hold)
     systems = _build(problems, start)
     solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
     if not np.isfinite(solution.cost):
@@ -123,12 +122,12 @@ def solve(
     for i in range(max_iterations):
         if progress:
             progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
-        step = _try(problems, solution, free, damping)
+        step = _try(problems, solution, hold, damping)
         while not step.accepted:
             damping *= LAMBDA_FACTOR
             if damping > LAMBDA_LARGEST:
                 return _stuck(solution, step, step_tolerance)
-            step = _try(problems, solution, free, damping)
+            step = _try(problems, solution, hold, damping)
         fall = (solution.cost - step.cost) / max(solution.cost, 1e-300)
         solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
         solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
@@ -141,32 +140,62 @@ def solve(
 
 
 @dataclass(frozen=True)
-class _Step:
-    """A trial step: where it leads, and whether the cost falls."""
+class NewtonStep:
+    """A Gauss-Newton step.
+
+    Attributes:
+        estimate: where it leads.
+        in_sigmas: largest change of a shared value in sigmas.
+        dx: change of the states of each recording.
+        dp: change of the shared values, shape (s,).
+    """
 
     estimate: Estimate
+    in_sigmas: float
+    dx: list[Array]
+    dp: Array
+
+
+@dataclass(frozen=True)
+class _Trial(NewtonStep):
+    """A step whose end was linearised: normal equations, cost, and whether the cost falls."""
+
     systems: list[NormalEquations]
     cost: float
-    in_sigmas: float
     accepted: bool
 
 
-def _try(problems: Sequence[BagProblem], solution: Solution, free: NDArray[np.intp], damping: float) -> _Step:
-    """One damped Gauss-Newton step. The trial point is linearised at once: nearly every step is accepted."""
+def newton_step(
+    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
+) -> NewtonStep:
+    """One step from the solution's normal equations, not checked against the cost.
+
+    Args:
+        problems: factors of each recording.
+        solution: estimate with its normal equations; receives the Hessian.
+        hold: blocks that stay.
+        damping: Levenberg-Marquardt lambda, relative to the diagonal.
+    """
     shared = solution.shared
+    free = free_indices(shared, hold)
     eliminations = [eliminate(system, damping) for system in solution.systems]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
     dp, in_sigmas = _solve_shared(H, g, free, damping)
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     solution.hessian = H
-    trial = solution.estimate.moved(dx, dp, shared)
-    systems = _build(problems, trial)
-    trial_cost = _cost(problems[0], systems, trial)
-    accepted = bool(np.isfinite(trial_cost) and trial_cost <= solution.cost * (1.0 + 1e-12))
-    return _Step(trial, systems, trial_cost, in_sigmas, accepted)
+    return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
 
-def _stuck(solution: Solution, step: _Step, step_tolerance: float) -> Solution:
+def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str], damping: float) -> _Trial:
+    """One damped step. The trial point is linearised at once: nearly every step is accepted."""
+    step = newton_step(problems, solution, hold, damping)
+    systems = _build(problems, step.estimate)
+    cost_there = _cost(problems[0], systems, step.estimate)
+    accepted = bool(np.isfinite(cost_there) and cost_there <= solution.cost * (1.0 + 1e-12))
+    return _Trial(step.estimate, step.in_sigmas, step.dx, step.dp, systems, cost_there, accepted)
+
+
+def _stuck(solution: Solution, step: _Trial, step_tolerance: float) -> Solution:
     """No damping lowers the cost: a minimum within rounding, or an error."""
     if step.in_sigmas >= max(step_tolerance, 0.1):
         raise SolveError(

@@ -20,8 +20,7 @@ from jointscope.graphs.batch_solver import Estimate, Progress, Solution, solve
 from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
-from jointscope.graphs.noise_estimation import densities, estimate_noise, noise_evidence, scaled
-from jointscope.graphs.posterior import posteriors
+from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.recording import Notice, Recording
@@ -75,8 +74,7 @@ def calibrate(
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = _History([])
     noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
-    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 0.9))
-    report("residuals and uncertainties", 0.9)
+    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -154,10 +152,11 @@ def _whole_stage(
         solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
         history.add("all samples", solution)
         _must_converge(solution, "the whole recording")
-        solved = Solved(now, solution, *posteriors(now, solution, hold))
+        progress("residuals and uncertainties", 0.9)
+        solved = Solved.of(now, solution, hold)
         if not noise.estimate:
             break
-        better = scaled(noise, noise_evidence(now, solution.estimate, solved.posteriors).factors)
+        better = scaled(noise, solved.evidence.factors)
         if np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
             break
         noise, estimate = better, solution.estimate

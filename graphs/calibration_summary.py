@@ -25,7 +25,9 @@ from jointscope.graphs.calibration_result import (
 )
 from jointscope.graphs.findings import findings
 from jointscope.graphs.identifiability import weak_directions
-from jointscope.graphs.posterior import ResidualPart, StatePosterior, residual_parts
+from jointscope.graphs.noise_estimation import NoiseEvidence
+from jointscope.graphs.normal_equations import linearize_all
+from jointscope.graphs.posterior import ResidualPart, StatePosterior, posteriors, residual_parts
 from jointscope.graphs.robust_sigma import BlockScores, inflation
 from jointscope.robots.recording import Notice
 from jointscope.robots.robot import Robot
@@ -37,30 +39,51 @@ HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called h
 NEAR_ZERO = 0.5  # relative sigma from which a small positive value is called compatible with zero
 
 
-@dataclass(frozen=True)
-class Solved:
-    """A converged problem.
+@dataclass
+class BagResiduals:
+    """Sums and series of one recording's residuals.
 
     Attributes:
-        problems: factors of each recording, with the final noise.
+        series: by sensor: residuals [unit], their expected deviation, and sums for chi2 of every chunk.
+        process: velocity defects [rad/s] and their expected deviation of every chunk.
+        scores: gradient of the shared values in blocks of time.
+    """
+
+    series: dict[str, list[tuple[Array, Array, Array]]]
+    process: list[tuple[Array, Array]]
+    scores: BlockScores
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A converged problem with its residuals and uncertainties.
+
+    Attributes:
+        problems: factors of each recording, with the noise used.
         solution: states and shared values.
         posteriors: uncertainty of each recording's states.
         covariance: of all shared values, shape (s, s).
+        residuals: of each recording.
+        evidence: what the residuals say about the process noise.
     """
 
     problems: list[BagProblem]
     solution: Solution
     posteriors: list[StatePosterior]
     covariance: Array
+    residuals: list[BagResiduals]
+    evidence: NoiseEvidence
 
-
-@dataclass
-class _Collector:
-    """Sums and series of one recording's residuals."""
-
-    series: dict[str, list[tuple[Array, Array, Array]]]
-    process: list[tuple[Array, Array]]
-    scores: BlockScores
+    @staticmethod
+    def of(problems: list[BagProblem], solution: Solution, hold: Sequence[str]) -> Solved:
+        """Uncertainties and one pass over all residuals."""
+        found, covariance = posteriors(problems, solution, hold)
+        evidence = NoiseEvidence.empty(problems[0].robot.n)
+        residuals = [
+            _collect(problem, solution, i, posterior, evidence)
+            for i, (problem, posterior) in enumerate(zip(problems, found, strict=True))
+        ]
+        return Solved(problems, solution, found, covariance, residuals, evidence)
 
 
 def summarize(
@@ -76,7 +99,7 @@ def summarize(
         hold: blocks that were held.
     """
     solution, shared = solved.solution, solved.solution.shared
-    collected = [_collect(solved, i) for i in range(len(solved.problems))]
+    collected = solved.residuals
     factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
     covariance = solved.covariance * np.outer(factor, factor)
     bags = tuple(_bag_fit(solved, i, c) for i, c in enumerate(collected))
@@ -107,24 +130,26 @@ def summarize(
     return replace(result, findings=findings(result, notices))
 
 
-def _collect(solved: Solved, i: int) -> _Collector:
+def _collect(
+    problem: BagProblem, solution: Solution, i: int, posterior: StatePosterior, evidence: NoiseEvidence
+) -> BagResiduals:
     """One pass over all residuals of a recording."""
-    problem, solution = solved.problems[i], solved.solution
     ticks = problem.timeline.ticks
     scores = BlockScores(float(ticks[0]), float(ticks[-1]), solution.shared.indices(i), solution.shared.size)
-    collector = _Collector({name: [] for name in problem.robot.sensors}, [], scores)
+    collected = BagResiduals({name: [] for name in problem.robot.sensors}, [], scores)
     x, calibration = solution.estimate.states[i], solution.estimate.calibrations[i]
-    for part in residual_parts(problem, x, calibration, solved.posteriors[i]):
+    for part in residual_parts(linearize_all(problem, x, calibration), calibration, posterior):
+        evidence.add(part)
         if part.factor.states:
             scores.add(ticks[part.ticks], part.score)
         sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
         expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
         if isinstance(part.factor, DynamicsFactor):
             half = part.residual.shape[1] // 2
-            collector.process.append(((part.residual * sigmas)[:, :half], expected[:, :half]))
-        elif part.factor.name in collector.series:
-            collector.series[part.factor.name].append((part.residual * sigmas, expected, _one(part)))
-    return collector
+            collected.process.append(((part.residual * sigmas)[:, :half], expected[:, :half]))
+        elif part.factor.name in collected.series:
+            collected.series[part.factor.name].append((part.residual * sigmas, expected, _one(part)))
+    return collected
 
 
 def _one(part: ResidualPart) -> Array:
@@ -132,7 +157,7 @@ def _one(part: ResidualPart) -> Array:
     return np.array([np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)])
 
 
-def _bag_fit(solved: Solved, i: int, collector: _Collector) -> BagFit:
+def _bag_fit(solved: Solved, i: int, collector: BagResiduals) -> BagFit:
     problem, solution = solved.problems[i], solved.solution
     residuals = {}
     for name, sensor in problem.robot.sensors.items():

@@ -18,16 +18,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.factors.factor import Linearization
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, solve
-from jointscope.graphs.posterior import ResidualPart, StatePosterior, posteriors, residual_parts
+from jointscope.graphs.batch_solver import Estimate, Progress, Solution, newton_step, solve
+from jointscope.graphs.normal_equations import accumulate, linearize_all
+from jointscope.graphs.posterior import ResidualPart, posteriors, residual_parts
+from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.robots.robot import ProcessNoise
 
 Array = NDArray[np.float64]
 
 SMALLEST_DENSITY = 1e-3  # [rad/s/sqrt(s)] below this, rounding in the Hessian and the integration error take over
 CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
+FAR = 5.0  # [sigma] a Gauss-Newton step beyond this is checked and damped
 LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at the most
 
 
@@ -101,9 +106,7 @@ def estimate_noise(
     for cycle in range(cycles):
         if progress:
             progress("process noise", cycle / cycles)
-        solution = solve(problems, estimate, max_iterations=1, hold=hold)
-        estimate = solution.estimate
-        evidence = noise_evidence(problems, estimate, posteriors(problems, solution, hold)[0])
+        evidence, estimate = _cycle([p.with_noise(noise) for p in problems], estimate, hold)
         log_now, log_change = np.log(densities(noise)), np.log(evidence.factors)
         boost = np.ones_like(log_change) if before is None else _aitken(before, (log_now, log_change))
         step = np.clip(log_change * boost, -LARGEST_UPDATE, LARGEST_UPDATE)
@@ -111,22 +114,42 @@ def estimate_noise(
         new = scaled(noise, np.exp(step))
         settled = np.abs(np.log(densities(new) / densities(noise))) < CHANGE_TOLERANCE
         noise = new
-        problems = [problem.with_noise(noise) for problem in problems]
         if np.all(settled):
             break
     return noise, estimate
 
 
-def noise_evidence(
-    problems: Sequence[BagProblem], estimate: Estimate, found: Sequence[StatePosterior]
-) -> NoiseEvidence:
-    """Dynamics residuals of all recordings at an estimate, with the uncertainty of its states."""
+def _cycle(
+    problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str], damped: bool = False
+) -> tuple[NoiseEvidence, Estimate]:
+    """Evidence and estimate one Gauss-Newton step further, from one linearization."""
+    bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
+    linearized = [list(linearize_all(*bag)) for bag in bags]
+    systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
+    shared = SharedLayout.of(estimate.calibrations[0], len(problems))
+    here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, systems)
+    step = newton_step(problems, here, hold)
+    if step.in_sigmas > FAR and not damped:
+        # too far for a step that nobody checks: two checked ones first
+        return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
+    found, _ = posteriors(problems, here, hold)
     evidence = NoiseEvidence.empty(problems[0].robot.n)
-    bags = zip(problems, estimate.states, estimate.calibrations, found, strict=True)
-    for problem, x, calibration, posterior in bags:
-        for part in residual_parts(problem, x, calibration, posterior, dynamics_only=True):
+    for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
+        dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]
+        dx = step.dx[i]
+        local = shared.step(step.dp, i)[DYNAMICS]
+        moved = [(factor, ticks, _after(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
+        for part in residual_parts(moved, estimate.calibrations[i], posterior):
             evidence.add(part)
-    return evidence
+    return evidence, step.estimate
+
+
+def _after(linear: Linearization, ticks: NDArray[np.intp], dx: Array, dp: Array) -> Linearization:
+    """A linearization with the residual that it predicts after a step."""
+    residual = linear.residual + linear.by_block[DYNAMICS] @ dp
+    for i, J in enumerate(linear.by_state):
+        residual = residual + np.einsum("kri,ki->kr", J, dx[ticks + i])
+    return replace(linear, residual=residual)
 
 
 def _aitken(before: tuple[Array, Array], now: tuple[Array, Array]) -> Array:

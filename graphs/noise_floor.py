@@ -18,7 +18,7 @@ from jointscope.graphs.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.banded_solver import eliminate
 from jointscope.graphs.causal_filter import filter_around
 from jointscope.graphs.noise_estimation import scaled
-from jointscope.graphs.normal_equations import build
+from jointscope.graphs.normal_equations import build, linearize_all
 from jointscope.graphs.posterior import StatePosterior, residual_parts
 from jointscope.robots.sensors import Gyro
 
@@ -60,7 +60,8 @@ def _quiet_factors(problem: BagProblem, x: Array, calibration: Calibration) -> A
     p = elimination.W.shape[1]
     posterior = StatePosterior.of(elimination, np.zeros((p, p)))
     squares, freedom, times = [], [], []
-    for part in residual_parts(problem, x, calibration, posterior, dynamics_only=True):
+    linearized = linearize_all(problem, x, calibration, dynamics_only=True)
+    for part in residual_parts(linearized, calibration, posterior):
         half = part.residual.shape[1] // 2
         squares.append(part.residual[:, :half] ** 2)
         freedom.append(1.0 - part.leverage[:, :half])

@@ -21,7 +21,10 @@ from jointscope.graphs.bag_problem import BagProblem, Placed
 
 Array = NDArray[np.float64]
 
-CHUNK = 4096  # samples linearised at once: large enough for numpy, small enough for the cache
+Linearized = tuple[Factor, NDArray[np.intp], Linearization]
+"""Some samples of a factor, the first tick of each, and their linearization."""
+
+CHUNK = 1024  # samples linearised at once: large enough for numpy, small enough for the cache
 
 
 @dataclass
@@ -84,17 +87,27 @@ def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool =
         calibration: shared values, with the biases of this recording.
         split: keep apart what reaches on to the next state, as a filter needs it.
     """
+    return accumulate(linearize_all(problem, x, calibration), x, calibration, split)
+
+
+def accumulate(
+    linearized: Iterable[Linearized],
+    x: Array,
+    calibration: Calibration,
+    split: bool = False,
+) -> NormalEquations:
+    """Sums linearised factors; arguments as in `build`."""
     columns = layout(calibration)
     p = max(c.stop for c in columns.values())
     system = NormalEquations.zeros(len(x), x.shape[1], p, split)
-    for factor, ticks, linear in linearize_all(problem, x, calibration):
+    for factor, ticks, linear in linearized:
         _accumulate(system, factor, ticks, linear, columns)
     return system
 
 
 def linearize_all(
     problem: BagProblem, x: Array, calibration: Calibration, dynamics_only: bool = False
-) -> Iterator[tuple[Factor, NDArray[np.intp], Linearization]]:
+) -> Iterator[Linearized]:
     """All factors chunk by chunk: factor, first tick of each sample, linearization."""
     m = len(problem.dynamics)
     for start in range(0, m, CHUNK):
@@ -144,12 +157,7 @@ def _accumulate(
 ) -> None:
     r, J, by_block = whitened(factor, linear)
     system.cost += 0.5 * float(np.sum(r**2))
-    shared = np.concatenate([np.arange(columns[b].start, columns[b].stop) for b in by_block]) if by_block else None
-    P = np.concatenate([by_block[b] for b in by_block], axis=2) if by_block else None
-    if P is not None and shared is not None:
-        flat = P.reshape(-1, P.shape[2])
-        system.C[np.ix_(shared, shared)] += flat.T @ flat
-        system.g_p[shared] += flat.T @ r.ravel()
+    _accumulate_shared(system, r, by_block, columns)
     for i, J_i in enumerate(J):
         transposed = J_i.transpose(0, 2, 1)
         square, gradient = transposed @ J_i, (transposed @ r[:, :, None])[:, :, 0]
@@ -158,12 +166,21 @@ def _accumulate(
         if len(J) == 2 and i == 0 and system.D_next is not None and system.g_next is not None:
             add_at(system.D_next, ticks, square)
             add_at(system.g_next, ticks, gradient)
-        if P is not None and shared is not None:
-            full = np.zeros((len(r), system.B.shape[1], system.B.shape[2]))
-            full[:, :, shared] = transposed @ P
-            add_at(system.B, ticks + i, full)
+        for block, P in by_block.items():
+            add_at(system.B[:, :, columns[block]], ticks + i, transposed @ P)
     if len(J) == 2:
         add_at(system.E, ticks, J[1].transpose(0, 2, 1) @ J[0])
+
+
+def _accumulate_shared(
+    system: NormalEquations, r: Array, by_block: dict[str, Array], columns: dict[str, slice]
+) -> None:
+    """Corner and gradient of the shared values."""
+    flat = {block: P.reshape(-1, P.shape[2]) for block, P in by_block.items()}
+    for a, P_a in flat.items():
+        system.g_p[columns[a]] += P_a.T @ r.ravel()
+        for b, P_b in flat.items():
+            system.C[columns[a], columns[b]] += P_a.T @ P_b
 
 
 def add_at(target: Array, index: NDArray[np.intp], values: Array) -> None:

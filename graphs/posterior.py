@@ -12,7 +12,7 @@ The shared values widen them: x moves by -X dp for a change dp, X = A^-1 B.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from jointscope.factors.factor import Factor
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
 from jointscope.graphs.batch_solver import Solution, free_indices, reduced_system
-from jointscope.graphs.normal_equations import layout, linearize_all, whitened
+from jointscope.graphs.normal_equations import Linearized, layout, whitened
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -125,16 +125,18 @@ class ResidualPart:
 
 
 def residual_parts(
-    problem: BagProblem,
-    x: Array,
-    calibration: Calibration,
-    posterior: StatePosterior,
-    dynamics_only: bool = False,
+    linearized: Iterable[Linearized], calibration: Calibration, posterior: StatePosterior
 ) -> Iterator[ResidualPart]:
-    """All residuals of a recording with leverage and score, chunk by chunk."""
+    """Residuals of linearised factors with leverage and score.
+
+    Args:
+        linearized: factors of one recording, linearised at the estimate.
+        calibration: gives the layout of the shared values.
+        posterior: uncertainty of the recording's states.
+    """
     columns = layout(calibration)
     p = posterior.shared.shape[0]
-    for factor, ticks, linear in linearize_all(problem, x, calibration, dynamics_only):
+    for factor, ticks, linear in linearized:
         r, J, by_block = whitened(factor, linear)
         by_shared = np.zeros((*r.shape, p))
         for block, J_block in by_block.items():

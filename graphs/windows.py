@@ -14,8 +14,8 @@ import numpy as np
 from jointscope.graphs.bag_problem import first_command_time
 from jointscope.robots.recording import Recording
 
-WINDOW = 1.0  # [s]
-TOTAL = 9.0  # [s] all windows together
+WINDOW = 0.8  # [s]
+TOTAL = 6.4  # [s] all windows together
 
 
 def windows_of(recordings: Sequence[Recording]) -> list[tuple[int, Recording]]:

@@ -23,6 +23,20 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class RigidDerivatives:
+    """Derivatives of the rigid bodies' accelerations by q, v and tau (M^-1), shape (m, n, n) each."""
+
+    by_position: Array
+    by_velocity: Array
+    by_torque: Array
+
+    def between(self) -> RigidDerivatives:
+        """Means of neighbouring samples, shape (m - 1, n, n): off by h^2/8 of their second time derivative."""
+        parts = (self.by_position, self.by_velocity, self.by_torque)
+        return RigidDerivatives(*(0.5 * (part[1:] + part[:-1]) for part in parts))
+
+
+@dataclass(frozen=True)
 class Accelerations:
     """Accelerations of m samples and their derivatives.
 
@@ -30,11 +44,13 @@ class Accelerations:
         value: link accelerations, then motor accelerations, shape (m, 2n) [rad/s^2].
         by_state: derivative by x, shape (m, 2n, 4n).
         by_parameter: derivative by the free parameters, each in its own unit, shape (m, 2n, p).
+        rigid: the part of the derivatives that comes from the rigid bodies.
     """
 
     value: Array
     by_state: Array
     by_parameter: Array
+    rigid: RigidDerivatives
 
 
 class ElasticJoints:
@@ -84,16 +100,20 @@ class ElasticJoints:
         a_motor = (tau_c + self._motor_torque(u, v_motor, law) - tau_friction) / law["inertia"]
         return np.hstack([a_link, a_motor])
 
-    def with_derivatives(self, x: Array, u: Array, parameters: Array) -> Accelerations:
-        """Link and motor accelerations with derivatives; arguments as in `accelerations`."""
-        return self.with_command(self.without_command(x, parameters), x, u, parameters)
+    def with_derivatives(
+        self, x: Array, u: Array, parameters: Array, rigid: RigidDerivatives | None = None
+    ) -> Accelerations:
+        """Link and motor accelerations with derivatives; arguments as in `accelerations` and `without_command`."""
+        return self.with_command(self.without_command(x, parameters, rigid), u, parameters)
 
-    def without_command(self, x: Array, parameters: Array) -> Accelerations:
+    def without_command(self, x: Array, parameters: Array, rigid: RigidDerivatives | None = None) -> Accelerations:
         """As `with_derivatives` at u = 0; the dear part, which consecutive steps share.
 
         Args:
             x: states, shape (m, 4n).
             parameters: values of the free parameters, shape (p,).
+            rigid: derivatives of the rigid bodies where they are known well enough; the accelerations themselves are
+                always exact.
         """
         n, m = self.n, len(x)
         q_link, v_link, q_motor, v_motor = np.split(x, 4, axis=1)
@@ -101,7 +121,12 @@ class ElasticJoints:
         K, D, b = law["stiffness"], law["damping"], law["inertia"]
         deflection, rate = q_link - q_motor, v_link - v_motor
         tau_c = K * deflection + D * rate
-        a_link, da_dq, da_dv, M_inverse = self._tree.acceleration_derivatives(q_link, v_link, -tau_c)
+        if rigid is None:
+            a_link, *derivatives = self._tree.acceleration_derivatives(q_link, v_link, -tau_c)
+            rigid = RigidDerivatives(*derivatives)
+        else:
+            a_link = self._tree.acceleration(q_link, v_link, -tau_c)
+        da_dq, da_dv, M_inverse = rigid.by_position, rigid.by_velocity, rigid.by_torque
         v_friction = v_link if self._friction_on_link else v_motor
         smooth_sign = np.tanh(self._sharpness * v_friction)
         zero_command = np.zeros((1, n))
@@ -133,14 +158,13 @@ class ElasticJoints:
             self._add(by_parameter, "inertia", i, n + i, -a_motor[:, i] / b[i])
             if not self._torque_command:
                 self._add(by_parameter, "k_mi", i, n + i, -v_motor[:, i] / b[i])
-        return Accelerations(np.hstack([a_link, a_motor]), by_state, by_parameter)
+        return Accelerations(np.hstack([a_link, a_motor]), by_state, by_parameter, rigid)
 
-    def with_command(self, free: Accelerations, x: Array, u: Array, parameters: Array) -> Accelerations:
+    def with_command(self, free: Accelerations, u: Array, parameters: Array) -> Accelerations:
         """Adds the command to the result of `without_command`.
 
         Args:
             free: accelerations at u = 0; not changed.
-            x: states, shape (m, 4n).
             u: commands in their SI unit, shape (m, n).
             parameters: values of the free parameters, shape (p,).
         """
@@ -155,7 +179,7 @@ class ElasticJoints:
             self._add(by_parameter, "inertia", i, n + i, -torque[:, i] / b[i] ** 2)
             if not self._torque_command:
                 self._add(by_parameter, "k_pwm", i, n + i, self._volts * u[:, i] / b[i])
-        return Accelerations(value, free.by_state, by_parameter)
+        return Accelerations(value, free.by_state, by_parameter, free.rigid)
 
     def _motor_torque(self, u: Array, v_motor: Array, law: dict[str, Array]) -> Array:
         if self._torque_command:

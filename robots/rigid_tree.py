@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.body_rates import BodyRates
 from jointscope.robots.errors import RobotError
 
 Array = NDArray[np.float64]
@@ -37,6 +38,7 @@ class RigidTree:
         self.model.gravity = pin.Motion(np.asarray(gravity, float), np.zeros(3))
         self.data = self.model.createData()
         self._pool = pin.ModelPool(self.model, 1)
+        self._rates = BodyRates(self.model)
         self.gravity = np.asarray(gravity, float)
         self._check_inertias()
 
@@ -120,16 +122,7 @@ class RigidTree:
         Returns:
             omega_body, shape (m, 3) [rad/s]; its derivatives by q and by v, each of shape (m, 3, n).
         """
-        m, n = q.shape
-        frame = self.frame_id(body)
-        omega, d_dq, d_dv = np.empty((m, 3)), np.empty((m, 3, n)), np.empty((m, 3, n))
-        model, data, local, zero = self.model, self.data, pin.ReferenceFrame.LOCAL, np.zeros(n)
-        for k in range(m):
-            pin.computeForwardKinematicsDerivatives(model, data, q[k], v[k], zero)
-            dq_k, dv_k = pin.getFrameVelocityDerivatives(model, data, frame, local)
-            d_dq[k], d_dv[k] = dq_k[3:], dv_k[3:]
-        np.einsum("kij,kj->ki", d_dv, v, out=omega)
-        return omega, d_dq, d_dv
+        return self._rates.rate(self.frame_id(body), q, v)
 
     def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:
         """Pose of a body in the base frame: R_base_body, shape (m, 3, 3), and p_base_body, shape (m, 3) [m]."""

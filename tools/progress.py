@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TextIO
 
 Progress = Callable[[str, float], None]
@@ -36,6 +37,11 @@ def progress_bar(stream: TextIO | None = None) -> Iterator[Progress]:
         yield bar.show
     finally:
         bar.erase()
+
+
+def reading(bag: Path, progress: Progress) -> Callable[[int, int], None]:
+    """What a bag reader calls with the number of messages read and expected."""
+    return lambda done, expected: progress(f"reading {bag.name}", done / max(expected, 1))
 
 
 class _Bar:

@@ -132,3 +132,24 @@ def test_gtsam_moves_a_rotation_from_the_right_as_the_calibration_does():
     delta.insert(gtsam.symbol("r", 1), step)
     moved = values.retract(delta).atRot3(gtsam.symbol("r", 1)).matrix()
     np.testing.assert_allclose(moved, calibration.retract({"imu2.rotation": step}).rotations["imu2"], atol=1e-12)
+
+
+def test_a_chain_linearizes_as_its_pairs_do():
+    """The chain shares rigid-body derivatives between steps; residuals are the same, Jacobians to parts per million."""
+    rng = np.random.default_rng(3)
+    t = np.arange(41)[:, None] * 1e-3
+    phase = rng.uniform(0, 6, 3)
+    q = 0.6 * np.sin(8.0 * t + phase)
+    v = 4.8 * np.cos(8.0 * t + phase)
+    x = np.hstack([q, v, q + 0.01 * np.sin(30.0 * t), v + 0.3 * np.cos(30.0 * t)])
+    steps = Steps(np.full(40, 1e-3), rng.uniform(-1, 1, (40, 3)), ROBOT.noise)
+    calibration = Calibration.of(ROBOT)
+    for kind in (EulerDynamics, MidpointDynamics, SimpsonDynamics):
+        factor = kind(ElasticJoints(ROBOT), steps, ROBOT.joints)
+        pairs, chain = factor.linearize((x[:-1], x[1:]), calibration), factor.linearize_chain(x, calibration)
+        np.testing.assert_allclose(chain.residual, pairs.residual, rtol=1e-12, atol=1e-14)
+        for a, b in zip(
+            (*chain.by_state, chain.by_block["dynamics"]), (*pairs.by_state, pairs.by_block["dynamics"]), strict=True
+        ):
+            size = np.abs(b).max(axis=(0, 2), keepdims=True)
+            assert np.max(np.abs(a - b) / size) < 1e-5

@@ -115,7 +115,8 @@ def plot(axes: Axes, marks: Sequence[Mark]) -> str:
         else ""
     )
     return (
-        f'<svg class="plot" viewBox="0 0 {axes.width} {axes.height}" role="img" aria-label="{escape(axes.title)}"{zoom}>'
+        f'<svg class="plot" viewBox="0 0 {axes.width} {axes.height}" role="img" '
+        f'aria-label="{escape(axes.title)}"{zoom}>'
         f'<text class="title" x="{left}" y="14">{escape(axes.title)}</text>'
         f'<g transform="translate({left} {top})">{grid}'
         f'<svg class="data" width="{inner_width}" height="{inner_height}" viewBox="0 0 {width} {height}" '
@@ -168,11 +169,11 @@ def _grid(axes: Axes, x: Scale, y: Scale, width: float, height: float) -> str:
         ticks.append(f'<path class="grid" d="M{at} 0V{height}"/>{text}')
     parts.append(f'<g class="xticks">{"".join(ticks)}</g>')
     for value, label in axes.levels:
-        at = float(y(value))
+        level = float(y(value))
         parts.append(
-            f'<path class="level" d="M0 {at:.1f}H{width}"/>'
+            f'<path class="level" d="M0 {level:.1f}H{width}"/>'
             f'<text class="level{" left" if axes.level_at_left else ""}" '
-            f'x="{4 if axes.level_at_left else width - 4}" y="{at - 4:.1f}">{escape(label)}</text>'
+            f'x="{4 if axes.level_at_left else width - 4}" y="{level - 4:.1f}">{escape(label)}</text>'
         )
     if axes.x_label:
         parts.append(f'<text class="xlabel" x="{width / 2:.0f}" y="{height + 30}">{escape(axes.x_label)}</text>')

@@ -47,13 +47,17 @@ class Scale:
 
 
 def nice_ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
-    """Ticks at 1, 2, 5 times a power of ten."""
+    """About `count` ticks at 1, 2, 5 times a power of ten; three at least, as two do not show a scale."""
     raw = (high - low) / max(count, 1)
     power = 10.0 ** math.floor(math.log10(raw))
-    step = next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= raw * 0.999)
+    steps = [m * power for m in (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)]
+    wanted = next(i for i, step in enumerate(steps) if step >= raw * 0.999)
+    step, first, last = steps[wanted], 0, 0
+    for step in reversed(steps[max(wanted - 2, 0) : wanted + 1]):
+        first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+        if last - first >= 2:
+            break
     decimals = max(0, -math.floor(math.log10(step) + 1e-9))
-    first = math.ceil(low / step - 1e-9)
-    last = math.floor(high / step + 1e-9)
     return [(k * step, minus(f"{k * step:.{decimals}f}")) for k in range(first, last + 1)]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What one recording offers to look at: measured and predicted signals row by row, and a stretch worth a closer look."""
+"""What one recording offers to look at: measured and predicted signals, and a stretch worth a closer look."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def signal_rows(result: CalibrationResult, bag: BagFit) -> list[SignalRow]:
 def central_difference(times: Array, values: Array, span: float = RATE_SPAN) -> tuple[Array, Array]:
     """Rate of change over `span` seconds around each sample; times, shape (k,), and rates, shape (k, c)."""
     period = float(np.median(np.diff(times))) if len(times) > 1 else span
-    reach = max(int(round(0.5 * span / period)), 1)
+    reach = max(round(0.5 * span / period), 1)
     if len(times) <= 2 * reach:
         return times[:0], values[:0]
     dt = times[2 * reach :] - times[: -2 * reach]

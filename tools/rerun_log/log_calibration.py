@@ -55,14 +55,14 @@ def _blueprint(result: CalibrationResult) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
     findings = rrb.TextDocumentView(origin="/findings", name="findings")
-    tabs = [findings]
+    tabs: list[rrb.View | rrb.Container] = [findings]
     for i, bag in enumerate(result.bags):
         root = _root(result, i)
-        own = [
+        own: list[rrb.View | rrb.Container] = [
             sensor_views(bag, root, "residuals"),
             state_views(result.robot, root),
             sensor_views(bag, root, "signals"),
-            robot_view(root),
+            robot_view(result.robot, root),
         ]
         tabs += own if not root else [rrb.Tabs(*own, name=viewer_text(bag_name(bag, i)))]
     tabs.insert(3 if len(result.bags) == 1 else 1, covariance_views())

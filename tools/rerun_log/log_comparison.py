@@ -63,7 +63,7 @@ def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
     sensors = result.models[0].sensors if result.models else {}
-    tabs = [rrb.TextDocumentView(origin="/scores", name="scores")]
+    tabs: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="/scores", name="scores")]
     for kind, title in KINDS.items():
         columns = [
             rrb.Vertical(

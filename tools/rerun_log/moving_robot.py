@@ -40,11 +40,15 @@ def send_robot(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str)
     _send_ellipsoid(stream, times, p_base_tip, position_covariance(robot.tree, tip, q, sigma_q), root)
 
 
-def robot_view(root: str) -> rrb.Spatial3DView:
-    """The 3D view."""
+def robot_view(robot: Robot, root: str) -> rrb.Spatial3DView:
+    """The 3D view, seen obliquely so that no joint axis points at the eye."""
     import rerun.blueprint as rrb
 
-    return rrb.Spatial3DView(origin="/" + entity(root, "robot"), name="robot in 3D")
+    rest = np.vstack([robot.tree.body_poses(body, np.zeros((1, robot.n)))[1] for body in robot.tree.bodies])
+    size = max(float(np.ptp(rest, axis=0).max()), 0.5)
+    middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0))
+    eye = rrb.EyeControls3D(position=middle + size * np.array([1.0, -0.66, 0.3]), look_target=middle)
+    return rrb.Spatial3DView(origin="/" + entity(root, "robot"), name="robot in 3D", eye_controls=eye)
 
 
 def position_covariance(tree: RigidTree, body: str, q: Array, sigma_q: Array) -> Array:

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from jointscope.tools.progress import progress_bar
+from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.whole_file import check_outputs
 
@@ -45,10 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     robot = load_robot(args.robot)
     with progress_bar() as progress:
-        recordings = []
-        for bag in args.bags:
-            label = f"reading {bag.name}"
-            recordings.append(read_recording(bag, robot, lambda done, of, t=label: progress(t, done / max(of, 1))))
+        recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
         result = calibrate(robot, recordings, progress=progress)
         if files.report is not None or files.rrd is not None:
             progress("writing", 1.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RobotError
-from jointscope.tools.progress import progress_bar
+from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_comparison
 from jointscope.tools.whole_file import check_outputs
 
@@ -53,9 +53,7 @@ def run(args: argparse.Namespace) -> int:
     check_same_streams(robots)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
-        recording = read_recording(
-            args.bag, first, lambda done, of: progress(f"reading {args.bag.name}", done / max(of, 1))
-        )
+        recording = read_recording(args.bag, first, reading(args.bag, progress))
         result = compare(robots, recording, progress=progress)
         write_comparison(result, files)
     print(comparison_text(result))

@@ -6,13 +6,12 @@ from __future__ import annotations
 import argparse
 import os
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError
-from jointscope.tools.progress import Progress, progress_bar
+from jointscope.tools.progress import Progress, progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, write_calibration, write_comparison
 from jointscope.tools.whole_file import check_outputs, write_json
 
@@ -146,16 +145,12 @@ class _Story:
         from jointscope.tools.bags import read_recording
 
         bag = f"{name}.mcap"
-        recording = read_recording(self.hidden / bag, self.robot, _reading(progress, bag))
+        recording = read_recording(self.hidden / bag, self.robot, reading(Path(bag), progress))
         return replace(recording, path=str(self.folder / bag))
 
     def _command(self, text: str, seed: int | None = None) -> None:
         """Prints what the user would type."""
         _say(f"   $ jointscope {text.format(self.folder)}{'' if seed is None else f' --seed {seed}'}\n")
-
-
-def _reading(progress: Progress, name: str) -> Callable[[int, int], None]:
-    return lambda done, of: progress(f"reading {name}", done / max(of, 1))
 
 
 def _against_truth(result: Any, truth: dict[str, Any]) -> str:

@@ -55,11 +55,8 @@ def _cell(result: CalibrationResult, i: int, j: int, size: int, top: int) -> str
         return f'<rect class="faint soft" x="{x}" y="{y}" width="{size - 1}" height="{size - 1}"/>'
     tip = f"{result.names[i]} and {result.names[j]}: {minus(f'{r:+.3f}')}"
     printed = abs(r) >= PRINTED and size >= 20
-    label = (
-        f'<text class="mid" x="{x + size / 2 - 0.5:.1f}" y="{y + size / 2:.1f}">{minus(f"{r:.1f}").replace("0.", ".")}</text>'
-        if printed
-        else ""
-    )
+    number = minus(f"{r:.1f}").replace("0.", ".")
+    label = f'<text class="mid" x="{x + size / 2 - 0.5:.1f}" y="{y + size / 2:.1f}">{number}</text>' if printed else ""
     strong = " strong" if abs(r) >= 0.65 else ""
     return (
         f'<g class="cell {"k0" if r < 0 else "k2"}{strong}" data-tip="{escape(tip, quote=True)}">'

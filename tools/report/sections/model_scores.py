@@ -28,8 +28,8 @@ def model_scores(result: ComparisonResult) -> Section:
     body = (
         f'<div class="verdict {level}"><p class="answer">{escape(_answer(best, len(result.models)))}</p>'
         f'<p class="why">{escape(_reason(best))}</p><div class="figures">{models}</div>{_bars(result)}</div>'
-        '<p class="quiet" style="margin-top:12px">Error: root mean square over all channels of the 0.1 s ahead error, in '
-        "sigmas of the sensor. Floor: what sensor noise and the uncertainty of the state alone would give.</p>"
+        '<p class="quiet" style="margin-top:12px">Error: root mean square over all channels of the 0.1 s ahead error, '
+        "in sigmas of the sensor. Floor: what sensor noise and the uncertainty of the state alone would give.</p>"
     )
     return Section("scores", "How good are the predictions?", body)
 
@@ -87,11 +87,12 @@ def _bars(result: ComparisonResult) -> str:
         )
     height = 26 * len(result.models) + 4
     ticks = "".join(
-        f'<path class="grid" d="M{at(v):.1f} 0V{height}"/><text class="x" x="{at(v):.1f}" y="{height + 14}">{label}</text>'
+        f'<path class="grid" d="M{at(v):.1f} 0V{height}"/>'
+        f'<text class="x" x="{at(v):.1f}" y="{height + 14}">{label}</text>'
         for v, label in log_ticks(LEAST, largest)
     )
     return (
         f'<svg viewBox="0 0 {BAR + 20} {height + 20}" width="100%" style="max-width:{BAR + 20}px;display:block;'
         f'margin-top:14px" role="img" aria-label="error and floor per model, in sigmas">{ticks}{"".join(rows)}</svg>'
-        '<p class="quiet" style="margin:2px 0 0">bar: error, black mark: floor, in sigmas of the sensor (logarithmic)</p>'
+        '<p class="quiet" style="margin:2px 0 0">bar: error, mark: floor, in sigmas of the sensor (logarithmic)</p>'
     )

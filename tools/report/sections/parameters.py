@@ -28,7 +28,8 @@ def parameters(result: CalibrationResult) -> Section:
     legend = (
         '<p class="quiet">Where it lies: <b>●</b> value with ±2 sigma, ○ start'
         + (", ◇ published" if published else "")
-        + ", shaded: prior ±1 sigma, each on its own scale. Bars of the relative sigma are logarithmic from 0.01 % to 100 %.</p>"
+        + ", shaded: prior ±1 sigma, each on its own scale. "
+        "Bars of the relative sigma are logarithmic from 0.01 % to 100 %.</p>"
     )
     lead = "What was calibrated. Sigmas are one standard deviation and include the uncertainty of everything else."
     return Section("parameters", "Parameters", table(head, cells, numbers) + legend, lead)
@@ -70,7 +71,8 @@ def _share_bar(share: float) -> str:
     length = BAR * min(max((math.log10(max(share, 1e-6)) + 4.0) / 4.0, 0.02), 1.0)
     tone = "good" if share < 0.02 else "warn" if share < 0.2 else "bad"
     return (
-        f'<svg width="{BAR + 70}" height="16" class="{tone} tone"><rect class="faint" x="0" y="4" width="{BAR}" height="8"/>'
+        f'<svg width="{BAR + 70}" height="16" class="{tone} tone">'
+        f'<rect class="faint" x="0" y="4" width="{BAR}" height="8"/>'
         f'<rect class="fill" x="0" y="4" width="{length:.1f}" height="8"/>'
         f'<text class="name" x="{BAR + 6}" y="8.5">{percent(share)}</text></svg>'
     )

@@ -21,8 +21,8 @@ def predictions(result: ComparisonResult) -> Section:
         body += f"<h3>{name}: 0.1 s ahead</h3>" + _sensor(result, name, "ahead", points)
         body += f"<h3>{name}: open loop from the first state</h3>" + _sensor(result, name, "open_loop", points)
     lead = (
-        "Broad and pale: measured. Dashed: predicted with the recorded commands alone, 0.1 s ahead from the state known "
-        "then, or open loop over the whole recording, where positions drift because nothing corrects them."
+        "Broad and pale: measured. Dashed: predicted with the recorded commands alone, 0.1 s ahead from the state "
+        "known then, or open loop over the whole recording, where positions drift because nothing corrects them."
     )
     return Section("predictions", "Measured and predicted", body, lead)
 

@@ -10,7 +10,7 @@ import numpy as np
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult, ResidualSeries
 from jointscope.tools.report.numbers import percent, prefixed, significant
 from jointscope.tools.report.page import Section, figure, table
-from jointscope.tools.report.plot import Axes, Band, Bars, Curve, plot
+from jointscope.tools.report.plot import Axes, Band, Bars, Curve, Mark, plot
 from jointscope.tools.report.sections.per_bag import per_bag
 from jointscope.tools.report.sensor_signals import COLOURS, points_per_curve
 from jointscope.tools.report.whiteness import autocorrelation
@@ -50,7 +50,7 @@ def residuals(result: CalibrationResult) -> Section:
         )
         return figure(rows, caption=caption, group=f"{group} residuals")
 
-    lead = "What the model leaves over. Good residuals fill their band evenly, look like the bell curve, and have no memory."
+    lead = "What the model leaves over. Good residuals fill their band, look like the bell curve, and have no memory."
     body = table(head, rows, [1, 2, 4]) + per_bag(result, draw)
     return Section("residuals", "Residuals", body, lead)
 
@@ -62,7 +62,7 @@ def _over_time(series: ResidualSeries, i: int, points: int) -> str:
     outside = float(np.mean(np.abs(whitened[np.isfinite(whitened)]) > 3.0)) if len(r) else 0.0
     title = f"{series.channels[i]} [{unit}], outside 3 sigma: {percent(outside)}"
     colour = COLOURS[i % 6]
-    marks = [
+    marks: list[Mark] = [
         Band("±3 sigma", series.times, -3.0 * factor * sigma, 3.0 * factor * sigma, "soft"),
         Curve(series.channels[i], series.times, factor * r, colour, "hair", min(points, 1000)),
         # dense residuals hide the band: its limits are drawn again on top
@@ -79,7 +79,8 @@ def _histogram(series: ResidualSeries, i: int) -> str:
     heights = density / max(len(whitened), 1) / (EDGES[1] - EDGES[0])
     normal = np.exp(-0.5 * GAUSS**2) / np.sqrt(2.0 * np.pi)
     axes = Axes("distribution", "residual [sigma]", 240, 150, zoomable=False)
-    return plot(axes, [Bars("", EDGES, heights, COLOURS[i % 6]), Curve("normal", GAUSS, normal, "ink", "solid")])
+    marks: list[Mark] = [Bars("", EDGES, heights, COLOURS[i % 6]), Curve("normal", GAUSS, normal, "ink", "solid")]
+    return plot(axes, marks)
 
 
 def _memory(series: ResidualSeries, i: int) -> str:

@@ -32,11 +32,13 @@ def _direction(direction: WeakDirection) -> str:
         y, length = 20 * i + 10, BAR * abs(weight) / scale
         rows.append(
             f'<text class="end" x="{LEFT - 10}" y="{y}">{escape(name)}</text>'
-            f'<rect class="fill {"k0" if weight < 0 else "k2"}" x="{LEFT}" y="{y - 6}" width="{length:.1f}" height="12"/>'
+            f'<rect class="fill {"k0" if weight < 0 else "k2"}" x="{LEFT}" y="{y - 6}" '
+            f'width="{length:.1f}" height="12"/>'
             f'<text class="name" x="{LEFT + length + 7:.1f}" y="{y}">{minus(f"{weight:+.2f}")}</text>'
         )
     height = 20 * len(largest)
     return (
-        f'<h3>{escape(sentence(direction.text))}</h3><div class="scroll"><svg width="{LEFT + BAR + 60}" height="{height}" '
+        f'<h3>{escape(sentence(direction.text))}</h3><div class="scroll">'
+        f'<svg width="{LEFT + BAR + 60}" height="{height}" '
         f'role="img" aria-label="weights of the direction">{"".join(rows)}</svg></div>'
     )
