@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 LOOSE = 0.3  # [rad/s/sqrt(s)] densities at which every calibration begins; the paper's are 0.35 and 0.26
 APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approached
-NOISE_AGREES = 0.2  # relative difference of windows and whole recording that asks for no second pass
+NOISE_AGREES = 0.25  # relative difference of windows and whole recording that asks for no second pass
 MOST_ITERATIONS = 40
 
 

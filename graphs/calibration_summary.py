@@ -141,7 +141,7 @@ def _collect(
     for part in residual_parts(linearize_all(problem, x, calibration), calibration, posterior):
         evidence.add(part)
         if part.factor.states:
-            scores.add(ticks[part.ticks], part.score)
+            scores.add(ticks[part.ticks], part)
         sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
         expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
         if isinstance(part.factor, DynamicsFactor):

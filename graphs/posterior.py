@@ -114,14 +114,14 @@ class ResidualPart:
         ticks: first state of each sample.
         residual: whitened, shape (m, r).
         leverage: share of each row's variance that the fit absorbs, in [0, 1], shape (m, r).
-        score: contribution to the gradient by the shared values, with states following along, shape (m, p).
+        by_shared: derivative of the whitened residual by the shared values, with states following along, shape (m, r, p).
     """
 
     factor: Factor
     ticks: NDArray[np.intp]
     residual: Array
     leverage: Array
-    score: Array
+    by_shared: Array
 
 
 def residual_parts(
@@ -148,4 +148,4 @@ def residual_parts(
         if len(J) == 2:
             leverage += 2.0 * np.einsum("kri,kri->kr", J[0] @ posterior.neighbours[ticks], J[1])
         leverage += np.einsum("krp,krp->kr", by_shared @ posterior.shared, by_shared)
-        yield ResidualPart(factor, ticks, r, leverage, np.einsum("kr,krp->kp", r, by_shared))
+        yield ResidualPart(factor, ticks, r, leverage, by_shared)

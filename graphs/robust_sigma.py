@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Standard deviations that survive coloured disturbances.
 
-The inverse Hessian is the covariance only where residuals are white. Disturbances that last (friction changing with
-temperature, a hand on the robot) make it too small. The sandwich  H^-1 (sum of s_b s_b') H^-1  over blocks of time
-needs no whiteness within a block; s_b is the score of block b. White and Domowitz (1984), Newey and West (1987).
+The inverse Hessian is the covariance only where residuals are white. Disturbances that last (a hand on the robot,
+friction that changes with temperature) make it too small. A jackknife over blocks of time needs no whiteness within a
+block: leaving out block b moves the estimate by
+
+    d_b = (H - H_b)^-1 s_b,      covariance = (B - 1) / B  sum of d_b d_b'
+
+with the block's score s_b and information H_b. Where a few blocks hold most of the information, H_b matters.
+Cameron and Miller (2015), "A practitioner's guide to cluster-robust inference", CR3.
 """
 
 from __future__ import annotations
@@ -11,14 +16,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.posterior import ResidualPart
+
 Array = NDArray[np.float64]
 
 BLOCK = 0.5  # [s] longer than the memory of the smoother and of most disturbances
-FEWEST_BLOCKS = 8  # below this the sandwich says nothing
+FEWEST_BLOCKS = 8  # below this the jackknife says nothing
 
 
 class BlockScores:
-    """Collects scores of one recording in blocks of time.
+    """Collects scores and information of one recording in blocks of time.
 
     Args:
         t0, t1: limits of the recording [s].
@@ -28,15 +35,29 @@ class BlockScores:
 
     def __init__(self, t0: float, t1: float, indices: NDArray[np.intp], size: int):
         self._t0 = t0
-        count = max(int(np.ceil((t1 - t0) / BLOCK)), 1)
-        self.scores = np.zeros((count, size))
         self._indices = indices
+        self.size = size
+        count = max(int(np.ceil((t1 - t0) / BLOCK)), 1)
+        self._scores = np.zeros((count, len(indices)))
+        self._information = np.zeros((count, len(indices), len(indices)))
 
-    def add(self, times: Array, score: Array) -> None:
-        """Adds the scores of samples, shape (m, p), at their times, shape (m,) [s]."""
-        block = np.clip(((times - self._t0) / BLOCK).astype(int), 0, len(self.scores) - 1)
-        for j, index in enumerate(self._indices):
-            self.scores[:, index] += np.bincount(block, weights=score[:, j], minlength=len(self.scores))
+    def add(self, times: Array, part: ResidualPart) -> None:
+        """Adds samples in the order of time; times have shape (m,) [s]."""
+        block = np.clip(((times - self._t0) / BLOCK).astype(int), 0, len(self._scores) - 1)
+        edges = np.flatnonzero(np.diff(block)) + 1
+        for members in np.split(np.arange(len(block)), edges):
+            J = part.by_shared[members].reshape(-1, len(self._indices))
+            b = block[members[0]]
+            self._scores[b] += J.T @ part.residual[members].ravel()
+            self._information[b] += J.T @ J
+
+    def jackknife(self, H: Array) -> Array:
+        """Change of all shared values when each block is left out, shape (blocks, s); H: Hessian, shape (s, s)."""
+        score = np.zeros((len(self._scores), self.size))
+        information = np.zeros((len(self._scores), self.size, self.size))
+        score[:, self._indices] = self._scores
+        information[:, self._indices[:, None], self._indices[None, :]] = self._information
+        return np.linalg.solve(H - information, score[:, :, None])[:, :, 0]
 
 
 def inflation(scores: list[BlockScores], covariance: Array) -> Array:
@@ -46,10 +67,10 @@ def inflation(scores: list[BlockScores], covariance: Array) -> Array:
         scores: of all recordings.
         covariance: inverse Hessian of the shared values, shape (s, s).
     """
-    stacked = np.vstack([s.scores for s in scores])
-    blocks = len(stacked)
+    H = np.linalg.inv(covariance)
+    changes = np.vstack([s.jackknife(H) for s in scores])
+    blocks = len(changes)
     if blocks < FEWEST_BLOCKS:
         return np.ones(len(covariance))
-    centred = (stacked - stacked.mean(axis=0)) @ covariance
-    robust = np.sum(centred**2, axis=0) * blocks / (blocks - 1.0)
-    return np.sqrt(np.maximum(robust / np.diag(covariance), 1.0))
+    variance = np.sum((changes - changes.mean(axis=0)) ** 2, axis=0) * (blocks - 1.0) / blocks
+    return np.sqrt(np.maximum(variance / np.diag(covariance), 1.0))
