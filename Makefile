@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint style types bench clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -19,9 +19,14 @@ demo: $(VENV)/sim $(VENV)/code
 test: $(VENV)/dev $(VENV)/code
 	$(BIN)/python -m pytest
 
-lint: $(VENV)/dev
+lint: style types
+
+style: $(VENV)/dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+# mypy sees the rooms as one package through links.
+types: $(VENV)/dev
 	rm -rf $(TYPES) && mkdir -p $(TYPES)/jointscope
 	ln -s $(addprefix $(CURDIR)/,robots factors graphs tools tools/facade/__init__.py tools/facade/py.typed) $(TYPES)/jointscope/
 	cd $(TYPES) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p jointscope

@@ -11,7 +11,8 @@ from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.robots.recording import Notice
 
 CHI2_LOW, CHI2_HIGH = 0.8, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
-COLOURED = 1.5  # block-robust over plain sigma from which residuals are called coloured
+COLOURED = 1.5  # block-robust over plain sigma from which a value counts as widened
+SEVERAL = 0.25  # share of widened values from which residuals are called coloured; a few widen by chance
 
 
 def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple[str, ...]:
@@ -72,7 +73,7 @@ def _process_noise(result: CalibrationResult) -> list[str]:
 
 def _coloured(result: CalibrationResult) -> list[str]:
     names = [name for name, factor in result.sigma_inflation.items() if factor > COLOURED]
-    if not names:
+    if len(names) < SEVERAL * len(result.sigma_inflation):
         return []
     largest = max(result.sigma_inflation.values())
     return [

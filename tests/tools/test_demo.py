@@ -32,7 +32,7 @@ def test_the_demo_tells_the_story_and_leaves_its_files(quick, capsys):
     assert main(["demo", "-o", "here", "--seconds", "5", "--json", "found.json"]) == 0
     text = capsys.readouterr().out
     for part in (
-        "$ jointscope simulate doggy -o here/calibration.mcap --motion calibration --seconds 5 --seed 1",
+        "$ jointscope simulate doggy -o here/calibration.mcap --motion calibration --seconds 5 --seed 1 --friction ",
         "$ jointscope calibrate doggy here/calibration.mcap -o here/doggy_calibrated.yaml",
         "$ jointscope compare doggy here/doggy_calibrated.yaml here/moves.mcap",
         "Of 12 parameters",

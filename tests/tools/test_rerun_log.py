@@ -14,6 +14,7 @@ from jointscope.robots.errors import JointscopeError, RecordingError
 from jointscope.tools.rerun_log import log_calibration, log_comparison
 from jointscope.tools.rerun_log.covariance_picture import correlation_picture
 from jointscope.tools.rerun_log.moving_robot import position_covariance
+from jointscope.tools.rerun_log.rrd_file import _check_complete
 from jointscope.tools.rerun_log.viewer_text import viewer_text
 from jointscope.tools.verbs import view
 
@@ -130,6 +131,14 @@ def test_a_disk_without_room_is_noticed_before_the_work(result, tmp_path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_a_file_that_was_cut_off_is_noticed(calibration_file, tmp_path):
+    whole = calibration_file.read_bytes()
+    (tmp_path / "cut.rrd").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(JointscopeError, match="is not complete"):
+        _check_complete(tmp_path / "cut.rrd")
+
+
 def test_an_interrupted_log_leaves_the_old_file(result, tmp_path, monkeypatch):
     file = tmp_path / "run.rrd"
     file.write_bytes(b"old")
@@ -162,6 +171,7 @@ def test_the_correlation_picture_shows_signs_as_colours(result):
 def test_text_that_the_viewer_cannot_draw_is_replaced():
     assert viewer_text("χ² = 1 ± 0.2 µrad − größer") == "χ² = 1 ± 0.2 µrad − größer"
     assert viewer_text("ﬁt ℹ 録画") == "fit i ??"
+    assert viewer_text("\u0149 \u038b") == "n ?"
 
 
 def test_viewing_a_missing_or_foreign_file_is_one_line(tmp_path):

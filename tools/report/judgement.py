@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult, ParameterEstimate
-from jointscope.tools.report.numbers import percent, significant
-from jointscope.tools.report.whiteness import autocorrelation, strength
+from jointscope.tools.report.numbers import significant
+from jointscope.tools.report.whiteness import LAGS, autocorrelation, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
@@ -112,7 +112,7 @@ def _white(result: CalibrationResult) -> Check:
     worst = max(found, key=lambda c: found[c])
     level = _level(found[worst], CORRELATION)
     tail = "nothing systematic is left" if level == "good" else "something systematic is left in it"
-    text = f"The largest autocorrelation over {100} samples is {found[worst]:.2f}, in {worst}: {tail}."
+    text = f"The largest autocorrelation over {LAGS} samples is {found[worst]:.2f}, in {worst}: {tail}."
     return Check(level, "Residuals without memory", text)
 
 
@@ -183,12 +183,6 @@ def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
         return "", float("nan")
     worst = max(shares, key=lambda name: shares[name])
     return worst, shares[worst]
-
-
-def spread_text(result: CalibrationResult) -> str:
-    """The largest relative sigma in words."""
-    name, share = largest_relative_sigma(result)
-    return f"{name} is known to ±{percent(share)}" if name else ""
 
 
 def _is_sensor_name(name: str) -> bool:

@@ -39,12 +39,6 @@ def with_sigma(value: float, sigma: float) -> tuple[str, str]:
     return minus(f"{value:.{decimals}f}"), f"{sigma:.{decimals}f}"
 
 
-def plus_minus(value: float, sigma: float) -> str:
-    """Text such as 187.56 ± 0.12."""
-    number, deviation = with_sigma(value, sigma)
-    return f"{number} ± {deviation}"
-
-
 def significant(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, without needless powers of ten."""
     if value is None or not math.isfinite(value):

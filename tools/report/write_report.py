@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-from jointscope.robots.errors import JointscopeError
+from jointscope.tools.whole_file import whole_file
 
 
 def write_report(path: str | Path, html: str) -> None:
@@ -19,14 +18,5 @@ def write_report(path: str | Path, html: str) -> None:
     Raises:
         JointscopeError: the file cannot be written (no folder, no permission, disk full); nothing is left behind.
     """
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(html, encoding="utf-8")
-        os.replace(temporary, target)
-    except OSError as err:
-        raise JointscopeError(f"cannot write the report {target}: {err.strerror or err}") from err
-    finally:
-        # the folder itself may be missing or be a file
-        if temporary.exists():
-            temporary.unlink()
+    with whole_file(path) as unfinished:
+        unfinished.write_text(html, encoding="utf-8")

@@ -11,10 +11,10 @@ from jointscope.tools.report.judgement import judge
 from jointscope.tools.report.sensor_signals import bag_name
 from jointscope.tools.rerun_log.covariance_picture import covariance_views, send_covariance
 from jointscope.tools.rerun_log.moving_robot import robot_view, send_robot
+from jointscope.tools.rerun_log.rrd_file import rrd_file
 from jointscope.tools.rerun_log.sensor_lines import send_sensors, sensor_views
 from jointscope.tools.rerun_log.state_lines import send_states, state_views
 from jointscope.tools.rerun_log.viewer_text import viewer_text
-from jointscope.tools.rerun_log.whole_file import whole_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -36,7 +36,7 @@ def log_calibration(result: CalibrationResult, path: str | Path) -> None:
     expected = 8 * sum(
         bag.states.size * 2 + 12 * s.measured.size for bag in result.bags for s in bag.residuals.values()
     )
-    with whole_file(path, _blueprint(result), expected) as stream:
+    with rrd_file(path, _blueprint(result), expected) as stream:
         _send_findings(stream, result)
         send_covariance(stream, result)
         for i, bag in enumerate(result.bags):

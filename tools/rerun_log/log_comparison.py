@@ -11,8 +11,8 @@ import numpy as np
 from jointscope.graphs.comparison_result import ComparisonResult
 from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_lines
+from jointscope.tools.rerun_log.rrd_file import rrd_file
 from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
-from jointscope.tools.rerun_log.whole_file import whole_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -33,7 +33,7 @@ def log_comparison(result: ComparisonResult, path: str | Path) -> None:
         JointscopeError: the file cannot be written; nothing is left behind.
     """
     expected = 8 * sum(4 * s.measured.size for model in result.models for s in model.sensors.values())
-    with whole_file(path, _blueprint(result), expected) as stream:
+    with rrd_file(path, _blueprint(result), expected) as stream:
         _send_scores(stream, result)
         for sensor, prediction in (result.models[0].sensors if result.models else {}).items():
             for i in range(len(prediction.channels)):

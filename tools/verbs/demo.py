@@ -20,6 +20,7 @@ EXAMPLE = """example:
 
 ROBOT = "doggy"
 MOVES_SECONDS = 10.0  # [s]
+FRICTION = "smooth"  # as the robot file has it; with "dry" the simulation holds an effect that the model lacks
 ALLOWED_ERROR = 0.01  # a parameter within 1 % of the truth is called found
 
 
@@ -86,6 +87,7 @@ class _Story:
         _say(_against_truth(calibration, truth))
         _say("\n4. Another motion of the same robot, which the calibration has not seen.")
         self._simulate("moves", MOVES_SECONDS)
+        _say("")
         comparison = self._compare()
         return {"calibration": calibration.to_json(), "truth": truth, "comparison": comparison.to_json()}
 
@@ -94,13 +96,21 @@ class _Story:
         from jointscope.tools.bags import write_bag
         from jointscope.tools.simulator import simulate
 
-        self._command(f"simulate {ROBOT} -o {{}}/{motion}.mcap --motion {motion} --seconds {seconds:g}", self.seed)
+        options = f"--motion {motion} --seconds {seconds:g} --seed {self.seed} --friction {FRICTION}"
+        self._command(f"simulate {ROBOT} -o {{}}/{motion}.mcap {options}")
         with progress_bar() as progress:
             simulation = simulate(
-                self.robot, motion, seconds, self.seed, progress=lambda share: progress("simulating", share)
+                self.robot,
+                motion,
+                seconds,
+                self.seed,
+                friction=FRICTION,
+                progress=lambda share: progress("simulating", share),
             )
             write_bag(self.hidden / f"{motion}.mcap", simulation.recording, self.robot)
         write_json(self.hidden / f"{motion}.truth.json", simulation.truth)
+        count = simulation.recording.sample_count
+        _say(f"{self.folder}/{motion}.mcap: {count:,} messages; what is true stands in {motion}.truth.json")
         return dict(simulation.truth["parameters"])
 
     def _calibrate(self) -> Any:
@@ -148,9 +158,9 @@ class _Story:
         recording = read_recording(self.hidden / bag, self.robot, reading(Path(bag), progress))
         return replace(recording, path=str(self.folder / bag))
 
-    def _command(self, text: str, seed: int | None = None) -> None:
+    def _command(self, text: str) -> None:
         """Prints what the user would type."""
-        _say(f"   $ jointscope {text.format(self.folder)}{'' if seed is None else f' --seed {seed}'}\n")
+        _say(f"   $ jointscope {text.format(self.folder)}\n")
 
 
 def _against_truth(result: Any, truth: dict[str, Any]) -> str:

@@ -46,7 +46,7 @@ def residuals(result: CalibrationResult) -> Section:
         ]
         caption = (
             "Left: measured − predicted with the ±3 sigma that is expected. Middle: distribution in sigmas, with the "
-            "normal one as a line. Right: autocorrelation; white noise stays within the band."
+            "normal one as a line; outer bars: all beyond. Right: autocorrelation; white noise stays in its band."
         )
         return figure(rows, caption=caption, group=f"{group} residuals")
 
@@ -78,7 +78,8 @@ def _histogram(series: ResidualSeries, i: int) -> str:
     density, _ = np.histogram(np.clip(whitened, EDGES[0], EDGES[-1]), EDGES)
     heights = density / max(len(whitened), 1) / (EDGES[1] - EDGES[0])
     normal = np.exp(-0.5 * GAUSS**2) / np.sqrt(2.0 * np.pi)
-    axes = Axes("distribution", "residual [sigma]", 240, 150, zoomable=False)
+    top = 1.08 * max(float(heights.max(initial=0.0)), float(normal.max()))
+    axes = Axes("distribution", "residual [sigma]", 240, 150, y_range=(0.0, top), zoomable=False)
     marks: list[Mark] = [Bars("", EDGES, heights, COLOURS[i % 6]), Curve("normal", GAUSS, normal, "ink", "solid")]
     return plot(axes, marks)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jointscope.robots.errors import JointscopeError
+from jointscope.tools.whole_file import whole_file
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -20,7 +21,7 @@ ROOM_FACTOR = 1.25  # the viewer's format needs a little more than the numbers t
 
 
 @contextmanager
-def whole_file(path: str | Path, blueprint: rrb.Blueprint, expected_bytes: int = 0) -> Iterator[rr.RecordingStream]:
+def rrd_file(path: str | Path, blueprint: rrb.Blueprint, expected_bytes: int = 0) -> Iterator[rr.RecordingStream]:
     """A stream to log to; the file appears at its place when the block ends without an error.
 
     Args:
@@ -36,32 +37,27 @@ def whole_file(path: str | Path, blueprint: rrb.Blueprint, expected_bytes: int =
     """
     import rerun as rr
 
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        _check_room(target, expected_bytes)
-        # the viewer's writer works in the background and only logs its errors: open the file ourselves first
-        temporary.touch()
+    _check_room(Path(path), expected_bytes)
+    with whole_file(path) as unfinished:
+        # the viewer's writer works in the background and only logs its errors: create the file ourselves first
+        unfinished.touch()
         stream = rr.RecordingStream(APPLICATION)
         stream.set_log_time_enabled(False)
-        stream.save(temporary, default_blueprint=blueprint)
+        stream.save(unfinished, default_blueprint=blueprint)
         try:
             yield stream
             stream.flush()
         finally:
             stream.disconnect()
-        _check_complete(temporary)
-        os.replace(temporary, target)
-    except OSError as err:
-        raise JointscopeError(f"cannot write {target}: {err.strerror or err}") from err
-    finally:
-        if temporary.exists():
-            temporary.unlink()
+        _check_complete(unfinished)
 
 
 def _check_room(target: Path, expected_bytes: int) -> None:
     """Asks the disk before the work, as the background writer cannot tell afterwards."""
-    disk = os.statvfs(target.parent)
+    try:
+        disk = os.statvfs(target.parent)
+    except OSError:
+        return  # the folder is missing; writing will say so
     free = disk.f_bavail * disk.f_frsize
     if free < ROOM_FACTOR * expected_bytes:
         raise JointscopeError(
@@ -76,4 +72,4 @@ def _check_complete(file: Path) -> None:
     try:
         RrdReader(str(file)).store().schema()
     except Exception as err:
-        raise JointscopeError(f"cannot write {file.name}: the viewer's file is not complete") from err
+        raise JointscopeError(f"cannot write {file}: the viewer's file is not complete") from err
