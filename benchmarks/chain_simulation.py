@@ -129,15 +129,27 @@ def simulate_all(x0s, volts, h, ps, inertias, sharpness):
     return paths
 
 
+def body_rates(path: Array) -> tuple[Array, Array]:
+    """Angular velocities of bodies 1 and 3 in their own frames, shape (m, 3) each, for states of shape (m, 12)."""
+    s2, c2, s3, c3 = np.sin(path[:, 1]), np.cos(path[:, 1]), np.sin(path[:, 2]), np.cos(path[:, 2])
+    v1, v2, v3 = path[:, 3:6].T
+    body1 = np.column_stack([np.zeros_like(v1), np.zeros_like(v1), v1])
+    return body1, np.column_stack([-s2 * v1 - v3, -c2 * s3 * v1 + c3 * v2, c2 * c3 * v1 + s3 * v2])
+
+
 def inertias_of(tree: RigidTree) -> Array:
     """Inertias of the three bodies about the common point, shape (3, 3, 3) [kg m2]."""
     return np.array([tree.model.inertias[j].inertia for j in range(1, 4)])
 
 
 def check_against(tree: RigidTree) -> None:
-    """Raises AssertionError unless the formulas above give pinocchio's accelerations."""
+    """Raises AssertionError unless the formulas above give pinocchio's accelerations and body rates."""
     rng = np.random.default_rng(0)
     q, v, tau = rng.uniform(-1.0, 1.0, (3, 50, 3)) * np.array([1.0, 3.0, 20.0])[:, None, None]
     ours = [link_acceleration(inertias_of(tree), *q[k, 1:], *v[k], *tau[k]) for k in range(len(q))]
-    if not np.allclose(ours, tree.acceleration(q, v, tau), rtol=1e-9, atol=1e-9):
+    same = np.allclose(ours, tree.acceleration(q, v, tau), rtol=1e-9, atol=1e-9)
+    rates = body_rates(np.hstack([q, v, q, v]))
+    for body, rate in zip(("link1", "link3"), rates, strict=True):
+        same = same and np.allclose(rate, tree.body_rate(body, q, v)[0])
+    if not same:
         raise AssertionError("single shooting: the formulas by hand differ from pinocchio")
