@@ -37,7 +37,7 @@ def run(quick: bool) -> Section:
     """Calibrates on the training recording, looks at the truth and at the test recording; `quick` changes nothing."""
     section = Section(
         "Accuracy",
-        "Clean Doggy recordings of unknown make, 16 s to calibrate with and 8 s held out; truth.json holds the truth.",
+        "Clean Doggy recordings that this project's simulator did not make: 16 s to calibrate with and 8 s held out.",
     )
     if not (DATA / "truth.json").is_file():
         section.notes.append("Skipped: the recordings are not there; they are expected in ../shared/data/doggy/clean.")
@@ -88,7 +88,10 @@ def _report(section: Section, name: str, result: CalibrationResult, found: Seque
         section.promise(f"{name}: {what}", f"{limit:g} %" * promised, measured, size < limit if promised else None)
     bias = max(abs(d.error) for d in found if d.kind == "bias")
     section.promise(
-        f"{name}: largest error of a bias", f"{BIAS:g} rad/s" * promised, f"{bias:.1e} rad/s", bias < BIAS if promised else None
+        f"{name}: largest error of a bias",
+        f"{BIAS:g} rad/s" * promised,
+        f"{bias:.1e} rad/s",
+        bias < BIAS if promised else None,
     )
     angle = max(np.degrees(abs(d.error)) for d in found if d.kind == "rotation")
     measured = f"{angle:.4f} deg"
@@ -111,7 +114,8 @@ def _yaw_note(result: CalibrationResult) -> str:
     """What the calibration itself says about the yaw."""
     yaw = next(p for p in result.parameters if p.name == UNOBSERVABLE)
     said = f'"{yaw.note}"' if yaw.note else "nothing"
-    return f"no recording with a rigid bearing shows it. The calibration says {said}, sigma {np.degrees(yaw.sigma):.1f} deg."
+    sigma = f"{np.degrees(yaw.sigma):.1f} deg"
+    return f"no recording with a rigid bearing shows it. The calibration says {said}, sigma {sigma}."
 
 
 def _table(words: str, found: Sequence[Deviation], promised: bool) -> Table:

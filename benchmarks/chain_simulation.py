@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 PARAMETERS = 12
 
 
-@njit(cache=True, fastmath=True, inline="always")
+@njit(cache=True, fastmath=True, error_model="numpy", inline="always")
 def _times(inertia, x, y, z):
     """I w for one body."""
     return (
@@ -34,7 +34,7 @@ def _times(inertia, x, y, z):
     )
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def link_acceleration(inertias, q2, q3, v1, v2, v3, t1, t2, t3):
     """M^-1 (tau - c) for joint torques t1, t2, t3 [N m]; gravity is compensated."""
     s2, c2, s3, c3 = np.sin(q2), np.cos(q2), np.sin(q3), np.cos(q3)
@@ -76,7 +76,7 @@ def link_acceleration(inertias, q2, q3, v1, v2, v3, t1, t2, t3):
     )
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _derivative(x, volts, p, inertias, sharpness, tau, dx):
     """dx/dt of x = (q_link, v_link, q_motor, v_motor); `tau` is scratch."""
     for i in range(3):
@@ -87,7 +87,7 @@ def _derivative(x, volts, p, inertias, sharpness, tau, dx):
     dx[3], dx[4], dx[5] = link_acceleration(inertias, x[1], x[2], x[3], x[4], x[5], -tau[0], -tau[1], -tau[2])
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _simulate(x0, volts, h, p, inertias, sharpness, path):
     x, y, tau = x0.copy(), np.empty(12), np.empty(3)
     k1, k2, k3, k4 = np.empty(12), np.empty(12), np.empty(12), np.empty(12)
@@ -108,7 +108,7 @@ def _simulate(x0, volts, h, p, inertias, sharpness, path):
         path[k + 1] = x
 
 
-@njit(cache=True, fastmath=True, parallel=True)
+@njit(cache=True, fastmath=True, error_model="numpy", parallel=True)
 def simulate_all(x0s, volts, h, ps, inertias, sharpness):
     """Runge-Kutta paths of several robots under the same commands, one per core at a time.
 

@@ -29,8 +29,8 @@ def run(quick: bool) -> Section:
     count = recording.sample_count
     section = Section(
         "Reading",
-        f"{count:,} messages on 4 topics, {duration:g} s at 1 kHz; hash of the file included. The best of {REPEATS} runs, "
-        "with the file in the cache of the operating system.",
+        f"{count:,} messages on 4 topics, {duration:g} s at 1 kHz; hash of the file included. The best of {REPEATS} "
+        "runs, with the file in the cache of the operating system.",
     )
     with tempfile.TemporaryDirectory(prefix="jointscope-bench-") as folder:
         for fmt in FORMATS:

@@ -78,7 +78,7 @@ class SingleShooting:
         self._paths(np.zeros((1, UNKNOWNS)), steps=2)  # compiles
 
     def start(self, regression: bool) -> Array:
-        """Unknowns to begin with: biases from the rest; parameters of the robot file, or regressed as `calibrate` does."""
+        """Where to begin: biases from the rest; parameters of the robot file, or of `calibrate`'s regression."""
         calibration = initial_biases(self._problem, Calibration.of(self._robot))
         if regression:
             windows = [BagProblem.of(self._robot, piece) for _, piece in windows_of([self._recording])]

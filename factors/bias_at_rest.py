@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.robots.sensors import AXES, Gyro
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ class BiasAtRestFactor:
         """Noise of each component, shape (3,) [rad/s]."""
         return np.full(3, self.sensor.sigma)
 
-    def select(self, samples: slice) -> BiasAtRestFactor:
+    def select(self, samples: Samples) -> BiasAtRestFactor:
         """The same factor for some of the samples."""
         return replace(self, measured=self.measured[samples])
 

@@ -68,7 +68,7 @@ class Calibration:
 
     @property
     def value_by_coordinate(self) -> Array:
-        """d value / d coordinate of each dynamic parameter, shape (p,)."""
+        """D value / d coordinate of each dynamic parameter, shape (p,)."""
         return np.where(self.positive, self.values, 1.0)
 
     @property

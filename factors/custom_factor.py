@@ -15,7 +15,6 @@ import numpy as np
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Factor
 
-
 TICKS_PER_BAG = 10**9
 GYROS_PER_BAG = 1000
 

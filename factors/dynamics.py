@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.step import Steps, row_names
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.robot import ProcessNoise
@@ -49,7 +49,7 @@ class DynamicsFactor(ABC):
         """Standard deviations of the rows, shape (m, 4n) [rad/s], [rad]."""
         return self.steps.sigmas
 
-    def select(self, samples: slice | NDArray[np.intp]) -> DynamicsFactor:
+    def select(self, samples: Samples) -> DynamicsFactor:
         """The same factor for some of the steps."""
         return replace(self, steps=self.steps.select(samples))
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 
 Array = NDArray[np.float64]
+Samples = slice | NDArray[np.intp]
+"""A choice of samples: a range, or their indices."""
 
 
 @dataclass(frozen=True)
@@ -35,26 +37,32 @@ class Linearization:
 
 
 class Factor(Protocol):
-    """One kind of residual for m samples.
+    """One kind of residual for m samples."""
 
-    Attributes:
-        name: short name for messages and reports.
-        rows: name of each row of the residual.
-        states: number of states each sample touches (0, 1 or 2).
-        blocks: blocks of the calibration the residual depends on.
-        sigmas: standard deviation of each row, shape (r,) or (m, r).
-    """
+    @property
+    def name(self) -> str:
+        """Short name for messages and reports."""
 
-    name: str
-    rows: tuple[str, ...]
-    states: int
-    blocks: tuple[str, ...]
-    sigmas: Array
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Name of each row of the residual."""
+
+    @property
+    def states(self) -> int:
+        """Number of states each sample touches (0, 1 or 2)."""
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """Blocks of the calibration the residual depends on."""
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviation of each row, shape (r,) or (m, r)."""
 
     def __len__(self) -> int:
         """Number of samples."""
 
-    def select(self, samples: slice) -> Factor:
+    def select(self, samples: Samples) -> Factor:
         """The same factor for some of the samples."""
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
 
@@ -61,7 +61,7 @@ class GyroFactor:
         """Noise of each component, shape (3,) [rad/s]."""
         return np.full(3, self.sensor.sigma)
 
-    def select(self, samples: slice) -> GyroFactor:
+    def select(self, samples: Samples) -> GyroFactor:
         """The same factor for some of the samples."""
         return replace(self, measured=self.measured[samples])
 

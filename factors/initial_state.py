@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ class InitialStateFactor:
         eye, zero = np.eye(len(self.joints)), np.zeros((len(self.joints),) * 2)
         return np.block([[eye, zero, -eye, zero], [zero, eye, zero, zero], [zero, zero, zero, eye]])
 
-    def select(self, samples: slice) -> InitialStateFactor:
+    def select(self, samples: Samples) -> InitialStateFactor:
         """There is one sample only."""
         return self
 

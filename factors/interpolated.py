@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Factor, Linearization
+from jointscope.factors.factor import Factor, Linearization, Samples
 
 Array = NDArray[np.float64]
 
@@ -60,17 +60,17 @@ class InterpolatedFactor:
         """Noise of the sensor."""
         return self.inner.sigmas
 
-    def select(self, samples: slice) -> InterpolatedFactor:
+    def select(self, samples: Samples) -> InterpolatedFactor:
         """The same factor for some of the samples."""
         return replace(self, inner=self.inner.select(samples), fraction=self.fraction[samples], h=self.h[samples])
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
-        return self.inner.residual((interpolate(*x, self.fraction, self.h),), calibration)
+        return self.inner.residual((interpolate(x[0], x[1], self.fraction, self.h),), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives by both states."""
-        inner = self.inner.linearize((interpolate(*x, self.fraction, self.h),), calibration)
+        inner = self.inner.linearize((interpolate(x[0], x[1], self.fraction, self.h),), calibration)
         J = inner.by_state[0]
         J0, J1 = np.empty_like(J), np.empty_like(J)
         position, velocity = ([w[:, None, None] for w in part] for part in _weights(self.fraction, self.h))
@@ -86,7 +86,8 @@ def interpolate(x0: Array, x1: Array, fraction: Array, h: Array) -> Array:
     """States between two ticks.
 
     Args:
-        x0, x1: states at the ticks, shape (m, 4n).
+        x0: states at the first tick, shape (m, 4n).
+        x1: states at the second tick, shape (m, 4n).
         fraction: (t - t_k) / h, in [0, 1], shape (m,).
         h: distance of the ticks, shape (m,) [s].
 

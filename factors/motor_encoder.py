@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.robots.sensors import MotorEncoder
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class MotorEncoderFactor:
         """Noise of each channel, shape (n,) [rad]."""
         return np.full(self.measured.shape[1], self.sensor.sigma)
 
-    def select(self, samples: slice) -> MotorEncoderFactor:
+    def select(self, samples: Samples) -> MotorEncoderFactor:
         """The same factor for some of the samples."""
         return replace(self, measured=self.measured[samples])
 

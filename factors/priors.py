@@ -8,13 +8,14 @@ sigma; a rotation carries it on Log(R_prior^T R).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import skew
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import AXES, Gyro
@@ -31,7 +32,7 @@ class _Prior:
     def __len__(self) -> int:
         return 1
 
-    def select(self, samples: slice) -> _Prior:
+    def select(self, samples: Samples) -> Self:
         """There is one sample only."""
         return self
 
@@ -161,7 +162,7 @@ class RotationPrior(_Prior):
 
 
 def inverse_right_jacobian(w: Array) -> Array:
-    """d Log(Exp(w) Exp(delta)) / d delta at delta = 0, shape (3, 3); w: rotation vector, shape (3,) [rad].
+    """D Log(Exp(w) Exp(delta)) / d delta at delta = 0, shape (3, 3); w: rotation vector, shape (3,) [rad].
 
     Reference: Sola, Deray, Atchuthan (2018), "A micro Lie theory", eq. (144).
     """

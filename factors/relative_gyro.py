@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import skew
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
@@ -70,11 +70,9 @@ class RelativeGyroFactor:
         """Noise of each component, shape (3,) [rad/s]."""
         return np.full(3, self.sensor.sigma)
 
-    def select(self, samples: slice) -> RelativeGyroFactor:
+    def select(self, samples: Samples) -> RelativeGyroFactor:
         """The same factor for some of the samples."""
-        return replace(
-            self, measured=self.measured[samples], measured_reference=self.measured_reference[samples]
-        )
+        return replace(self, measured=self.measured[samples], measured_reference=self.measured_reference[samples])
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, 3) [rad/s]."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.factor import Samples
 from jointscope.robots.robot import ProcessNoise
 
 Array = NDArray[np.float64]
@@ -36,7 +37,7 @@ class Steps:
     def __len__(self) -> int:
         return len(self.h)
 
-    def select(self, samples: slice | NDArray[np.intp]) -> Steps:
+    def select(self, samples: Samples) -> Steps:
         """Some of the steps."""
         return Steps(self.h[samples], self.u[samples], self.noise)
 

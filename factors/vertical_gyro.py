@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization
+from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import skew
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
@@ -69,7 +69,7 @@ class VerticalGyroFactor:
         rest = np.zeros((1, self.tree.n))
         return self.tree.body_rate(self.sensor.body, rest, rest)[2][0, :, 0]
 
-    def select(self, samples: slice) -> VerticalGyroFactor:
+    def select(self, samples: Samples) -> VerticalGyroFactor:
         """The same factor for some of the samples."""
         return replace(self, measured=self.measured[samples])
 

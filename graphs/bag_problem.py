@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One recording as factors on a chain of states.
+r"""One recording as factors on a chain of states.
 
-     X(0) --dyn-- X(1) --dyn-- X(2) -- ... -- X(N)          dyn:  dynamics of the robot's integrator
-      |    \\    /  |                            |            enc:  motor encoder, at a tick or between two
-   initial  enc,  gyro                          ...          gyro: full, vertical or relative
-                 \\___ dynamics parameters, rotations, biases (shared by all ticks)
+X(0) --dyn-- X(1) --dyn-- X(2) -- ... -- X(N)          dyn:  dynamics of the robot's integrator
+|    \\    /  |                            |            enc:  motor encoder, at a tick or between two
+initial  enc,  gyro                          ...          gyro: full, vertical or relative
+\\___ dynamics parameters, rotations, biases (shared by all ticks)
 """
 
 from __future__ import annotations
@@ -164,9 +164,7 @@ def _rate_of_change(stream: Stream) -> Array:
     return np.abs(np.gradient(stream.values, stream.times, axis=0)).max(axis=1)
 
 
-def _sensor_factor(
-    robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]
-) -> Factor:
+def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
     sensor, values = robot.sensors[name], stream.values[chosen]
     if isinstance(sensor, MotorEncoder):
         return MotorEncoderFactor(sensor, values)

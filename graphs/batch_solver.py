@@ -29,7 +29,7 @@ LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 LAMBDA_LARGEST = 1e8
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
-COST_TOLERANCE = 1e-7  # relative fall of the cost
+COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def solve(
         fall = (solution.cost - step.cost) / max(solution.cost, 1e-300)
         solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
         solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
-        small = step.in_sigmas < step_tolerance and fall < 1e-3
+        small = _remaining(solution.iterations) < step_tolerance and fall < 1e-3
         if small or (fall < COST_TOLERANCE and damping <= LAMBDA_START):
             solution.converged = True
             break
@@ -193,6 +193,15 @@ def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str]
     cost_there = _cost(problems[0], systems, step.estimate)
     accepted = bool(np.isfinite(cost_there) and cost_there <= solution.cost * (1.0 + 1e-12))
     return _Trial(step.estimate, step.in_sigmas, step.dx, step.dp, systems, cost_there, accepted)
+
+
+def _remaining(iterations: Sequence[Iteration]) -> float:
+    """How far the minimum may still be, in sigmas: the last step, or more where steps shrink slowly."""
+    last = iterations[-1].step_in_sigmas
+    if len(iterations) < 2:
+        return last
+    ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.99)
+    return last * max(1.0, ratio / (1.0 - ratio))
 
 
 def _stuck(solution: Solution, step: _Trial, step_tolerance: float) -> Solution:

@@ -21,7 +21,6 @@ from jointscope.graphs.calibration_result import (
     IterationRecord,
     ParameterEstimate,
     ResidualSeries,
-    WeakDirection,
 )
 from jointscope.graphs.findings import findings
 from jointscope.graphs.identifiability import weak_directions
@@ -87,7 +86,11 @@ class Solved:
 
 
 def summarize(
-    robot: Robot, solved: Solved, iterations: tuple[IterationRecord, ...], notices: Sequence[Notice], hold: Sequence[str]
+    robot: Robot,
+    solved: Solved,
+    iterations: tuple[IterationRecord, ...],
+    notices: Sequence[Notice],
+    hold: Sequence[str],
 ) -> CalibrationResult:
     """Everything that users see of a calibration.
 
@@ -233,9 +236,7 @@ def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[
             note = "at its bound: compatible with zero"
         elif sigmas[i] > HELD_BY_PRIOR * relative_prior:
             note = "held by its prior"
-        found.append(
-            ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note)
-        )
+        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
     start = len(calibration.names)
     for gyro in robot.gyros:
         angle = Rotation.from_matrix(gyro.R_prior.T @ calibration.rotations[gyro.name]).as_rotvec()

@@ -124,7 +124,7 @@ class _Run:
             at = self.tick + (1 if placed.factor.states == 1 else 0)
             for j in range(int(np.max(count[at], initial=0))):
                 who = np.flatnonzero(count[at] > j)
-                factor = placed.factor.select(first[at[who]] + j)  # type: ignore[arg-type]
+                factor = placed.factor.select(first[at[who]] + j)
                 self._add(H, g, factor, who, (x1[who],) if factor.states == 1 else (x0[who], x1[who]))
         H, scale = _balanced(H)
         g = g * scale

@@ -60,9 +60,7 @@ class Ahead:
     predicted: Array
 
 
-def compare(
-    robots: Mapping[str, Robot], recording: Recording, *, progress: Progress | None = None
-) -> ComparisonResult:
+def compare(robots: Mapping[str, Robot], recording: Recording, *, progress: Progress | None = None) -> ComparisonResult:
     """Compares models with a recording.
 
     Args:
@@ -136,12 +134,17 @@ def _predict_ahead(
     """Predictions `horizon` seconds ahead from starts all over the recording, by sensor."""
     timeline = problem.timeline
     ticks, h = timeline.ticks, float(np.median(timeline.h))
-    stride = max(int(round(SPACING[horizon] / h)), 1)
+    stride = max(round(SPACING[horizon] / h), 1)
     longest = int(np.ceil((horizon + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
     start = np.arange(0, len(ticks) - 1 - longest, stride)
     if len(start) == 0:
-        return {name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels)))) for name, s in problem.robot.sensors.items()}
-    wanted = {name: _target_samples(problem.recording.streams[name], ticks[start] + horizon) for name in problem.robot.sensors}
+        return {
+            name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))))
+            for name, s in problem.robot.sensors.items()
+        }
+    wanted = {
+        name: _target_samples(problem.recording.streams[name], ticks[start] + horizon) for name in problem.robot.sensors
+    }
     steps = {name: timeline.locate(problem.recording.streams[name].times[w])[0] for name, (w, _) in wanted.items()}
     found = {name: np.full((len(start), causal.mean.shape[1]), np.nan) for name in wanted}
     for step, before, after in predictor.paths(causal.mean[start], start, longest):

@@ -99,12 +99,12 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
     filtered = {key: sosfiltfilt(band, value, axis=0) for key, value in signals.items()}
     filtered["deflection"] = sosfiltfilt(band, np.cumsum(signals["deflection_rate"] * h, axis=0), axis=0)
     filtered["load"] = -filtered["load"]
-    keep = slice(None, None, max(int(round(0.25 / (BAND[1] * h))), 1))
+    keep = slice(None, None, max(round(0.25 / (BAND[1] * h)), 1))
     return {key: value[keep] for key, value in filtered.items()}
 
 
 def _inverse_mass(robot: Robot, q: Array) -> Array:
-    return np.linalg.inv(robot.tree.mass_matrix(q))
+    return np.asarray(np.linalg.inv(robot.tree.mass_matrix(q)), dtype=np.float64)
 
 
 def _regress(
@@ -122,7 +122,9 @@ def _regress(
     values, _ = nnls(regressors / scale, target)
     for law, value, size in zip(laws, values / scale, scale, strict=True):
         parameter = (
-            robot.parameter(f"{joint}.{law}") if law not in ("k_pwm", "k_mi", "inertia") else robot.drive_parameter(joint, law)
+            robot.parameter(f"{joint}.{law}")
+            if law not in ("k_pwm", "k_mi", "inertia")
+            else robot.drive_parameter(joint, law)
         )
         if value > 0.0 and not parameter.fixed:
             found.setdefault(parameter.name, []).append((float(value), float(value * size)))
@@ -155,16 +157,16 @@ def _link_rates(problem: BagProblem, calibration: Calibration, q: Array, fallbac
         jacobian = robot.tree.body_rate(gyro.body, q, np.zeros_like(q))[2]
         left += jacobian.transpose(0, 2, 1) @ jacobian
         right = right + np.einsum("kij,ki->kj", jacobian, omega_body)
-    return np.linalg.solve(left, right[:, :, None])[:, :, 0]
+    return np.asarray(np.linalg.solve(left, right[:, :, None])[:, :, 0], dtype=np.float64)
 
 
 def _smooth_derivative(values: Array, ticks: Array) -> Array:
     """Slope of a local parabola; polynomial at the ends, so that nothing jumps there."""
     h = float(np.median(np.diff(ticks)))
-    width = min(2 * max(int(round(0.5 * SMOOTHING / h)), 1) + 1, len(ticks) - 1 + len(ticks) % 2)
+    width = min(2 * max(round(0.5 * SMOOTHING / h), 1) + 1, len(ticks) - 1 + len(ticks) % 2)
     if width < 3:
-        return np.gradient(values, ticks, axis=0)
-    return savgol_filter(values, width, 2, deriv=1, delta=h, axis=0, mode="interp")
+        return np.asarray(np.gradient(values, ticks, axis=0), dtype=np.float64)
+    return np.asarray(savgol_filter(values, width, 2, deriv=1, delta=h, axis=0, mode="interp"), dtype=np.float64)
 
 
 def _at(ticks: Array, times: Array, values: Array) -> Array:

@@ -42,7 +42,7 @@ def floor_of(problem: BagProblem, x: Array, calibration: Calibration, horizon: f
     """
     quiet = problem.with_noise(scaled(problem.dynamics.steps.noise, _quiet_factors(problem, x, calibration)))
     filtered = filter_around(quiet, x, calibration)
-    steps = max(int(round(horizon / float(np.median(problem.timeline.h)))), 1)
+    steps = max(round(horizon / float(np.median(problem.timeline.h))), 1)
     ticks = problem.timeline.ticks
     # at rest friction hides the deflection; no prediction can know it before the first motion
     first = int(np.searchsorted(ticks, first_command_time(problem.recording) + SETTLING))

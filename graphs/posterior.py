@@ -114,7 +114,7 @@ class ResidualPart:
         ticks: first state of each sample.
         residual: whitened, shape (m, r).
         leverage: share of each row's variance that the fit absorbs, in [0, 1], shape (m, r).
-        by_shared: derivative of the whitened residual by the shared values, with states following along, shape (m, r, p).
+        by_shared: derivative of the residual by the shared values, with states following along, shape (m, r, p).
     """
 
     factor: Factor

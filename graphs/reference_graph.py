@@ -54,7 +54,9 @@ def estimate_of(values: gtsam.Values, like: Estimate) -> Estimate:
     return Estimate(states, calibrations)
 
 
-def solve_with_gtsam(problems: Sequence[BagProblem], start: Estimate, max_iterations: int = 50) -> tuple[Estimate, float]:
+def solve_with_gtsam(
+    problems: Sequence[BagProblem], start: Estimate, max_iterations: int = 50
+) -> tuple[Estimate, float]:
     """Minimises with `gtsam.LevenbergMarquardtOptimizer`.
 
     Returns:

@@ -57,7 +57,8 @@ class BlockScores:
         information = np.zeros((len(self._scores), self.size, self.size))
         score[:, self._indices] = self._scores
         information[:, self._indices[:, None], self._indices[None, :]] = self._information
-        return np.linalg.solve(H - information, score[:, :, None])[:, :, 0]
+        changes = np.linalg.solve(H - information, score[:, :, None])[:, :, 0]
+        return np.asarray(changes, dtype=np.float64)
 
 
 def inflation(scores: list[BlockScores], covariance: Array) -> Array:
@@ -67,7 +68,7 @@ def inflation(scores: list[BlockScores], covariance: Array) -> Array:
         scores: of all recordings.
         covariance: inverse Hessian of the shared values, shape (s, s).
     """
-    H = np.linalg.inv(covariance)
+    H: Array = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
     changes = np.vstack([s.jackknife(H) for s in scores])
     blocks = len(changes)
     if blocks < FEWEST_BLOCKS:

@@ -14,7 +14,7 @@ from jointscope.graphs.causal_filter import filter_around, filter_states
 from jointscope.graphs.initial_guess import initial_biases, initial_states
 from jointscope.graphs.normal_equations import build, linearize_all
 from jointscope.graphs.posterior import StatePosterior, posteriors, residual_parts
-from jointscope.graphs.reference_graph import nonlinear_graph, initial_values, solve_with_gtsam
+from jointscope.graphs.reference_graph import initial_values, nonlinear_graph, solve_with_gtsam
 from jointscope.robots.errors import SolveError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot_file import load_robot
@@ -82,7 +82,7 @@ def test_batched_solver_ends_where_gtsam_ends(moving):
 
 def test_two_recordings_share_parameters_as_in_the_gtsam_graph(simulated, doggy):
     robot = _noisier(doggy, 0.3)
-    parts = [_short(simulated.recording, t, 0.06, every=2) for t in (4.0, 6.0)]
+    parts = [_short(simulated.recording, t, 0.04, every=2) for t in (4.0, 6.0)]
     problems, start = _start(robot, parts)
     graph = nonlinear_graph(problems, start)
     assert graph.error(initial_values(start)) == pytest.approx(total_cost(problems, start), rel=1e-9)
@@ -133,7 +133,7 @@ def _random_chain(m=7, d=4, p=3, seed=0):
 
 def test_elimination_equals_dense_algebra():
     system = _random_chain()
-    m, d, p = system.B.shape
+    m, d, _p = system.B.shape
     full = -np.linalg.solve(_dense(system), np.concatenate([system.g_x.ravel(), system.g_p]))
     elimination = eliminate(system)
     dp = -np.linalg.solve(elimination.S, elimination.s)
@@ -143,7 +143,7 @@ def test_elimination_equals_dense_algebra():
 
 def test_backward_recursion_gives_the_blocks_of_the_dense_inverse():
     system = _random_chain()
-    m, d, p = system.B.shape
+    m, d, _p = system.B.shape
     inverse = np.linalg.inv(_dense(system))
     elimination = eliminate(system)
     posterior = StatePosterior.of(elimination, np.linalg.inv(elimination.S))
