@@ -9,13 +9,14 @@ derivative by delta is -R [omega_body]x.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization, Samples
+from jointscope.factors.factor import Linearization
+from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
 
@@ -23,47 +24,19 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class GyroFactor:
-    """Residual = predicted - measured angular rate in the sensor frame.
+class GyroFactor(SensorFactor[Gyro]):
+    """Residual = predicted - measured angular rate in the sensor frame; measured has shape (m, 3) [rad/s].
 
     Attributes:
-        sensor: the gyro.
         tree: rigid bodies.
-        measured: rates, shape (m, 3) [rad/s].
     """
 
-    sensor: Gyro
     tree: RigidTree
-    measured: Array
-
-    states = 1
-
-    def __len__(self) -> int:
-        return len(self.measured)
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.sensor.name
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.sensor.channels
 
     @property
     def blocks(self) -> tuple[str, ...]:
         """Rotation and bias of this gyro."""
         return (rotation_block(self.name), bias_block(self.name))
-
-    @property
-    def sigmas(self) -> Array:
-        """Noise of each component, shape (3,) [rad/s]."""
-        return np.full(3, self.sensor.sigma)
-
-    def select(self, samples: Samples) -> GyroFactor:
-        """The same factor for some of the samples."""
-        return replace(self, measured=self.measured[samples])
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, 3) [rad/s]."""

@@ -6,54 +6,27 @@ Variables: X at the time of the sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Linearization, Samples
+from jointscope.factors.factor import Linearization
+from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.sensors import MotorEncoder
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class MotorEncoderFactor:
-    """Residual = predicted - measured motor angle.
-
-    Attributes:
-        sensor: the encoder.
-        measured: angles, shape (m, n) [rad].
-    """
-
-    sensor: MotorEncoder
-    measured: Array
-
-    states = 1
-    blocks = ()
-
-    def __len__(self) -> int:
-        return len(self.measured)
+class MotorEncoderFactor(SensorFactor[MotorEncoder]):
+    """Residual = predicted - measured motor angle; measured has shape (m, n) [rad]."""
 
     @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.sensor.name
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.sensor.channels
-
-    @property
-    def sigmas(self) -> Array:
-        """Noise of each channel, shape (n,) [rad]."""
-        return np.full(self.measured.shape[1], self.sensor.sigma)
-
-    def select(self, samples: Samples) -> MotorEncoderFactor:
-        """The same factor for some of the samples."""
-        return replace(self, measured=self.measured[samples])
+    def blocks(self) -> tuple[str, ...]:
+        """None: the zero of the encoder is known."""
+        return ()
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, n) [rad]."""

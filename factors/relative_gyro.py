@@ -13,6 +13,7 @@ Schuethe, Wenk, Frese (2016).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import skew
+from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
 
@@ -27,37 +29,18 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class RelativeGyroFactor:
+class RelativeGyroFactor(SensorFactor[Gyro]):
     """Residual = rate predicted from another gyro and the joints in between - measured rate.
 
     Attributes:
-        sensor: the gyro.
-        reference: the gyro further down the tree, on the body that the first joint moves.
         tree: rigid bodies.
-        measured: rates of `sensor`, shape (m, 3) [rad/s].
+        reference: the gyro further down the tree, on the body that the first joint moves.
         measured_reference: rates of `reference` at the same times, shape (m, 3) [rad/s].
     """
 
-    sensor: Gyro
-    reference: Gyro
     tree: RigidTree
-    measured: Array
+    reference: Gyro
     measured_reference: Array
-
-    states = 1
-
-    def __len__(self) -> int:
-        return len(self.measured)
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.sensor.name
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.sensor.channels
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -65,12 +48,7 @@ class RelativeGyroFactor:
         own, other = self.name, self.reference.name
         return (rotation_block(other), rotation_block(own), bias_block(other), bias_block(own))
 
-    @property
-    def sigmas(self) -> Array:
-        """Noise of each component, shape (3,) [rad/s]."""
-        return np.full(3, self.sensor.sigma)
-
-    def select(self, samples: Samples) -> RelativeGyroFactor:
+    def select(self, samples: Samples) -> Self:
         """The same factor for some of the samples."""
         return replace(self, measured=self.measured[samples], measured_reference=self.measured_reference[samples])
 

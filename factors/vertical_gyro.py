@@ -10,14 +10,15 @@ and leaves the component as it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization, Samples
+from jointscope.factors.factor import Linearization
 from jointscope.factors.gyro import skew
+from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
 
@@ -25,28 +26,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class VerticalGyroFactor:
-    """Residual = rate of the first joint - measured rate about its axis.
+class VerticalGyroFactor(SensorFactor[Gyro]):
+    """Residual = rate of the first joint - measured rate about its axis; the gyro sits on the body that it moves.
 
     Attributes:
-        sensor: the gyro, on the body that the first joint moves.
         tree: rigid bodies.
-        measured: rates, shape (m, 3) [rad/s].
     """
 
-    sensor: Gyro
     tree: RigidTree
-    measured: Array
-
-    states = 1
-
-    def __len__(self) -> int:
-        return len(self.measured)
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.sensor.name
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -59,19 +46,10 @@ class VerticalGyroFactor:
         return (rotation_block(self.name), bias_block(self.name))
 
     @property
-    def sigmas(self) -> Array:
-        """Noise, shape (1,) [rad/s]."""
-        return np.array([self.sensor.sigma])
-
-    @property
     def axis(self) -> Array:
         """Axis of the first joint in the body's frame, shape (3,)."""
         rest = np.zeros((1, self.tree.n))
         return self.tree.body_rate(self.sensor.body, rest, rest)[2][0, :, 0]
-
-    def select(self, samples: Samples) -> VerticalGyroFactor:
-        """The same factor for some of the samples."""
-        return replace(self, measured=self.measured[samples])
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual, shape (m, 1) [rad/s]."""

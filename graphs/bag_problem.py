@@ -169,14 +169,14 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
     if isinstance(sensor, MotorEncoder):
         return MotorEncoderFactor(sensor, values)
     if sensor.form == "vertical":
-        return VerticalGyroFactor(sensor, robot.tree, values)
+        return VerticalGyroFactor(sensor, values, robot.tree)
     if sensor.form == "relative":
         reference = robot.sensors[str(sensor.reference)]
         assert isinstance(reference, Gyro)
         other = recording.streams[reference.name]
         nearest = _nearest(other.times, stream.times[chosen])
-        return RelativeGyroFactor(sensor, reference, robot.tree, values, other.values[nearest])
-    return GyroFactor(sensor, robot.tree, values)
+        return RelativeGyroFactor(sensor, values, robot.tree, reference, other.values[nearest])
+    return GyroFactor(sensor, values, robot.tree)
 
 
 def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:

@@ -187,7 +187,7 @@ def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration) 
     sensor = robot.sensors[name]
     nothing = np.zeros((len(x), len(sensor.channels)))
     if isinstance(sensor, Gyro):
-        return GyroFactor(sensor, robot.tree, nothing).residual((x,), calibration)
+        return GyroFactor(sensor, nothing, robot.tree).residual((x,), calibration)
     return MotorEncoderFactor(sensor, nothing).residual((x,), calibration)
 
 

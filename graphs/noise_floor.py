@@ -96,7 +96,7 @@ def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, 
     for sensor in problem.robot.sensors.values():
         nothing = np.zeros((len(x), len(sensor.channels)))
         factor = (
-            GyroFactor(sensor, problem.robot.tree, nothing)
+            GyroFactor(sensor, nothing, problem.robot.tree)
             if isinstance(sensor, Gyro)
             else MotorEncoderFactor(sensor, nothing)
         )

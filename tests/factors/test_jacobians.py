@@ -36,12 +36,12 @@ def _factors():
     fraction, h = rng.uniform(size=M), rng.uniform(5e-4, 2e-3, size=M)
     steps = {robot.name: Steps(h, rng.uniform(-1, 1, (M, 3)), robot.noise) for robot in (ROBOT, PAPER)}
     encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)))
-    gyro = GyroFactor(imu2, tree, rates)
+    gyro = GyroFactor(imu2, rates, tree)
     yield "encoder", encoder
-    yield "gyro on the first body", GyroFactor(imu1, tree, rates)
+    yield "gyro on the first body", GyroFactor(imu1, rates, tree)
     yield "gyro on the last body", gyro
-    yield "vertical gyro", VerticalGyroFactor(imu1, tree, rates)
-    yield "relative gyro", RelativeGyroFactor(imu2, imu1, tree, rates, other)
+    yield "vertical gyro", VerticalGyroFactor(imu1, rates, tree)
+    yield "relative gyro", RelativeGyroFactor(imu2, rates, tree, imu1, other)
     yield "bias at rest", BiasAtRestFactor(imu1, rates)
     yield "interpolated encoder", InterpolatedFactor(encoder, fraction, h)
     yield "interpolated gyro", InterpolatedFactor(gyro, fraction, h)
