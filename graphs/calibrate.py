@@ -21,6 +21,7 @@ from jointscope.graphs.calibration_result import CalibrationResult, IterationRec
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
+from jointscope.graphs.single_thread import single_thread
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.recording import Notice, Recording
@@ -46,6 +47,7 @@ class _History:
         self.records += [IterationRecord(stage, i.cost_after, i.damping, i.step_in_sigmas) for i in solution.iterations]
 
 
+@single_thread
 def calibrate(
     robot: Robot,
     recordings: Sequence[Recording],

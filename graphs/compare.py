@@ -33,6 +33,7 @@ from jointscope.graphs.comparison_result import (
 from jointscope.graphs.initial_guess import initial_biases
 from jointscope.graphs.noise_floor import floor_of
 from jointscope.graphs.prediction import Predictor
+from jointscope.graphs.single_thread import single_thread
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
@@ -60,6 +61,7 @@ class Ahead:
     predicted: Array
 
 
+@single_thread
 def compare(robots: Mapping[str, Robot], recording: Recording, *, progress: Progress | None = None) -> ComparisonResult:
     """Compares models with a recording.
 
