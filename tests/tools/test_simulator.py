@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from jointscope.robots.errors import EffectError, RobotError, SimulationError
+from jointscope.robots.errors import EffectError, JointscopeError, RobotError, SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
@@ -392,7 +392,7 @@ def test_the_verb_writes_a_bag_that_can_be_read_and_the_truth_beside_it(doggy, t
 
 
 def test_the_verb_leaves_nothing_behind_when_it_fails(tmp_path):
-    with pytest.raises(SimulationError, match=r"the folder .*nowhere does not exist"):
+    with pytest.raises(JointscopeError, match=r"train.mcap: the folder .*nowhere does not exist"):
         verb("doggy", "-o", str(tmp_path / "nowhere" / "train.mcap"))
     with pytest.raises(SimulationError, match=r"--set joint1\.stiffness: expected NAME=VALUE"):
         verb("doggy", "-o", str(tmp_path / "train.mcap"), "--set", "joint1.stiffness")

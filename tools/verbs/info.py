@@ -4,23 +4,15 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RecordingError
-from jointscope.robots.robot_file import load_robot
-from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.progress import progress_bar, reading
+from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope info calibration.mcap
   jointscope info calibration.mcap --robot doggy --json info.json"""
-
-QUIET_SECONDS = 2.0  # [s] shorter work needs no progress bar
 
 
 def add_parser(subparsers: Any) -> None:
@@ -40,36 +32,14 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
+    check_outputs([args.json], inputs=[args.bag])
+    from jointscope.robots.robot_file import load_robot
+    from jointscope.tools.bags.describe_bag import describe_bag
+
     robot = load_robot(args.robot) if args.robot else None
-    description = describe_bag(args.bag, robot, _progress_bar())
+    with progress_bar() as progress:
+        description = describe_bag(args.bag, robot, reading(args.bag, progress))
     if args.json is not None:
-        _write_json(args.json, description.to_json())
+        write_json(args.json, description.to_json())
     print(description.text())
     return 0
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    """Writes a file whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as err:
-        raise RecordingError(f"cannot write {path}: {err.strerror or err}") from err
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _progress_bar() -> Callable[[int, int], None] | None:
-    if not sys.stderr.isatty():
-        return None
-    begin = time.monotonic()
-
-    def show(done: int, total: int) -> None:
-        if time.monotonic() - begin < QUIET_SECONDS:
-            return
-        share = done / max(total, 1)
-        end = "\n" if done >= total else ""
-        print(f"\rreading [{'#' * round(30 * share):<30}] {share:4.0%}", end=end, file=sys.stderr, flush=True)
-
-    return show

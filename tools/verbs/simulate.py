@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import SimulationError
+from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.bags.write_bag import write_bag
+from jointscope.tools.progress import progress_bar
 from jointscope.tools.simulator import DEFAULT_SECONDS, Disturbance, Simulation, simulate, simulated_effects
+from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope simulate doggy -o train.mcap --seconds 20 --seed 3 --effect bearing_flexibility@joint1
@@ -74,9 +74,22 @@ def _add_sensor_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulates, writes bag, truth and JSON, and says what was done."""
+    truth_file = args.output.parent / f"{args.output.stem}.truth.json"
+    check_outputs([args.output if args.output.suffix else None, truth_file, args.json])
     robot = load_robot(args.robot)
-    _check_folders(args.output, args.json)
-    simulation = simulate(
+    with progress_bar() as progress:
+        simulation = _simulate(robot, args, lambda share: progress("simulating", share))
+    write_bag(args.output, simulation.recording, robot)
+    write_json(truth_file, simulation.truth)
+    summary = _summary(simulation, args.output, truth_file)
+    if args.json is not None:
+        write_json(args.json, summary)
+    print(_as_text(summary))
+    return 0
+
+
+def _simulate(robot: Robot, args: argparse.Namespace, progress: Callable[[float], None]) -> Simulation:
+    return simulate(
         robot,
         args.motion,
         args.seconds,
@@ -91,16 +104,8 @@ def run(args: argparse.Namespace) -> int:
         gyro_rate=args.gyro_rate,
         transport_delay=args.transport_delay * 1e-3,
         quantized=not args.white_encoder,
-        progress=_progress_bar(),
+        progress=progress,
     )
-    write_bag(args.output, simulation.recording, robot)
-    truth_file = args.output.parent / f"{args.output.stem}.truth.json"
-    _write_json(truth_file, simulation.truth)
-    summary = _summary(simulation, args.output, truth_file)
-    if args.json is not None:
-        _write_json(args.json, summary)
-    print(_as_text(summary))
-    return 0
 
 
 def _assignments(texts: Sequence[str]) -> dict[str, float]:
@@ -112,13 +117,6 @@ def _assignments(texts: Sequence[str]) -> dict[str, float]:
         except ValueError:
             raise SimulationError(f"--set {text}: expected NAME=VALUE, for example joint1.stiffness=180") from None
     return values
-
-
-def _check_folders(*files: Path | None) -> None:
-    """Complains before the work is done, not after."""
-    for file in files:
-        if file is not None and not file.parent.is_dir():
-            raise SimulationError(f"cannot write {file}: the folder {file.parent} does not exist")
 
 
 def _summary(simulation: Simulation, bag: Path, truth_file: Path) -> dict[str, Any]:
@@ -140,27 +138,3 @@ def _as_text(summary: dict[str, Any]) -> str:
         f"seed {truth['seed']}, {truth['friction']} friction\n"
         f"  effects: {effects}\n  samples: {samples}\n  truth:   {summary['truth_file']}"
     )
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    """Writes a file whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as err:
-        raise SimulationError(f"cannot write {path}: {err.strerror or err}") from err
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _progress_bar() -> Callable[[float], None] | None:
-    if not sys.stderr.isatty():
-        return None
-
-    def show(share: float) -> None:
-        bar = "#" * round(30 * share)
-        end = "\n" if share >= 1.0 else ""
-        print(f"\rsimulating [{bar:<30}] {share:4.0%}", end=end, file=sys.stderr, flush=True)
-
-    return show
