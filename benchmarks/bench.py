@@ -25,8 +25,9 @@ PACKAGES = ("jointscope", "numpy", "scipy", "gtsam", "pin", "mujoco", "numba", "
 
 def main() -> None:
     arguments = _parse()
-    print(f"# Benchmark{' (quick run)' if arguments.quick else ''}\n\n{environment()}\n", flush=True)
-    results: dict[str, Any] = {"environment": environment(), "quick": arguments.quick, "sections": {}}
+    surroundings = environment()
+    print(f"# Benchmark{' (quick run)' if arguments.quick else ''}\n\n{surroundings}\n", flush=True)
+    results: dict[str, Any] = {"environment": surroundings, "quick": arguments.quick, "sections": {}}
     for name in arguments.sections or SECTIONS:
         say(f"section {name}")
         started = time.perf_counter()
@@ -39,7 +40,7 @@ def main() -> None:
 
 
 def environment() -> str:
-    """Cores, Python and package versions in one line."""
+    """Cores, load, Python and package versions in one line."""
     versions = []
     for package in PACKAGES:
         try:
@@ -47,7 +48,9 @@ def environment() -> str:
         except importlib.metadata.PackageNotFoundError:
             versions.append(f"{package} not installed")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return f"{cores} cores, {platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}"
+    # other work on the machine makes every time below longer; the load tells
+    load = f"load {os.getloadavg()[0]:.1f} at the start, " if hasattr(os, "getloadavg") else ""
+    return f"{cores} cores, {load}{platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}"
 
 
 def _parse() -> argparse.Namespace:
@@ -56,9 +59,7 @@ def _parse() -> argparse.Namespace:
         description="Prints what was promised beside what is measured; example: bench.py speed reading --quick",
     )
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=f"any of {', '.join(SECTIONS)}; all by default")
-    parser.add_argument(
-        "--quick", action="store_true", help="short recordings: minutes instead of an hour, no verdicts"
-    )
+    parser.add_argument("--quick", action="store_true", help="short recordings, a few minutes in all")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
     arguments = parser.parse_args()
     unknown = [name for name in arguments.sections if name not in SECTIONS]

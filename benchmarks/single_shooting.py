@@ -86,10 +86,12 @@ class SingleShooting:
         biases = np.concatenate([calibration.biases[gyro.name] for gyro in self._robot.gyros])
         return np.concatenate([calibration.dynamics, np.zeros(3), biases, np.zeros(6)])
 
-    def fit(self, start: Array) -> Shot:
-        """Least squares from a start."""
+    def fit(self, start: Array, method: str) -> Shot:
+        """Least squares from a start with a method of scipy: "lm" (MINPACK) or "trf" (trust region)."""
         started = time.perf_counter()
-        found = least_squares(self.residuals, start, self.jacobian, x_scale="jac", max_nfev=MOST_EVALUATIONS)
+        found = least_squares(
+            self.residuals, start, self.jacobian, method=method, x_scale="jac", max_nfev=MOST_EVALUATIONS
+        )
         seconds = time.perf_counter() - started
         rms = float(np.sqrt(np.mean(found.fun**2)))
         parameters = np.exp(found.x[:PARAMETERS])

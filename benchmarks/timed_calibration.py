@@ -33,6 +33,7 @@ def main(path: str) -> None:
         "state_unknowns": result.bags[0].states.size,
         "iterations": len(result.iterations),
         "parameters": {name: result.robot.parameters[name].value for name in robot.parameters},
+        "sigmas": {name: result.robot.parameters[name].sigma for name in robot.parameters},
     }
     print(json.dumps(took))
 
