@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the three dynamics factors share: the steps between ticks, their commands and their noise.
 
-Variables: X(k), X(k+1), dynamics. The residual of step k has two halves: velocities d_v and positions
-d_q - (h/2) d_v. White noise on the velocities with density s makes the two halves independent, with standard
+Variables: X(k), X(k+1), dynamics. Disturbances are torques: the link rows are turned from velocities into impulses by
+the mass matrix at the measured angles (a known weight W, stated on the mean inertia of each joint so that it keeps the
+unit of a velocity). The residual of step k has two halves: velocities d_v and positions d_q - (h/2) d_v. White noise on the velocities with density s makes the two halves independent, with standard
 deviations s sqrt(h) and s h sqrt(h/12); so the positions follow from the velocities and need no noise of their own.
 With `independent` position noise (eq. 36 of Schuethe et al. 2016) the second half is d_q itself.
 """
@@ -28,18 +29,21 @@ class Steps:
         h: length of each step, shape (m,) [s].
         u: command that acts during each step, shape (m, n), SI unit of the command.
         noise: densities of the process noise.
+        weight: W of each step, shape (m, n, n); None for the identity.
     """
 
     h: Array
     u: Array
     noise: ProcessNoise
+    weight: Array | None = None
 
     def __len__(self) -> int:
         return len(self.h)
 
     def select(self, samples: Samples) -> Steps:
         """Some of the steps."""
-        return Steps(self.h[samples], self.u[samples], self.noise)
+        weight = None if self.weight is None else self.weight[samples]
+        return Steps(self.h[samples], self.u[samples], self.noise, weight)
 
     @property
     def integrated(self) -> bool:
@@ -61,7 +65,16 @@ class Steps:
         if not self.integrated:
             return np.concatenate([d_v, d_q], axis=1)
         half = (0.5 * self.h).reshape(-1, *([1] * (d_v.ndim - 1)))
-        return np.concatenate([d_v, d_q - half * d_v], axis=1)
+        return np.concatenate([self._weighted(d_v), self._weighted(d_q - half * d_v)], axis=1)
+
+    def _weighted(self, defect: Array) -> Array:
+        """Link rows as impulses on the mean inertia, motor rows as they are."""
+        if self.weight is None:
+            return defect
+        n = self.weight.shape[1]
+        columns = defect[:, :n].reshape(len(defect), n, -1)
+        link = (self.weight @ columns).reshape(defect[:, :n].shape)
+        return np.concatenate([link, defect[:, n:]], axis=1)
 
 
 def row_names(joints: tuple[str, ...]) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ class BagProblem:
     def of(robot: Robot, recording: Recording) -> BagProblem:
         """Builds the factors of a recording."""
         timeline = Timeline.of(recording)
-        steps = Steps(timeline.h, timeline.u, robot.noise)
+        steps = Steps(timeline.h, timeline.u, robot.noise, _impulse_weights(robot, recording, timeline))
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         initial = InitialStateFactor(robot.joints, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA)
@@ -109,6 +109,17 @@ class BagProblem:
     def sensors(self) -> tuple[Placed, ...]:
         """The factors that hold measurements of states."""
         return tuple(p for p in self.placed if p.factor.name in self.robot.sensors)
+
+
+def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> Array:
+    """M(q) of every step over the mean inertia of each joint, shape (m, n, n); q from the motor encoders."""
+    encoder = recording.streams[robot.motor_encoder.name]
+    middle = timeline.ticks[:-1] + 0.5 * timeline.h
+    angles = [np.interp(middle, encoder.times, column) for column in encoder.values.T]
+    M = robot.tree.mass_matrix(np.column_stack(angles) - robot.motor_encoder.zero)
+    M_at_zero = robot.tree.mass_matrix(np.zeros((1, robot.n)))[0]
+    alone = 1.0 / np.diag(np.linalg.inv(M_at_zero))
+    return M / alone[:, None]
 
 
 def first_command_time(recording: Recording) -> float:

@@ -43,12 +43,13 @@ class ModelChoices:
 
 @dataclass(frozen=True)
 class ProcessNoise:
-    """Random walk of the velocities between ticks.
+    """Random torques, as the random walk of the velocities that they cause.
 
     Attributes:
         estimate: whether a calibration estimates the densities.
         model: "integrated" (the positions follow from the velocities) or "independent" (eq. 36).
-        link_velocity: density of each link equation, shape (n_joints,) [rad/s/sqrt(s)].
+        link_velocity: density of the torque on each link over the joint's inertia at zero angles, shape (n_joints,)
+            [rad/s/sqrt(s)].
         motor_velocity: density of each motor equation, shape (n_joints,) [rad/s/sqrt(s)].
         position: density of the positions for model "independent" [rad/sqrt(s)].
     """

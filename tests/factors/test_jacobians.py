@@ -34,7 +34,9 @@ def _factors():
     tree = ROBOT.tree
     rates, other = rng.normal(size=(M, 3)), rng.normal(size=(M, 3))
     fraction, h = rng.uniform(size=M), rng.uniform(5e-4, 2e-3, size=M)
-    steps = {robot.name: Steps(h, rng.uniform(-1, 1, (M, 3)), robot.noise) for robot in (ROBOT, PAPER)}
+    weight = ROBOT.tree.mass_matrix(rng.normal(size=(M, 3)))
+    u = rng.uniform(-1, 1, (M, 3))
+    steps = {"doggy": Steps(h, u, ROBOT.noise, weight), "doggy_paper": Steps(h, u, PAPER.noise)}
     encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)))
     gyro = GyroFactor(imu2, rates, tree)
     yield "encoder", encoder
