@@ -20,7 +20,7 @@ from jointscope.graphs.initial_guess import initial_states
 from jointscope.graphs.normal_equations import build
 from jointscope.graphs.reference_graph import initial_values, nonlinear_graph
 from jointscope.graphs.shared_layout import SharedLayout
-from jointscope.graphs.single_thread import single_thread
+from jointscope.graphs.solver_context import in_solver_context
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
@@ -45,7 +45,7 @@ class Cost:
         return self.linearize + self.eliminate
 
 
-@single_thread
+@in_solver_context
 def near_solution(robot: Robot, recording: Recording) -> tuple[BagProblem, Estimate]:
     """A problem and a point near its minimum, where one iteration costs what it costs in the end."""
     problem = BagProblem.of(robot, recording)
@@ -54,7 +54,7 @@ def near_solution(robot: Robot, recording: Recording) -> tuple[BagProblem, Estim
     return problem, solve([problem], start, max_iterations=2).estimate
 
 
-@single_thread
+@in_solver_context
 def batch_iteration(problem: BagProblem, estimate: Estimate, repeats: int = 3) -> Cost:
     """One iteration of the batch solver; the fastest of some."""
     costs = []

@@ -16,7 +16,7 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Estimate, NewtonStep, Solution, newton_step, priors_of
 from jointscope.graphs.normal_equations import Linearized, accumulate, linearize_all, whitened
 from jointscope.graphs.shared_layout import SharedLayout
-from jointscope.graphs.single_thread import single_thread
+from jointscope.graphs.solver_context import in_solver_context
 
 REPEATS = 3
 
@@ -40,7 +40,7 @@ class EliminationTimes:
     difference: float
 
 
-@single_thread  # as in `calibrate`; GTSAM does not use BLAS
+@in_solver_context  # as in `calibrate`; GTSAM does not use BLAS
 def measure(problem: BagProblem, estimate: Estimate) -> EliminationTimes:
     """Solves one linear system in both ways."""
     x, calibration = estimate.states[0], estimate.calibrations[0]

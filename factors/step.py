@@ -3,9 +3,10 @@
 
 Variables: X(k), X(k+1), dynamics. Disturbances are torques: the link rows are turned from velocities into impulses by
 the mass matrix at the measured angles (a known weight W, stated on the mean inertia of each joint so that it keeps the
-unit of a velocity). The residual of step k has two halves: velocities d_v and positions d_q - (h/2) d_v. White noise on the velocities with density s makes the two halves independent, with standard
-deviations s sqrt(h) and s h sqrt(h/12); so the positions follow from the velocities and need no noise of their own.
-With `independent` position noise (eq. 36 of Schuethe et al. 2016) the second half is d_q itself.
+unit of a velocity). The residual of step k has two halves: velocities d_v and positions d_q - (h/2) d_v. White noise on
+the velocities with density s makes the two halves independent, with standard deviations s sqrt(h) and s h sqrt(h/12);
+so the positions follow from the velocities and need no noise of their own. With `independent` position noise (eq. 36 of
+Schuethe et al. 2016) the second half is d_q itself.
 """
 
 from __future__ import annotations

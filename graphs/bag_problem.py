@@ -95,7 +95,7 @@ class BagProblem:
             placed += _place_sensor(robot, recording, timeline, name)
         for gyro in robot.gyros:
             placed.append(_without_states(BiasPrior(gyro), 1))
-            if robot.choices.bias_at_rest:
+            if robot.choices.bias_at_rest and rests:
                 resting = recording.streams[gyro.name].between(-np.inf, first_command_time(recording))
                 if len(resting):
                     placed.append(_without_states(BiasAtRestFactor(gyro, resting.values), len(resting)))
@@ -129,8 +129,8 @@ def first_command_time(recording: Recording) -> float:
     return float(command.times[moving[0]] if len(moving) else command.times[-1])
 
 
-def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.05) -> bool:
-    """Whether commands are zero and the encoders still for the first `window` seconds."""
+def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.1) -> bool:
+    """Whether commands are zero, encoders and gyros still for the first `window` seconds."""
     encoder = recording.streams[robot.motor_encoder.name]
     t0 = float(max(encoder.times[0], recording.command.times[0]))
     if first_command_time(recording) < t0 + window:
@@ -138,9 +138,19 @@ def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.05) -> 
     part = encoder.between(t0, t0 + window)
     if len(part) < 4:
         return False
+    still = bool(np.all(_drift(part) < 4.0 * robot.motor_encoder.sigma))
+    # friction may hold the motors while the links swing: the gyros must be still, too
+    gyros = [(gyro, recording.streams[gyro.name].between(t0, t0 + window)) for gyro in robot.gyros]
+    return still and all(
+        len(part) < 6 or bool(np.all(_drift(part) < 5.0 * gyro.sigma * np.sqrt(6.0 / len(part))))
+        for gyro, part in gyros
+    )
+
+
+def _drift(part: Stream) -> Array:
+    """Change of the mean from the first to the last third, shape (c,)."""
     third = max(len(part) // 3, 1)
-    drift = np.abs(part.values[-third:].mean(axis=0) - part.values[:third].mean(axis=0))
-    return bool(np.all(drift < 4.0 * robot.motor_encoder.sigma))
+    return np.abs(part.values[-third:].mean(axis=0) - part.values[:third].mean(axis=0))
 
 
 def _without_states(factor: Factor, m: int) -> Placed:

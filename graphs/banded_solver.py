@@ -79,7 +79,8 @@ def eliminate(system: NormalEquations, damping: float = 0.0) -> Elimination:
         tick, component = divmod(info - 1, d)
         raise SolveError(
             f"the state at tick {tick} (component {component} of {d}) is not determined by the recording: "
-            "its Hessian is not positive definite; check that encoder and gyro samples cover the whole recording"
+            "its Hessian is not positive definite; either no sample sees it, or the estimate ran away because "
+            "the model contradicts the recording (a wrong sign, axis or unit, a sensor that stopped)"
         )
     _check(info)
     right = np.empty((m * d, p + 1), order="F")

@@ -29,6 +29,7 @@ LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 LAMBDA_LARGEST = 1e8
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
+SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
 COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 
 
@@ -131,7 +132,8 @@ def solve(
         fall = (solution.cost - step.cost) / max(solution.cost, 1e-300)
         solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
         solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
-        small = _remaining(solution.iterations) < step_tolerance and fall < 1e-3
+        arrived = step.in_sigmas < step_tolerance and _remaining(solution.iterations) < SLOW * step_tolerance
+        small = arrived and fall < 1e-3
         if small or (fall < COST_TOLERANCE and damping <= LAMBDA_START):
             solution.converged = True
             break
@@ -196,12 +198,12 @@ def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str]
 
 
 def _remaining(iterations: Sequence[Iteration]) -> float:
-    """How far the minimum may still be, in sigmas: the last step, or more where steps shrink slowly."""
+    """How far the minimum may still be, in sigmas, if the steps go on shrinking as the last one did."""
     last = iterations[-1].step_in_sigmas
     if len(iterations) < 2:
         return last
-    ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.99)
-    return last * max(1.0, ratio / (1.0 - ratio))
+    ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.97)
+    return last * ratio / (1.0 - ratio)
 
 
 def _stuck(solution: Solution, step: _Trial, step_tolerance: float) -> Solution:
@@ -274,6 +276,8 @@ def _solve_shared(H: Array, g: Array, free: NDArray[np.intp], damping: float) ->
     if len(free) == 0:
         return dp, 0.0
     block = H[np.ix_(free, free)]
+    if not (np.all(np.isfinite(block)) and np.all(np.isfinite(g))):
+        raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
     try:
         factor = cho_factor(block + damping * np.diag(np.diag(block)))
     except np.linalg.LinAlgError as err:

@@ -21,7 +21,7 @@ from jointscope.graphs.calibration_result import CalibrationResult, IterationRec
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
-from jointscope.graphs.single_thread import single_thread
+from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.recording import Notice, Recording
@@ -35,6 +35,7 @@ APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approach
 NOISE_AGREES = 0.25  # relative difference of windows and whole recording that asks for no second pass
 MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
 WINDOW_ITERATIONS = 12
+SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
 
 
 @dataclass
@@ -47,7 +48,7 @@ class _History:
         self.records += [IterationRecord(stage, i.cost_after, i.damping, i.step_in_sigmas) for i in solution.iterations]
 
 
-@single_thread
+@in_solver_context
 def calibrate(
     robot: Robot,
     recordings: Sequence[Recording],
@@ -74,8 +75,11 @@ def calibrate(
     problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = _History([])
-    noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
-    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
+    try:
+        noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
+        solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
+    except SolveError as err:
+        raise SolveError(_with_suspicions(str(err), recordings, notices)) from err
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -89,6 +93,13 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
     """
     if not recordings:
         raise RecordingError("no recording given; pass at least one bag")
+    seen: dict[str, str] = {}
+    for recording in recordings:
+        if recording.sha256 and seen.setdefault(recording.sha256, recording.path) is not recording.path:
+            raise RecordingError(
+                f"{recording.path} is the same recording as {seen[recording.sha256]}; give every recording once, "
+                "or its samples count twice"
+            )
     notices = [notice for recording in recordings for notice in screen(recording, robot)]
     resting = set(robot.joints)
     for recording in recordings:
@@ -101,6 +112,13 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
             "add a recording in which it moves"
         )
     return notices
+
+
+def _with_suspicions(message: str, recordings: Sequence[Recording], notices: Sequence[Notice]) -> str:
+    """A failure together with what the reader and the screening saw, which often is the reason."""
+    everything = [*notices, *(notice for recording in recordings for notice in recording.notices)]
+    texts = dict.fromkeys(notice.text for notice in everything if notice.kind in SUSPICIOUS)
+    return "; ".join([message, *list(texts)[:3]])
 
 
 def _windows_stage(

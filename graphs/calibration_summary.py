@@ -105,7 +105,7 @@ def summarize(
     collected = solved.residuals
     factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
     covariance = solved.covariance * np.outer(factor, factor)
-    bags = tuple(_bag_fit(solved, i, c) for i, c in enumerate(collected))
+    bags = tuple(_bag_fit(solved, i, c, factor) for i, c in enumerate(collected))
     names = _names(robot, solution.estimate.calibrations[0], shared.bags)
     sigmas = np.sqrt(np.diag(covariance))
     calibration = solution.estimate.calibrations[0]
@@ -160,8 +160,11 @@ def _one(part: ResidualPart) -> Array:
     return np.array([np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)])
 
 
-def _bag_fit(solved: Solved, i: int, collector: BagResiduals) -> BagFit:
+def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
     problem, solution = solved.problems[i], solved.solution
+    widening = factor[solution.shared.indices(i)]
+    posterior = solved.posteriors[i]
+    posterior = replace(posterior, shared=posterior.shared * np.outer(widening, widening))
     residuals = {}
     for name, sensor in problem.robot.sensors.items():
         if collector.series[name]:
@@ -175,7 +178,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals) -> BagFit:
         ticks=problem.timeline.ticks,
         commands=np.vstack([u, u[-1:]]),
         states=solution.estimate.states[i],
-        sigmas=solved.posteriors[i].sigmas,
+        sigmas=posterior.sigmas,
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,

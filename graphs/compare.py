@@ -31,9 +31,9 @@ from jointscope.graphs.comparison_result import (
     WorstWindow,
 )
 from jointscope.graphs.initial_guess import initial_biases
-from jointscope.graphs.noise_floor import floor_of
+from jointscope.graphs.noise_floor import floor_of, settled_from
 from jointscope.graphs.prediction import Predictor
-from jointscope.graphs.single_thread import single_thread
+from jointscope.graphs.solver_context import in_solver_context
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
@@ -61,7 +61,7 @@ class Ahead:
     predicted: Array
 
 
-@single_thread
+@in_solver_context
 def compare(robots: Mapping[str, Robot], recording: Recording, *, progress: Progress | None = None) -> ComparisonResult:
     """Compares models with a recording.
 
@@ -118,7 +118,8 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     """
     check_recordings(robot, [recording], every_joint=False)
     robot = robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})
-    calibrated = any(parameter.sigma is not None for parameter in robot.parameters.values())
+    sigmas = [parameter.sigma for parameter in robot.parameters.values()]
+    calibrated = "calibration" in robot.document or any(sigma is not None for sigma in sigmas)
     if robot.noise.estimate and not calibrated:
         result = calibrate(robot, [recording], biases_only=True)
         problem = BagProblem.of(replace(robot, noise=result.noise), recording)
@@ -138,7 +139,7 @@ def _predict_ahead(
     ticks, h = timeline.ticks, float(np.median(timeline.h))
     stride = max(round(SPACING[horizon] / h), 1)
     longest = int(np.ceil((horizon + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
-    start = np.arange(0, len(ticks) - 1 - longest, stride)
+    start = np.arange(np.searchsorted(ticks, settled_from(problem)), len(ticks) - 1 - longest, stride)
     if len(start) == 0:
         return {
             name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))))

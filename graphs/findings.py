@@ -10,7 +10,7 @@ import numpy as np
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.robots.recording import Notice
 
-CHI2_LOW, CHI2_HIGH = 0.8, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
+CHI2_LOW, CHI2_HIGH = 0.6, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
 COLOURED = 1.5  # block-robust over plain sigma from which a value counts as widened
 SEVERAL = 0.25  # share of widened values from which residuals are called coloured; a few widen by chance
 
@@ -51,7 +51,7 @@ def _sensor_noise(result: CalibrationResult) -> list[str]:
     reason = (
         "the model lacks something that these channels see, or their sigma in the robot file is too small"
         if too_large
-        else "their sigma in the robot file is larger than their noise"
+        else "smaller than stated, as that of a quantized encoder at rest, or the states follow the noise"
     )
     return [f"residuals do not have the stated size on {listed}: {reason}"]
 

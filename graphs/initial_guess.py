@@ -20,12 +20,14 @@ from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 SMOOTHING = 0.008  # [s] window over which encoders are differentiated
 LEAK = 0.2  # [s] time after which a deflection from integrated gyro rates is forgotten
+OPPOSITE = 20.0  # [sigma] a drive constant below minus this is a wrong sign
 BAND = (0.5, 10.0)  # [Hz] the regression uses motion between these frequencies
 
 
@@ -119,6 +121,8 @@ def _regress(
     scale = np.sqrt(np.mean(regressors**2, axis=0))
     if np.any(scale == 0.0):
         return
+    if "k_pwm" in laws:
+        _check_sign(joint, regressors / scale, target)
     values, _ = nnls(regressors / scale, target)
     for law, value, size in zip(laws, values / scale, scale, strict=True):
         parameter = (
@@ -128,6 +132,20 @@ def _regress(
         )
         if value > 0.0 and not parameter.fixed:
             found.setdefault(parameter.name, []).append((float(value), float(value * size)))
+
+
+def _check_sign(joint: str, regressors: Array, target: Array) -> None:
+    """A motor that turns against its command is a wiring or file mistake, not a parameter."""
+    values, _, rank, _ = np.linalg.lstsq(regressors, target, rcond=None)
+    if rank < regressors.shape[1]:
+        return
+    spread = float(np.std(target - regressors @ values))
+    sigma = spread * np.sqrt(np.linalg.inv(regressors.T @ regressors)[0, 0])
+    if values[0] < -OPPOSITE * sigma and spread < 0.7 * float(np.std(target)):
+        raise RecordingError(
+            f"{joint} moves against its command ({-values[0] / sigma:.0f} sigma): the sign of the command or of the "
+            "encoder is wrong; check the joint's axis in the URDF and the names and fields of the topics"
+        )
 
 
 def _with_values(calibration: Calibration, found: dict[str, list[tuple[float, float]]]) -> Calibration:

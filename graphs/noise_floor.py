@@ -27,8 +27,19 @@ Array = NDArray[np.float64]
 BLOCK = 0.5  # [s]
 QUIET = 0.25  # quantile of the blocks
 SETTLING = 0.5  # [s] of motion after which the filter knows the deflection
-STARTS = 150  # predictions over which the floor is averaged
+STARTS = 400  # predictions over which the floor is averaged
 FEWEST_FREE = 5.0  # degrees of freedom below which a block says nothing about its noise
+
+
+def settled_from(problem: BagProblem) -> float:
+    """Time from which predictions are scored [s]: the filter has seen half a second of motion.
+
+    At rest friction hides the deflection, and after a start in motion the filter has to find it first; no prediction
+    can know it before. At least half of the recording is always scored.
+    """
+    ticks = problem.timeline.ticks
+    motion = first_command_time(problem.recording) if problem.rests else float(ticks[0])
+    return min(motion + SETTLING, 0.5 * float(ticks[0] + ticks[-1]))
 
 
 def floor_of(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> float:
@@ -43,9 +54,7 @@ def floor_of(problem: BagProblem, x: Array, calibration: Calibration, horizon: f
     quiet = problem.with_noise(scaled(problem.dynamics.steps.noise, _quiet_factors(problem, x, calibration)))
     filtered = filter_around(quiet, x, calibration)
     steps = max(round(horizon / float(np.median(problem.timeline.h))), 1)
-    ticks = problem.timeline.ticks
-    # at rest friction hides the deflection; no prediction can know it before the first motion
-    first = int(np.searchsorted(ticks, first_command_time(problem.recording) + SETTLING))
+    first = int(np.searchsorted(problem.timeline.ticks, settled_from(problem)))
     last = max(len(x) - 2 - steps, 0)
     start = np.unique(np.linspace(min(first, last), last, STARTS).astype(int))
     P = filtered.covariance[start]

@@ -176,7 +176,7 @@ def _accumulate_shared(
     system: NormalEquations, r: Array, by_block: dict[str, Array], columns: dict[str, slice]
 ) -> None:
     """Corner and gradient of the shared values."""
-    flat = {block: P.reshape(-1, P.shape[2]) for block, P in by_block.items()}
+    flat = {block: P.reshape(P.shape[0] * P.shape[1], P.shape[2]) for block, P in by_block.items()}
     for a, P_a in flat.items():
         system.g_p[columns[a]] += P_a.T @ r.ravel()
         for b, P_b in flat.items():

@@ -15,6 +15,7 @@ from jointscope.graphs.bag_problem import first_command_time
 from jointscope.robots.recording import Recording
 
 WINDOW = 0.8  # [s]
+FEWEST_SAMPLES = 10  # of every sensor; a window inside a gap is left out
 TOTAL = 6.4  # [s] all windows together
 
 
@@ -33,5 +34,9 @@ def windows_of(recordings: Sequence[Recording]) -> list[tuple[int, Recording]]:
             pieces.append((i, recording))
             continue
         starts = np.linspace(start, end - WINDOW, count)
-        pieces += [(i, recording.between(float(t), float(t) + WINDOW)) for t in starts]
+        cut = [recording.between(float(t), float(t) + WINDOW) for t in starts]
+        full = [
+            piece for piece in cut if all(len(s) >= FEWEST_SAMPLES for n, s in piece.streams.items() if n != "command")
+        ]
+        pieces += [(i, piece) for piece in full or [recording]]
     return pieces

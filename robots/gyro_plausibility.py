@@ -145,7 +145,7 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         f"{gyro.name}: the axes seem swapped or flipped against R_imu_body: {wrong}; as it stands "
         f"{100 * expected:.0f} % of the signal do not fit, with those axes {100 * best:.0f} %"
     )
-    return [Notice(gyro.name, "info", 0, text)]
+    return [Notice(gyro.name, "axes", 0, text)]
 
 
 Axes = tuple[tuple[int, int], ...]

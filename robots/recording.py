@@ -51,7 +51,7 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "duplicate", "out_of_order", "gap", "jitter", "clipping", "dropped", "unit", "info".
+        kind: one of "duplicate", "out_of_order", "gap", "jitter", "clipping", "dropped", "unit", "axes", "info".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """
@@ -98,6 +98,18 @@ class Recording:
         return sum(len(s) for s in self.streams.values())
 
     def between(self, t0: float, t1: float) -> Recording:
-        """The part with t0 <= time < t1 [s], on the same time axis."""
+        """The part with t0 <= time < t1 [s], on the same time axis; the command that acts at t0 comes along."""
         streams = {name: stream.between(t0, t1) for name, stream in self.streams.items()}
+        before = int(np.searchsorted(self.command.times, t0)) - 1
+        held = streams["command"]
+        if before >= 0 and not (len(held) and held.times[0] == t0):
+            received = None if held.received is None else np.append(t0, held.received)
+            streams["command"] = Stream(
+                held.name,
+                np.append(t0, held.times),
+                np.vstack([self.command.values[before], held.values]),
+                held.channels,
+                held.unit,
+                received,
+            )
         return Recording(self.path, self.sha256, self.start_ns, streams, self.notices)

@@ -6,7 +6,9 @@ All functions take many samples at once; where pinocchio has no call for many, i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +57,9 @@ class RigidTree:
     @property
     def limits(self) -> Array:
         """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none."""
-        return np.column_stack([self.model.lowerPositionLimit, self.model.upperPositionLimit])
+        lower, upper = np.array(self.model.lowerPositionLimit), np.array(self.model.upperPositionLimit)
+        given = upper > lower
+        return np.column_stack([np.where(given, lower, -np.inf), np.where(given, upper, np.inf)])
 
     @property
     def velocity_limits(self) -> Array:
@@ -134,6 +138,15 @@ class RigidTree:
             R[k], p[k] = pose.rotation, pose.translation
         return R, p
 
+    def joints_below(self, body: str) -> tuple[int, ...]:
+        """Indices of the joints between the base and a link, base first."""
+        joint = self.model.frames[self.frame_id(body)].parentJoint
+        found = []
+        while joint > 0:
+            found.append(int(joint) - 1)
+            joint = self.model.parents[joint]
+        return tuple(found[::-1])
+
     def frame_id(self, body: str) -> int:
         """Index of a link in pinocchio's frames."""
         if body not in self.bodies:
@@ -157,9 +170,27 @@ def _read_urdf(urdf: Path) -> pin.Model:
     if not urdf.is_file():
         raise RobotError(f"the URDF {urdf} does not exist; set `urdf` in the robot file, relative to that file")
     try:
-        return pin.buildModelFromUrdf(str(urdf))
+        with _quiet_stderr():
+            return pin.buildModelFromUrdf(str(urdf))
     except Exception as err:
         raise RobotError(f"{urdf} is not a URDF that pinocchio can read: {str(err).splitlines()[0]}") from err
+
+
+@contextlib.contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    """Keeps the parser's own lines, written from C++, off the screen; its exception says the same."""
+    try:
+        saved = os.dup(2)
+    except OSError:
+        yield  # there is no stderr to keep quiet
+        return
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
 
 
 def _reduce(model: pin.Model, joints: tuple[str, ...], urdf: Path) -> pin.Model:

@@ -30,11 +30,38 @@ def check_robot(robot: Robot) -> None:
             raise RobotError(
                 f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
             )
+    _check_names(robot, place)
+    _check_gyro_forms(robot, place)
     if not any(isinstance(sensor, MotorEncoder) for sensor in robot.sensors.values()):
         raise RobotError(f"{place}: sensors: none of kind motor_encoder; the motor positions are needed")
     if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
         raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
     _check_parameters(robot, place)
+
+
+def _check_names(robot: Robot, place: str) -> None:
+    """Sensors have names of their own, and there is one motor encoder."""
+    taken = {"command", "motor", "robot", *robot.joints}
+    for name in robot.sensors:
+        if name in taken:
+            raise RobotError(f"{place}: sensors.{name}: the name {name!r} is taken; give the sensor another one")
+    encoders = [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder)]
+    if len(encoders) > 1:
+        raise RobotError(f"{place}: sensors: expected one of kind motor_encoder, got {', '.join(encoders)}")
+
+
+def _check_gyro_forms(robot: Robot, place: str) -> None:
+    """The forms of the paper hold only where the first joint, and no other, moves the gyro or its reference."""
+    by_name = {gyro.name: gyro for gyro in robot.gyros}
+    for gyro in robot.gyros:
+        seat = (
+            gyro if gyro.form == "vertical" else by_name.get(str(gyro.reference)) if gyro.form == "relative" else None
+        )
+        if seat is not None and robot.tree.joints_below(seat.body) != (0,):
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.form: {gyro.form} needs {seat.name} on the body that {robot.joints[0]} "
+                f"moves, got {seat.body!r}; use form full"
+            )
 
 
 def _check_parameters(robot: Robot, place: str) -> None:

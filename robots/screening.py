@@ -16,6 +16,7 @@ from jointscope.robots.units import UNITS, si_factor, si_unit
 Array = NDArray[np.float64]
 
 MIN_SECONDS = 0.3  # [s]
+FROZEN_SAMPLES, FROZEN_SECONDS = 20, 0.1  # [1], [s] a gyro does not repeat itself that often by chance
 MIN_SAMPLES = 100  # of each sensor
 MOVED_SIGMAS = 20.0  # an encoder that spans less than this many sigmas shows noise, not motion
 MOVED_ANGLE = 1e-3  # [rad]
@@ -50,6 +51,8 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
     for name in robot.sensors:
         _check_changes(recording, recording.streams[name], robot)
+    for gyro in robot.gyros:
+        _check_frozen(recording.streams[gyro.name])
     notices += _check_limits(motion, robot)
     notices += _check_motion(recording, robot, every_joint)
     return notices + check_gyros(recording, robot, motion)
@@ -77,6 +80,23 @@ def _check_samples(stream: Stream) -> None:
             )
     if stream.name != "command" and len(stream) < MIN_SAMPLES:
         raise RecordingError(f"{stream.name} is too short: {len(stream)} samples; expected at least {MIN_SAMPLES}")
+
+
+def _check_frozen(stream: Stream) -> None:
+    """A gyro whose noise stops repeats its last sample: the sensor or its driver has died."""
+    same = np.all(stream.values[1:] == stream.values[:-1], axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    starts, stops = edges[::2], edges[1::2]
+    if len(starts) == 0:
+        return
+    lengths = stops - starts
+    longest = int(np.argmax(lengths))
+    t0, t1 = float(stream.times[starts[longest]]), float(stream.times[stops[longest]])
+    if lengths[longest] >= FROZEN_SAMPLES and t1 - t0 > FROZEN_SECONDS:
+        raise RecordingError(
+            f"{stream.name} repeats one sample from {t0:.3f} to {t1:.3f} s: the sensor has stopped; use the part of "
+            "the recording before or after it"
+        )
 
 
 def _check_overlap(recording: Recording) -> list[Notice]:

@@ -34,7 +34,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises:
         JointscopeError: the file cannot be written: no such folder, no permission, disk full.
     """
-    target = Path(path)
+    target = _final_target(Path(path))
     unfinished = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
         yield unfinished
@@ -82,6 +82,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[str | Path] =
         if place in taken:
             raise JointscopeError(f"cannot write {path}: it {taken[place]}; give it another name")
         taken[place] = "is named for two outputs"
+        _final_target(path)
         if path.is_dir():
             raise JointscopeError(f"cannot write {path}: it is a folder; expected the name of a file")
         if not path.parent.is_dir():
@@ -91,6 +92,14 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[str | Path] =
                 pass
         except OSError as err:
             raise JointscopeError(_cannot_write(path, err)) from err
+
+
+def _final_target(path: Path) -> Path:
+    """The file behind a link; devices and pipes are refused, because moving a file there would replace them."""
+    target = path.resolve() if path.is_symlink() else path
+    if target.exists() and not target.is_file() and not target.is_dir():
+        raise JointscopeError(f"cannot write {path}: it is a device or a pipe; expected the name of a file")
+    return target
 
 
 def _plain(content: Any) -> Any:

@@ -67,7 +67,7 @@ def test_batched_cost_equals_the_cost_of_the_gtsam_graph(name, simulated):
 
 def test_batched_solver_ends_where_gtsam_ends(moving):
     problems, start = moving
-    fast = solve(problems, start, max_iterations=60, step_tolerance=1e-6)
+    fast = solve(problems, start, max_iterations=200, step_tolerance=1e-6)
     slow, slow_cost = solve_with_gtsam(problems, start)
     assert fast.cost == pytest.approx(slow_cost, rel=1e-6)
     _, covariance = posteriors(problems, fast)

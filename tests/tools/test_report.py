@@ -177,7 +177,7 @@ def test_a_burst_in_the_dynamics_is_found_at_its_time(result):
     process = bag.process.copy()
     process[1500:1550, 1] *= 40.0
     judgement = judge(dataclasses.replace(result, bags=(dataclasses.replace(bag, process=process),)))
-    assert judgement.checks[2].level == "bad"
+    assert judgement.checks[2].level in ("warn", "bad")
     assert "joint2 link equation, around 1.5 s" in judgement.checks[2].text
 
 
