@@ -35,6 +35,7 @@ APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approach
 NOISE_AGREES = 0.25  # relative difference of windows and whole recording that asks for no second pass
 MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
 WINDOW_ITERATIONS = 12
+NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
 SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
 
 
@@ -170,7 +171,7 @@ def _whole_stage(
         now = [p.with_noise(noise) for p in problems]
         solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
         history.add("all samples", solution)
-        _must_converge(solution)
+        _must_converge(solution, NUISANCE if hold else 0.0)
         progress("residuals and uncertainties", 0.9)
         solved = Solved.of(now, solution, hold)
         if not noise.estimate:
@@ -197,9 +198,10 @@ def _loose(noise: ProcessNoise) -> ProcessNoise:
     return scaled(noise, np.maximum(LOOSE / densities(noise), 1.0))
 
 
-def _must_converge(solution: Solution) -> None:
-    if not solution.converged:
-        last = solution.iterations[-1]
+def _must_converge(solution: Solution, enough: float) -> None:
+    """Raises unless the solver converged, or made its last step shorter than `enough` sigmas."""
+    last = solution.iterations[-1]
+    if not solution.converged and last.step_in_sigmas >= enough:
         raise SolveError(
             f"no convergence after {len(solution.iterations)} iterations: the last step was still "
             f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
