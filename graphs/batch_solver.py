@@ -188,6 +188,13 @@ def newton_step(
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
 
+def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
+    """Where one hardly damped step leads; for starts from which every step is an improvement."""
+    shared = SharedLayout.of(estimate.calibrations[0], len(problems))
+    here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, _build(problems, estimate))
+    return newton_step(problems, here, hold, LAMBDA_START).estimate
+
+
 def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str], damping: float) -> _Trial:
     """One damped step. The trial point is linearised at once: nearly every step is accepted."""
     step = newton_step(problems, solution, hold, damping)

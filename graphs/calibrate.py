@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, Solution, solve
+from jointscope.graphs.batch_solver import Estimate, Progress, Solution, first_step, solve
 from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
@@ -138,7 +138,9 @@ def _windows_stage(
     calibrations = [bags[i] for i, _ in pieces]
     states = [initial_states(w, c) for w, c in zip(windows, calibrations, strict=True)]
     if not hold:
-        guess = initial_dynamics(windows, states, calibrations[0])
+        # the regression filters its signals and wants them long
+        whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
+        guess = initial_dynamics(problems, whole, bags[0])
         calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
     estimate = Estimate(tuple(states), tuple(calibrations))
     # nearly linear in the states alone: bring them to the parameters before both move
@@ -164,9 +166,7 @@ def _whole_stage(
     progress: Progress,
 ) -> Solved:
     """All samples: first with looser noise, then with the estimated one, checked against the whole."""
-    first = approach(problems, noise, calibrations, hold)
-    history.add("approach", first)
-    estimate = first.estimate
+    estimate = approach(problems, noise, calibrations, hold)
     for _ in range(3):
         now = [p.with_noise(noise) for p in problems]
         solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
@@ -185,12 +185,11 @@ def _whole_stage(
 
 def approach(
     problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration], hold: tuple[str, ...]
-) -> Solution:
-    """One iteration over all samples with noise that is loose enough for states straight from the measurements."""
+) -> Estimate:
+    """One step over all samples with noise that is loose enough for states straight from the measurements."""
     states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
     loose = scaled(noise, np.maximum(APPROACH * LOOSE / densities(noise), 1.0))
-    estimate = Estimate(tuple(states), tuple(calibrations))
-    return solve([p.with_noise(loose) for p in problems], estimate, max_iterations=1, hold=hold)
+    return first_step([p.with_noise(loose) for p in problems], Estimate(tuple(states), tuple(calibrations)), hold)
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

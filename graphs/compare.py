@@ -127,7 +127,7 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     problem = BagProblem.of(robot, recording)
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
     first = approach([problem], robot.noise, [initial_biases(problem, Calibration.of(robot))], hold)
-    estimate = solve([problem], first.estimate, hold=hold).estimate
+    estimate = solve([problem], first, hold=hold).estimate
     return problem, estimate.states[0], estimate.calibrations[0]
 
 

@@ -11,6 +11,7 @@ the equations of motion are linear in the parameters; both sides pass the same f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,7 +58,7 @@ def initial_biases(problem: BagProblem, calibration: Calibration) -> Calibration
     return replace(calibration, biases=biases)
 
 
-def initial_dynamics(problems: list[BagProblem], states: list[Array], calibration: Calibration) -> Calibration:
+def initial_dynamics(problems: Sequence[BagProblem], states: Sequence[Array], calibration: Calibration) -> Calibration:
     """Parameters by linear regression; those it cannot find keep the robot file's value."""
     robot = problems[0].robot
     signals = [_regression_signals(p, x) for p, x in zip(problems, states, strict=True)]
