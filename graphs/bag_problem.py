@@ -188,7 +188,7 @@ def _rate_of_change(stream: Stream) -> Array:
 def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
     sensor, values = robot.sensors[name], stream.values[chosen]
     if isinstance(sensor, MotorEncoder):
-        return MotorEncoderFactor(sensor, values)
+        return factor_on_state(robot, name, values)
     if sensor.form == "vertical":
         return VerticalGyroFactor(sensor, values, robot.tree)
     if sensor.form == "relative":
@@ -197,6 +197,14 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
         other = recording.streams[reference.name]
         nearest = _nearest(other.times, stream.times[chosen])
         return RelativeGyroFactor(sensor, values, robot.tree, reference, other.values[nearest])
+    return factor_on_state(robot, name, values)
+
+
+def factor_on_state(robot: Robot, name: str, values: Array) -> Factor:
+    """A sensor with all its channels predicted from the state, whatever form its file chooses; values: shape (m, c)."""
+    sensor = robot.sensors[name]
+    if isinstance(sensor, MotorEncoder):
+        return MotorEncoderFactor(sensor, values)
     return GyroFactor(sensor, values, robot.tree)
 
 

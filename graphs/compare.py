@@ -15,10 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
-from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.interpolated import interpolate
-from jointscope.factors.motor_encoder import MotorEncoderFactor
-from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.bag_problem import BagProblem, factor_on_state
 from jointscope.graphs.batch_solver import Progress, solve
 from jointscope.graphs.calibrate import approach, calibrate, check_recordings
 from jointscope.graphs.causal_filter import FilteredStates, filter_states
@@ -37,7 +35,7 @@ from jointscope.graphs.solver_context import in_solver_context
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Gyro, Sensor
+from jointscope.robots.sensors import Sensor
 
 Array = NDArray[np.float64]
 
@@ -187,11 +185,8 @@ def _between(ticks: Array, step: NDArray[np.intp], times: Array, before: Array, 
 
 def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration) -> Array:
     """What a sensor would measure at states of shape (s, d), shape (s, c)."""
-    sensor = robot.sensors[name]
-    nothing = np.zeros((len(x), len(sensor.channels)))
-    if isinstance(sensor, Gyro):
-        return GyroFactor(sensor, nothing, robot.tree).residual((x,), calibration)
-    return MotorEncoderFactor(sensor, nothing).residual((x,), calibration)
+    nothing = np.zeros((len(x), len(robot.sensors[name].channels)))
+    return factor_on_state(robot, name, nothing).residual((x,), calibration)
 
 
 def _predict_open_loop(

@@ -12,15 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.gyro import GyroFactor
-from jointscope.factors.motor_encoder import MotorEncoderFactor
-from jointscope.graphs.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.bag_problem import BagProblem, factor_on_state, first_command_time
 from jointscope.graphs.banded_solver import eliminate
 from jointscope.graphs.causal_filter import filter_around
 from jointscope.graphs.noise_estimation import scaled
 from jointscope.graphs.normal_equations import build, linearize_all
 from jointscope.graphs.posterior import StatePosterior, residual_parts
-from jointscope.robots.sensors import Gyro
 
 Array = NDArray[np.float64]
 
@@ -102,13 +99,8 @@ def _advance(problem: BagProblem, x: Array, calibration: Calibration, ticks: NDA
 def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, P: Array) -> Array:
     """Expected squared error of every channel in sigmas, shape (s, c)."""
     found = []
-    for sensor in problem.robot.sensors.values():
-        nothing = np.zeros((len(x), len(sensor.channels)))
-        factor = (
-            GyroFactor(sensor, nothing, problem.robot.tree)
-            if isinstance(sensor, Gyro)
-            else MotorEncoderFactor(sensor, nothing)
-        )
+    for name, sensor in problem.robot.sensors.items():
+        factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))))
         J = factor.linearize((x,), calibration).by_state[0] / sensor.sigma
         found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
     return np.hstack(found)

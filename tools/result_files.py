@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -60,17 +61,10 @@ def write_calibration(result: Any, files: ResultFiles) -> None:
 
             text = robot_text(result.robot, files.robot.parent, provenance(result))
             stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        if files.report is not None:
-            from jointscope.tools.report import calibration_report
+        from jointscope.tools.report import calibration_report
+        from jointscope.tools.rerun_log import log_calibration
 
-            html = calibration_report(result)
-            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
-        if files.rrd is not None:
-            from jointscope.tools.rerun_log import log_calibration
-
-            log_calibration(result, stack.enter_context(whole_file(files.rrd)))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+        _write_views(stack, result, files, calibration_report, log_calibration)
 
 
 def write_comparison(result: Any, files: ResultFiles) -> None:
@@ -80,17 +74,27 @@ def write_comparison(result: Any, files: ResultFiles) -> None:
         JointscopeError: a file cannot be written; then none is.
     """
     with ExitStack() as stack:
-        if files.report is not None:
-            from jointscope.tools.report import comparison_report
+        from jointscope.tools.report import comparison_report
+        from jointscope.tools.rerun_log import log_comparison
 
-            html = comparison_report(result)
-            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
-        if files.rrd is not None:
-            from jointscope.tools.rerun_log import log_comparison
+        _write_views(stack, result, files, comparison_report, log_comparison)
 
-            log_comparison(result, stack.enter_context(whole_file(files.rrd)))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+
+def _write_views(
+    stack: ExitStack,
+    result: Any,
+    files: ResultFiles,
+    report: Callable[[Any], str],
+    log: Callable[[Any, Path], None],
+) -> None:
+    """Report, rerun recording and JSON; they take their places when the stack closes."""
+    if files.report is not None:
+        html = report(result)
+        stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+    if files.rrd is not None:
+        log(result, stack.enter_context(whole_file(files.rrd)))
+    if files.json is not None:
+        write_json(stack.enter_context(whole_file(files.json)), result.to_json())
 
 
 def provenance(result: Any) -> dict[str, Any]:

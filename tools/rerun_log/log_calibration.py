@@ -14,6 +14,7 @@ from jointscope.tools.rerun_log.moving_robot import robot_view, send_robot
 from jointscope.tools.rerun_log.rrd_file import rrd_file
 from jointscope.tools.rerun_log.sensor_lines import send_sensors, sensor_views
 from jointscope.tools.rerun_log.state_lines import send_states, state_views
+from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.viewer_text import viewer_text
 
 if TYPE_CHECKING:
@@ -66,13 +67,7 @@ def _blueprint(result: CalibrationResult) -> rrb.Blueprint:
         ]
         tabs += own if not root else [rrb.Tabs(*own, name=viewer_text(bag_name(bag, i)))]
     tabs.insert(3 if len(result.bags) == 1 else 1, covariance_views())
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed"),
-        auto_views=False,
-    )
+    return tabbed_blueprint(tabs)
 
 
 def _send_findings(stream: rr.RecordingStream, result: CalibrationResult) -> None:

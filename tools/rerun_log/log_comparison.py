@@ -12,6 +12,7 @@ from jointscope.graphs.comparison_result import ComparisonResult
 from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_lines
 from jointscope.tools.rerun_log.rrd_file import rrd_file
+from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
 
 if TYPE_CHECKING:
@@ -77,13 +78,7 @@ def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
             for p in sensors.values()
         ]
         tabs.append(rrb.Horizontal(*columns, name=title))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed"),
-        auto_views=False,
-    )
+    return tabbed_blueprint(tabs)
 
 
 def _send_scores(stream: rr.RecordingStream, result: ComparisonResult) -> None:
