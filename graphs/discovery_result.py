@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The waterfall: one step per effect that was added or removed, with the error on training and held-out recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from jointscope.graphs.comparison_result import ModelComparison
+from jointscope.graphs.diagnosis_result import Diagnosis
+from jointscope.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class DiscoveryStep:
+    """One model on the way.
+
+    Attributes:
+        added, removed: ID@OWNER, or None; the first step is the base model.
+        robot: calibrated with all training recordings.
+        train_error: error on validation blocks of the training recordings.
+        heldout_error: error on the held-out recording, which never chooses; NaN without one.
+        floor: of the held-out recording, else of the validation blocks.
+        diagnosis: what was found with this model as the base; None for the last step where nothing was diagnosed.
+        comparison: prediction against measurement on the held-out recording, else on the first training recording.
+        robot_file: where the robot was written; empty if it was not.
+        paragraph: what the step means, in plain words.
+    """
+
+    added: str | None
+    removed: str | None
+    robot: Robot
+    train_error: float
+    heldout_error: float
+    floor: float
+    diagnosis: Diagnosis | None
+    comparison: ModelComparison
+    robot_file: str = ""
+    paragraph: str = ""
+
+    @property
+    def label(self) -> str:
+        """What changed."""
+        if self.added is None and self.removed is None:
+            return "base model"
+        parts = ([f"+ {self.added}"] if self.added else []) + ([f"- {self.removed}"] if self.removed else [])
+        return " ".join(parts)
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """All steps of a discovery.
+
+    Attributes:
+        steps: the base model first.
+        stop_reason: why it ended, one sentence.
+        adequate: whether the last model is adequate.
+        robot_file: where the last robot was written; empty if it was not.
+        held_out: whether there was a held-out recording.
+    """
+
+    steps: tuple[DiscoveryStep, ...]
+    stop_reason: str
+    adequate: bool
+    robot_file: str = ""
+    held_out: bool = True
+
+    @property
+    def robot(self) -> Robot:
+        """The last model."""
+        return self.steps[-1].robot
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON of the verb `discover`."""
+        return {
+            "steps": [
+                {
+                    "added": step.added,
+                    "removed": step.removed,
+                    "train_error": step.train_error,
+                    "heldout_error": step.heldout_error if self.held_out else None,
+                    "floor": step.floor,
+                    "robot_file": step.robot_file or None,
+                    "paragraph": step.paragraph,
+                }
+                for step in self.steps
+            ],
+            "stop_reason": self.stop_reason,
+            "adequate": self.adequate,
+            "robot_file": self.robot_file or None,
+        }

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every physical effect has: an id, owners, parameters with a null value, a card.
+
+An effect is a family of models: at the null values of its parameters the model is exactly the one without it. That
+makes it testable without a refit, addable and removable. One effect is one file: a law and a module constant `EFFECT`
+of one of the kinds in this folder. Files in `robots/effects/` are found by being there, a user's own by `--effects`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jointscope.robots.robot import Robot
+
+OWNER_KINDS = ("joint", "gyro", "robot")
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One parameter of an effect.
+
+    Attributes:
+        name: last part of the full name OWNER.EFFECT.NAME.
+        unit: SI unit as text; "1" for a pure number.
+        start: where a calibration starts after the effect was added, in `unit`.
+        prior_sigma: standard deviation of the prior about the null value (for a shape: about the start), in `unit`;
+            wide, about ten times the largest size that is physically plausible.
+        null: value at which the effect vanishes.
+        sign: "+" if only values above null are physical, else "+-".
+        logarithmic: whether a calibration estimates the logarithm, because the law has no meaning at or below zero.
+        grid: for a shape, which has no null value (the speed of a Stribeck curve): values that a diagnosis tries;
+            empty for a size.
+        weak: whether the data may leave it open; its prior then holds it near the start.
+    """
+
+    name: str
+    unit: str
+    start: float
+    prior_sigma: float
+    null: float = 0.0
+    sign: str = "+-"
+    logarithmic: bool = False
+    grid: tuple[float, ...] = ()
+    weak: bool = False
+
+    @property
+    def is_shape(self) -> bool:
+        """Whether it has no null value of its own."""
+        return bool(self.grid)
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a user reads about an effect.
+
+    Attributes:
+        title: a few words.
+        law: the equation in plain text with its symbols.
+        explanation: one or two sentences: the mechanism, in plain words.
+        source: paper and equation, or a textbook.
+        typical: typical size in machines of this kind.
+        excitation: which motion shows it.
+        look_alikes: ids of effects that are hard to tell apart, with the reason.
+        numerics: True for defects of the computation, which are no physics.
+    """
+
+    title: str
+    law: str
+    explanation: str
+    source: str
+    typical: str
+    excitation: str
+    look_alikes: Mapping[str, str] = field(default_factory=dict)
+    numerics: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect(ABC):
+    """What all kinds share.
+
+    Attributes:
+        id: short name, as in ID@OWNER.
+        card: what a user reads.
+        parameters: of every instance; kinds whose parameters depend on the owner override `parameters_of`.
+        owners: kinds of owners: some of "joint", "gyro", "robot".
+        example: sizes for tests and demonstrations on the ready robots, by parameter name.
+    """
+
+    id: str
+    card: Card
+    parameters: tuple[EffectParameter, ...] = ()
+    owners: tuple[str, ...] = ("joint",)
+    example: Mapping[str, float] = field(default_factory=dict)
+
+    def may_act_on(self, robot: Robot, owner: str) -> str:
+        """Why the effect cannot act on an owner of this robot; empty if it can."""
+        known = self.owners_of(robot)
+        return "" if owner in known else f"acts on {', '.join(known) or 'nothing in this robot'}"
+
+    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+        """Everything in a robot that the effect can act on."""
+        by_kind = {"joint": robot.joints, "gyro": tuple(g.name for g in robot.gyros), "robot": ("robot",)}
+        return tuple(owner for kind in self.owners for owner in by_kind[kind])
+
+    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+        """Parameters of the instance at one owner."""
+        return self.parameters

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that change the inertia of a body, linear in their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.effect import Effect
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class InertiaEffect(Effect):
+    """A change of the body that the owner joint moves.
+
+    Attributes:
+        change: maps the body's present inertia about the origin of its joint frame, shape (3, 3) [kg m2], to the
+            change of the ten dynamic parameters per unit of each effect parameter, by name, shape (10,): mass, first
+            moments (x, y, z), Ixx, Ixy, Iyy, Ixz, Iyz, Izz (about the origin of the joint frame, pinocchio's order).
+        last_only: whether only the last joint can be the owner.
+    """
+
+    change: Callable[[Array], dict[str, Array]] = field(repr=False)
+    last_only: bool = False

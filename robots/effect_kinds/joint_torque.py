@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects that are a torque of one joint, as a function of that joint's own motion: one line of numpy.
+
+The law is written for complex numbers, so that its derivatives come exact from complex steps: use `smooth_sign`,
+`smooth_abs`, np.tanh, np.exp ..., never abs, sign or comparisons of the signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from jointscope.robots.effect_kinds.effect import Effect
+
+SIDES = ("motor", "link", "spring")
+SHARPNESS = 200.0  # [s/rad] of tanh(k v) where the robot file does not say otherwise
+
+
+@dataclass(frozen=True)
+class JointSignals:
+    """Motion of one joint at m samples, in link units; arrays of shape (m,), complex while derivatives are taken.
+
+    Attributes:
+        q_link, q_motor: positions [rad].
+        v_link, v_motor: velocities [rad/s].
+        tau_spring: K (q_link - q_motor) + D (v_link - v_motor) of the base model [N m].
+        stiffness: K [N m/rad].
+        sharpness: k of the base model's friction law [s/rad], a real number.
+        memory: the effect's own state, if its kind has one.
+    """
+
+    q_link: Any
+    v_link: Any
+    q_motor: Any
+    v_motor: Any
+    tau_spring: Any
+    stiffness: Any
+    sharpness: float = SHARPNESS
+    memory: Any = 0.0
+
+    @property
+    def deflection(self) -> Any:
+        """q_link - q_motor [rad]."""
+        return self.q_link - self.q_motor
+
+    @property
+    def deflection_rate(self) -> Any:
+        """v_link - v_motor [rad/s]."""
+        return self.v_link - self.v_motor
+
+
+Law = Callable[[JointSignals, Mapping[str, Any]], Any]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """A state of the effect's own, z, with dz/dt = rate(signals, parameters) and z = 0 at rest.
+
+    Attributes:
+        rate: right-hand side, complex-safe.
+        noise: density of the random walk that the estimator grants it [1/sqrt(s) times the unit of z].
+        spread: standard deviation of z where a recording begins.
+    """
+
+    rate: Law
+    noise: float
+    spread: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTorque(Effect):
+    """A torque added to the right-hand side of the motor's or the link's equation, or to the torque of the spring.
+
+    Attributes:
+        side: "motor": b a_motor = ... + law;  "link": M a_link + ... = law;  "spring": tau_c = K deflection + ... + law,
+            which acts on both sides.
+        law: torque [N m], shape (m,), zero at the null values; complex-safe.
+        memory: the effect's own state; None for a law without memory.
+    """
+
+    side: str
+    law: Law = field(repr=False)
+    memory: Memory | None = None
+
+
+def smooth_sign(x: Any, width: float) -> Any:
+    """tanh(x / width)."""
+    return np.tanh(x / width)
+
+
+def smooth_abs(x: Any, width: float) -> Any:
+    """sqrt(x^2 + width^2) - width: |x| with a rounded tip."""
+    return np.sqrt(x * x + width * width) - width
+
+
+def log_cosh(x: Any) -> Any:
+    """log(cosh(x)) without overflow; its derivative is tanh(x)."""
+    y = np.where(np.real(x) < 0, -x, x)
+    return y + np.log1p(np.exp(-2.0 * y)) - np.log(2.0)

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Viscous friction of a motor and its gear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from jointscope.robots.effect_kinds.effect import Card, EffectParameter
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
+
+
+def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
+    """-d v_motor [N m]."""
+    return -p["coefficient"] * s.v_motor
+
+
+EFFECT = JointTorque(
+    id="motor_viscous",
+    side="motor",
+    law=law,
+    parameters=(EffectParameter("coefficient", "N m s/rad", start=0.5, prior_sigma=50.0, sign="+"),),
+    example={"coefficient": 2.0},
+    card=Card(
+        title="viscous friction on the motor side",
+        law="b a_motor = ... - d v_motor",
+        explanation="Grease in gear and bearings resists in proportion to the speed of the motor.",
+        source="Armstrong-Helouvry, Dupont, Canudas de Wit (1994), survey of friction models, sec. 2.1",
+        typical="1 to 10 % of the back-EMF constant on the link side",
+        excitation="fast motion in both directions at several speeds",
+        look_alikes={"link_viscous": "with a stiff spring both sides move alike"},
+    ),
+)
