@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.comparison_result import ModelComparison
 from jointscope.graphs.failure_analysis import FailureAnalysis
 from jointscope.graphs.missing_torque import MissingTorque
+from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -91,7 +92,10 @@ class Diagnosis:
         placebo_score: largest score per degree of freedom of regressors that mean nothing.
         paragraphs: findings in plain words, most important first.
         refits: robots of the leaders after their refit, by label.
+        comparison: of the base model with the held-out recording, else with the first training recording.
         wall_seconds: by stage.
+        recordings: for training.
+        heldout: the held-out recording, if there was one.
     """
 
     robot: Robot
@@ -109,6 +113,8 @@ class Diagnosis:
     refits: Mapping[str, Robot] = field(default_factory=dict, repr=False)
     comparison: ModelComparison | None = None
     wall_seconds: Mapping[str, float] = field(default_factory=dict)
+    recordings: tuple[Recording, ...] = field(default=(), repr=False)
+    heldout: Recording | None = field(default=None, repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of the verb `diagnose`."""

@@ -3,12 +3,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from jointscope.graphs.comparison_result import ModelComparison
 from jointscope.graphs.diagnosis_result import Diagnosis
+from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class SavedStep:
+    """A finished step of an earlier run, from which a discovery continues; see DiscoveryStep.
+
+    Attributes:
+        added, removed: ID@OWNER, or None; the first step is the base model.
+        robot: as it was calibrated then.
+        robot_file: where it lies.
+        train_error, heldout_error, floor: as they were found then.
+        paragraph: what the step means.
+    """
+
+    added: str | None
+    removed: str | None
+    robot: Robot
+    robot_file: str
+    train_error: float
+    heldout_error: float
+    floor: float
+    paragraph: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,6 +80,8 @@ class Discovery:
         adequate: whether the last model is adequate.
         robot_file: where the last robot was written; empty if it was not.
         held_out: whether there was a held-out recording.
+        recordings: for training.
+        heldout: the held-out recording, if there was one.
     """
 
     steps: tuple[DiscoveryStep, ...]
@@ -64,6 +89,8 @@ class Discovery:
     adequate: bool
     robot_file: str = ""
     held_out: bool = True
+    recordings: tuple[Recording, ...] = field(default=(), repr=False)
+    heldout: Recording | None = field(default=None, repr=False)
 
     @property
     def robot(self) -> Robot:
