@@ -303,7 +303,7 @@ def test_truth_holds_everything_by_full_name_and_survives_json(doggy):
 class HalfCommand(SimulatedEffect):
     """Halves the command, doubles the encoders, delays the gyros by one tick and pulls on the first link."""
 
-    id, acts_on, defaults = "half_command", "robot", {"torque": 1.5}
+    id, acts_on, defaults = "half_command", ("robot",), {"torque": 1.5}
 
     def bind(self, model, data, address):
         self.passive, self.dof = data.qfrc_passive, address.link["joint1"]

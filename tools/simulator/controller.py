@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.hooks import distort
 from jointscope.tools.simulator.motion import Motion
-from jointscope.tools.simulator.sensing import distort, read_encoder
+from jointscope.tools.simulator.sensing import read_encoder
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class PController:
         self._full = full_command(robot)
 
     def __call__(self, tick: int, q_motor: Array) -> Array:
-        """The command of a tick, shape (n_joints,), for the true motor angles, shape (n_joints,) [rad]."""
+        """The command of a tick, shape (n_joints,), for the angles that the encoders see, shape (n_joints,) [rad]."""
         motion, angles = self._motion, q_motor[None]
         if self._effects:
             angles = distort(self._effects, self._encoder, motion.times[tick : tick + 1], angles)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.hooks import acting, age
 from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import build_specification, motor_joint
+from jointscope.tools.simulator.specification import build_specification, drive, motor_joint
 from jointscope.tools.simulator.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ Controller = Callable[[int, Array], Array]
 TICK = 1e-3  # [s]
 STEPS_PER_TICK = 5
 FRICTIONS = ("dry", "smooth")
+SETTLING = 3.0  # [s] at most
+AT_REST = 1e-6  # [rad/s]
 
 _callback_lock = threading.Lock()  # MuJoCo has one set of callbacks per process
 
@@ -61,6 +64,7 @@ class Engine:
         self.effects = tuple(effects)
         spec = build_specification(robot, friction, TICK / steps_per_tick)
         for effect in self.effects:
+            effect.friction = friction
             effect.edit(spec)
         try:
             self.model = spec.compile()
@@ -71,6 +75,7 @@ class Engine:
         self._link = np.array([self.address.link[joint] for joint in robot.joints])
         self._motor = np.array([self.address.motor[joint] for joint in robot.joints])
         self._actuator = np.array([self.address.actuator[joint] for joint in robot.joints])
+        self._encoder_age = age(self.effects, robot.motor_encoder)
         for effect in self.effects:
             effect.bind(self.model, self.data, self.address)
         self._torques: list[Callable[[], None]] = [e.torque for e in self.effects if e.uses("torque")]
@@ -97,6 +102,16 @@ class Engine:
         self._mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._link] = self.data.qpos[self._motor] = position
 
+    def settle(self) -> None:
+        """Lets the robot come to rest under its own load, without commands, and calls that time zero."""
+        with self._hooked():
+            for _ in range(round(SETTLING / TICK)):
+                self._mujoco.mj_step(self.model, self.data, self._steps)
+                if np.abs(self.data.qvel).max() < AT_REST:
+                    break
+        self._check_sane(0.0)
+        self.data.time = 0.0
+
     def accelerations(self, q: Array, v: Array, command: Array) -> Array:
         """Accelerations of all coordinates in the engine's order at one state, shape (nq,) [rad/s^2]."""
         self.data.qpos[:], self.data.qvel[:], self.data.ctrl[self._actuator] = q, v, command
@@ -110,8 +125,8 @@ class Engine:
         """Integrates from the present state.
 
         Args:
-            controller: maps the number of the tick and the true motor angles, shape (n_joints,) [rad], to the command,
-                shape (n_joints,), which is held until the next tick.
+            controller: maps the number of the tick and the motor angles that the encoders see, shape (n_joints,) [rad],
+                to the command, shape (n_joints,), which is held until the next tick.
             link_torques: disturbance on the links, shape (ticks, n_joints) [N m].
             motor_torques: disturbance on the rotors, shape (ticks, n_joints) [N m].
             progress: called now and then with the number of ticks done.
@@ -127,15 +142,15 @@ class Engine:
         ticks, h = len(link_torques), TICK / steps
         q, v = np.empty((ticks * steps + 1, model.nq)), np.empty((ticks * steps + 1, model.nv))
         q[0], v[0], row = qpos, qvel, 0
-        commands = [effect.command for effect in self.effects if effect.uses("command")]
+        commanding = [effect for effect in self.effects if effect.uses("command")]
         with self._hooked():
             for k in range(ticks):
-                issued = controller(k, qpos[self._motor])
+                issued = controller(k, self._seen(k * TICK, Trajectory(h, q[: row + 1], v[: row + 1])))
                 ctrl[self._actuator] = issued
                 applied[self._link], applied[self._motor] = link_torques[k], motor_torques[k]
                 for _ in range(steps):
-                    if commands:
-                        ctrl[self._actuator] = _acting(commands, row * h, issued)
+                    if commanding:
+                        ctrl[self._actuator] = acting(commanding, row * h, issued)
                     mj_step(model, data)
                     row += 1
                     q[row], v[row] = qpos, qvel
@@ -170,6 +185,12 @@ class Engine:
             omega[k] = six[:3]
         return omega
 
+    def _seen(self, now: float, past: Trajectory) -> Array:
+        """Motor angles that the encoders give out, old if they are late, shape (n_joints,) [rad]."""
+        if not self._encoder_age.any():
+            return past.q[-1, self._motor]
+        return past.at(now - self._encoder_age)[0][np.arange(len(self._motor)), self._motor]
+
     def _find_address(self, robot: Robot) -> Address:
         def dof(name: str) -> int:
             return int(self.model.joint(name).dofadr[0])
@@ -177,7 +198,7 @@ class Engine:
         return Address(
             link={joint: dof(joint) for joint in robot.joints},
             motor={joint: dof(motor_joint(joint)) for joint in robot.joints},
-            actuator={joint: self.model.actuator(f"{joint}.drive").id for joint in robot.joints},
+            actuator={joint: self.model.actuator(drive(joint)).id for joint in robot.joints},
         )
 
     def _smooth_friction(self, robot: Robot) -> Callable[[], None]:
@@ -219,9 +240,3 @@ class Engine:
             raise SimulationError(
                 f"the simulation diverged before {time:g} s; check stiffness, inertia and the effects' parameters"
             )
-
-
-def _acting(commands: Sequence[Callable[[float, Array], Array]], time: float, issued: Array) -> Array:
-    for command in commands:
-        issued = command(time, issued)
-    return issued

@@ -7,7 +7,6 @@ of the robot file: step^2 / 12 + noise^2 = sigma^2, with noise = 0.3 sigma.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.recording import Stream
 from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
-from jointscope.tools.simulator.effect import SimulatedEffect
 from jointscope.tools.simulator.engine import TICK, Engine
+from jointscope.tools.simulator.hooks import age, distort, logged, taken_at
 from jointscope.tools.simulator.random_streams import random_stream
 from jointscope.tools.simulator.trajectory import Trajectory
 
@@ -123,9 +122,19 @@ def encoder_stream(
     seed: int,
 ) -> Stream:
     """The stream of the motor encoders; `noise` is standard normal, shape (m, n_joints)."""
-    q, _ = trajectory.at(taken_at(engine.effects, encoder, stamps))
-    angles = distort(engine.effects, encoder, stamps, q[:, engine.motor])
-    return _stream(encoder, stamps, read_encoder(encoder, angles, noise, sampling.quantized), sampling, seed)
+    times = taken_at(engine.effects, encoder, stamps)
+    angles = _angles(trajectory, times, age(engine.effects, encoder), engine.motor)
+    angles = distort(engine.effects, encoder, stamps, angles)
+    values = logged(engine.effects, encoder, read_encoder(encoder, angles, noise, sampling.quantized))
+    return _stream(encoder, stamps, times <= trajectory.end, values, sampling, seed)
+
+
+def _angles(trajectory: Trajectory, times: Array, ages: Array, columns: NDArray[np.intp]) -> Array:
+    """Each coordinate as old as its channel, shape (m, channels) [rad]."""
+    angles = np.empty((len(times), len(columns)))
+    for old in np.unique(ages):
+        angles[:, ages == old] = trajectory.at(times - old)[0][:, columns[ages == old]]
+    return angles
 
 
 def gyro_stream(
@@ -133,27 +142,19 @@ def gyro_stream(
 ) -> Stream:
     """The stream of one gyro."""
     sensor = gyro.sensor
-    q, v = trajectory.at(taken_at(engine.effects, sensor, stamps))
-    rates = engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T + gyro.bias
+    effects = engine.effects
+    times = taken_at(effects, sensor, stamps)
+    q, v = trajectory.at(times - age(effects, sensor)[0])
+    rates = distort(effects, sensor, stamps, engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T)
     noise = sensor.sigma * random_stream(seed, "noise", sensor.name).standard_normal(rates.shape)
-    return _stream(sensor, stamps, distort(engine.effects, sensor, stamps, rates) + noise, sampling, seed)
+    values = logged(effects, sensor, rates + gyro.bias + noise)
+    return _stream(sensor, stamps, times <= trajectory.end, values, sampling, seed)
 
 
-def taken_at(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array) -> Array:
-    """When samples with these stamps were really taken [s]."""
-    for effect in effects:
-        stamps = effect.taken_at(sensor, stamps)
-    return stamps
-
-
-def distort(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array, values: Array) -> Array:
-    """What the effects make of true values, before noise."""
-    for effect in effects:
-        values = effect.reading(sensor, stamps, values)
-    return values
-
-
-def _stream(sensor: Sensor, stamps: Array, values: Array, sampling: Sampling, seed: int) -> Stream:
-    kept = sampling.kept(len(stamps), random_stream(seed, "drop", sensor.name))
+def _stream(
+    sensor: Sensor, stamps: Array, happened: NDArray[np.bool_], values: Array, sampling: Sampling, seed: int
+) -> Stream:
+    """What arrives of the samples; `happened` tells those that were taken before the end."""
+    kept = happened & sampling.kept(len(stamps), random_stream(seed, "drop", sensor.name))
     received = sampling.received(stamps, random_stream(seed, "transport", sensor.name))
     return Stream(sensor.name, stamps[kept], values[kept], sensor.channels, sensor.unit, received[kept])

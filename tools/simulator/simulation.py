@@ -2,7 +2,8 @@
 """A recording of a robot from an engine that is independent of the estimator's own model.
 
 The P-controller of the paper reads the noisy, quantized encoders at every tick and its command acts, held, from its
-stamp until the next one. The engine starts at rest with relaxed springs.
+stamp until the next one. The engine starts at rest with relaxed springs; where effects load them at rest, it settles
+before the recording begins.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from jointscope.robots.robot import Robot
 from jointscope.robots.units import si_unit
 from jointscope.tools.simulator.controller import PController
 from jointscope.tools.simulator.disturbance import Disturbance
-from jointscope.tools.simulator.effects import make_effect
+from jointscope.tools.simulator.effects import make_effects
 from jointscope.tools.simulator.engine import STEPS_PER_TICK, TICK, Engine
 from jointscope.tools.simulator.motion import MIN_REST, make_motion, start_position
 from jointscope.tools.simulator.random_streams import random_stream
@@ -111,7 +112,7 @@ def simulate(
     seconds = DEFAULT_SECONDS.get(motion, 30.0) if seconds is None else float(seconds)
     times = _ticks(seconds)
     truth = true_robot(robot, parameters or {})
-    built = [make_effect(text, truth) for text in effects]
+    built = make_effects(effects, truth)
     engine = Engine(truth, built, friction, steps_per_tick)
     occasion = int(random_stream(seed, motion).integers(2**31))
     gyros = _mounted_gyros(robot, occasion, hardware_seed)
@@ -121,6 +122,8 @@ def simulate(
     controller = PController(truth, schedule, noise, quantized, built)
     torques = disturbance.torques(random_stream(occasion, "disturbance"), len(times), robot.n, TICK)
     engine.place(start)
+    if any(effect.loads_at_rest for effect in built):
+        engine.settle()
     trajectory = engine.run(controller, *torques, _share(progress, len(times)))
     command = _command_stream(robot, times, controller.commands, sampling, occasion)
     streams = {"command": command, **_sensor_streams(engine, trajectory, gyros, noise, robot, sampling, occasion)}

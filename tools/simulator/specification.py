@@ -95,13 +95,11 @@ def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) 
     rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
     hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
     if friction == "dry":
-        hinge.frictionloss = robot.parameter(f"{joint}.coulomb_torque").value
-        hinge.solref_friction = [DRY_TIME_CONSTANT, 1.0]
-        hinge.solimp_friction = DRY_IMPEDANCE
+        add_dry_friction(hinge, robot.parameter(f"{joint}.coulomb_torque").value)
 
 
 def _add_spring(spec: Any, robot: Robot, joint: str) -> None:
-    tendon = spec.add_tendon(name=f"{joint}.spring")
+    tendon = spec.add_tendon(name=spring_tendon(joint))
     tendon.wrap_joint(joint, 1.0)
     tendon.wrap_joint(motor_joint(joint), -1.0)
     tendon.springlength = [0.0, 0.0]
@@ -115,7 +113,7 @@ def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
         gain = robot.drive_parameter(joint, "k_pwm").value * robot.command_volts
         back_emf = robot.drive_parameter(joint, "k_mi").value
     motor = spec.add_actuator(
-        name=f"{joint}.drive",
+        name=drive(joint),
         target=motor_joint(joint),
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
@@ -139,6 +137,31 @@ def set_linear(element: Any, name: str, value: float) -> None:
         getattr(element, name)[:] = [value, 0.0, 0.0]
     else:
         setattr(element, name, value)
+
+
+def add_linear(element: Any, name: str, value: float) -> None:
+    """Adds to the linear part of a stiffness or damping, see `set_linear`."""
+    if np.ndim(getattr(element, name)):
+        getattr(element, name)[0] += value
+    else:
+        setattr(element, name, getattr(element, name) + value)
+
+
+def add_dry_friction(hinge: Any, torque: float) -> None:
+    """Adds to the engine's friction loss of a joint [N m], and makes it as hard as can be integrated."""
+    hinge.frictionloss += torque
+    hinge.solref_friction = [DRY_TIME_CONSTANT, 1.0]
+    hinge.solimp_friction = DRY_IMPEDANCE
+
+
+def spring_tendon(joint: str) -> str:
+    """Name of the tendon whose length is the deflection of a joint, q_link - q_motor."""
+    return f"{joint}.spring"
+
+
+def drive(joint: str) -> str:
+    """Name of a joint's motor."""
+    return f"{joint}.drive"
 
 
 def _quaternion_wxyz(R: Array) -> Array:

@@ -51,5 +51,5 @@ def true_parameters(
 
 
 def effect_records(effects: Sequence[SimulatedEffect]) -> list[dict[str, Any]]:
-    """Id, owner and parameters of each effect."""
-    return [{"effect": e.id, "owner": e.owner, "parameters": dict(e.parameters)} for e in effects]
+    """Id, owner, kind ("catalogue", "outside" the estimator's catalogue, "mistake") and parameters of each effect."""
+    return [{"effect": e.id, "owner": e.owner, "kind": e.kind(), "parameters": dict(e.parameters)} for e in effects]

@@ -6,11 +6,13 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+from collections.abc import Iterable
 from functools import cache
 
 from jointscope.robots.errors import EffectError
 from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.effect import SimulatedEffect, owners_of
+from jointscope.tools.simulator.not_simulated import NOT_SIMULATED
 
 
 @cache
@@ -41,11 +43,29 @@ def make_effect(text: str, robot: Robot) -> SimulatedEffect:
     head, _, tail = text.partition(":")
     effect_id, at, owner = head.partition("@")
     known = simulated_effects()
+    if effect_id in NOT_SIMULATED:
+        raise EffectError(f"effect {effect_id} cannot be switched on: {NOT_SIMULATED[effect_id]}")
     if effect_id not in known:
         raise EffectError(f"effect {effect_id!r} cannot be simulated; known are {', '.join(known)}")
     if not at or not owner:
-        raise EffectError(f"effect {text!r}: expected ID@OWNER[:param=value,...], for example {effect_id}@joint1")
+        example = f"{effect_id}@{owners_of(known[effect_id].acts_on[0], robot)[0]}"
+        raise EffectError(f"effect {text!r}: expected ID@OWNER[:param=value,...], for example {example}")
     return known[effect_id](owner, _parameters(text, tail), robot)
+
+
+def make_effects(texts: Iterable[str], robot: Robot) -> list[SimulatedEffect]:
+    """Effects from their texts, see `make_effect`.
+
+    Raises:
+        EffectError: also if an effect is given twice for one owner.
+    """
+    effects: list[SimulatedEffect] = []
+    for text in texts:
+        effect = make_effect(text, robot)
+        if any((effect.id, effect.owner) == (other.id, other.owner) for other in effects):
+            raise EffectError(f"effect {effect.id}@{effect.owner} is given twice; give all its parameters at once")
+        effects.append(effect)
+    return effects
 
 
 def _parameters(text: str, tail: str) -> dict[str, float]:

@@ -15,19 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
-from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.inertia import is_possible
 from jointscope.tools.simulator.mujoco_module import load_mujoco
 from jointscope.tools.simulator.specification import link_body, set_linear
 
-PASSIVE = ("stiffness", "damping", "frictionloss", "armature")  # what another effect may have given the joint
+# What another effect may have given the joint.
+PASSIVE = ("stiffness", "damping", "frictionloss", "solref_friction", "solimp_friction", "armature")
 
 
 class BearingFlexibility(SimulatedEffect):
     """Two sprung hinges across the axis of a joint; a compliance of zero is a rigid direction."""
 
     id = "bearing_flexibility"
-    acts_on = "joint"
+    acts_on = ("joint",)
     defaults: ClassVar[Mapping[str, float]] = {
         "compliance_x": 1.0 / 2500.0,  # [rad/(N m)]
         "compliance_y": 1.0 / 3200.0,  # [rad/(N m)]
@@ -37,11 +38,8 @@ class BearingFlexibility(SimulatedEffect):
         "inertia_y": 2.7,  # [kg m2] of the moved body about y
     }
 
-    def __init__(self, owner: str, parameters: Mapping[str, float], robot: Robot):
-        super().__init__(owner, parameters, robot)
-        for name, value in self.parameters.items():
-            if not np.isfinite(value) or value < 0 or (value == 0 and name.startswith("inertia")):
-                raise EffectError(f"effect {self.id}@{owner}: {name} must not be negative, got {value:g}")
+    never_negative = ("compliance_x", "compliance_y", "damping_x", "damping_y")
+    above_zero = ("inertia_x", "inertia_y")
 
     def edit(self, spec: Any) -> None:
         """Puts the hinges before the joint, and the transverse inertia on its body."""
@@ -67,15 +65,9 @@ class BearingFlexibility(SimulatedEffect):
     def _override_inertia(self, body: Any, across: NDArray[np.intp]) -> None:
         inertia = np.array(body.fullinertia)
         inertia[across] = self.parameters["inertia_x"], self.parameters["inertia_y"]
-        moments = np.linalg.eigvalsh(_matrix(inertia))
-        if moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        if not is_possible(inertia):
             raise EffectError(
                 f"effect {self.id}@{self.owner}: transverse inertias {inertia[across][0]:g} and "
                 f"{inertia[across][1]:g} kg m2 are impossible beside the rest of the body's inertia"
             )
         body.fullinertia = inertia
-
-
-def _matrix(full: NDArray[np.float64]) -> NDArray[np.float64]:
-    xx, yy, zz, xy, xz, yz = full
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The disc of an encoder is not centred on its shaft: the head sees it under another angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import EffectError
+from jointscope.robots.sensors import Sensor
+from jointscope.tools.simulator.effect import SimulatedEffect
+
+Array = NDArray[np.float64]
+
+
+class EncoderEccentricity(SimulatedEffect):
+    """Adds cos cos(N q_motor) + sin sin(N q_motor) to first order, N the turns of the disc per turn of the joint.
+
+    The disc's centre is off by e, as a share of the head's radius; seen from it, the head is at atan2 of a point on
+    the circle, not on the circle's angle. At N = gear the disc sits on the motor, which is the default.
+    """
+
+    id = "encoder_eccentricity"
+    acts_on = ("joint",)
+    above_zero = ("order",)
+
+    def default_parameters(self) -> Mapping[str, float]:
+        """3e-4 rad at the joint, one period per turn of the motor."""
+        return {"cos": 1.8e-4, "sin": 2.4e-4, "order": self.robot.constants.get("motor.gear", 1.0)}  # [rad], [rad], [1]
+
+    def _check(self, name: str, value: float) -> None:
+        super()._check(name, value)
+        e = self.parameters["order"] * math.hypot(self.parameters["cos"], self.parameters["sin"])
+        if e >= 0.5:
+            raise EffectError(f"effect {self.id}@{self.owner}: the disc would be off by {e:g} of its radius")
+
+    def reading(self, sensor: Sensor, stamps: Array, values: Array) -> Array:
+        """Angles as the off-centre disc shows them."""
+        cos, sin, order = (self.parameters[name] for name in ("cos", "sin", "order"))
+        e, phase = order * math.hypot(cos, sin), math.atan2(cos, sin)
+        read = np.array(values)
+        for channel in self.encoder_channels(sensor):
+            disc = order * values[:, channel] + phase
+            read[:, channel] += np.arctan2(e * np.sin(disc), 1.0 - e * np.cos(disc)) / order
+        return read

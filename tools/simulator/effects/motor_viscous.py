@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Viscous friction in motor and gear beyond the back-EMF: the engine's own joint damping on the rotor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.specification import add_linear, motor_joint
+
+
+class MotorViscous(SimulatedEffect):
+    """Torque -coefficient v_motor on the rotor."""
+
+    id = "motor_viscous"
+    acts_on = ("joint",)
+    defaults: ClassVar[Mapping[str, float]] = {"coefficient": 2.0}  # [N m s/rad]
+    never_negative = ("coefficient",)
+
+    def edit(self, spec: Any) -> None:
+        """Raises the damping of the rotor."""
+        add_linear(spec.joint(motor_joint(self.owner)), "damping", self.parameters["coefficient"])

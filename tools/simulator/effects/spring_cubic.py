@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A spring that hardens or softens with its deflection: a second tendon with the engine's polynomial stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from jointscope.robots.errors import SimulationError
+from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.specification import motor_joint
+
+
+class SpringCubic(SimulatedEffect):
+    """Torque stiffness (q_link - q_motor)^3 beside that of the linear spring; it may be negative."""
+
+    id = "spring_cubic"
+    acts_on = ("joint",)
+    defaults: ClassVar[Mapping[str, float]] = {"stiffness": 20000.0}  # [N m/rad^3]
+
+    def edit(self, spec: Any) -> None:
+        """Adds a tendon between link and rotor whose stiffness is cubic only."""
+        tendon = spec.add_tendon(name=f"{self.owner}.cubic_spring")
+        tendon.wrap_joint(self.owner, 1.0)
+        tendon.wrap_joint(motor_joint(self.owner), -1.0)
+        tendon.springlength = [0.0, 0.0]
+        if np.size(tendon.stiffness) != 3:
+            raise SimulationError("effect spring_cubic needs MuJoCo 4: pip install --upgrade 'jointscope[sim]'")
+        tendon.stiffness[:] = [0.0, 0.0, self.parameters["stiffness"]]

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of the catalogue that cannot be switched on in a simulation, because the engine always has them or never.
+
+They are candidates for a robot file that leaves them out, so that is how to simulate them.
+"""
+
+from __future__ import annotations
+
+NOT_SIMULATED = {
+    "coriolis": "every simulation contains the Coriolis terms; calibrate with 'coriolis: false' in the robot file",
+    "joint_elasticity": "every simulated joint is elastic; calibrate with a robot file that declares the joint rigid",
+    "integration_error": "the engine integrates exactly; calibrate with 'integrator: euler' in the robot file",
+}
