@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.joint_states import JointStates
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
@@ -62,6 +64,7 @@ class SensorPrediction:
         measured: shape (m, c).
         open_loop: predicted from the first state with the recorded commands alone, shape (m, c).
         ahead: predicted 0.1 s ahead from the causal state, shape (m, c); NaN where no prediction ends.
+        soon: the same 0.01 s ahead, ends 0.01 s apart; None where it was not kept.
     """
 
     channels: tuple[str, ...]
@@ -71,6 +74,7 @@ class SensorPrediction:
     measured: Array
     open_loop: Array
     ahead: Array
+    soon: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,9 @@ class ModelComparison:
         channels: by name.
         worst: worst windows first.
         sensors: predictions by sensor name.
+        floors: `floor` by channel [sensor sigma]; empty where it was not kept.
+        motion: smoothed motion of the joints at all ticks; None where it was not kept.
+        predicted_motion: motion 0.1 s ahead of the causal states; None where it was not kept.
     """
 
     label: str
@@ -94,6 +101,9 @@ class ModelComparison:
     channels: dict[str, ChannelComparison]
     worst: tuple[WorstWindow, ...]
     sensors: dict[str, SensorPrediction]
+    floors: Mapping[str, float] = field(default_factory=dict)
+    motion: JointStates | None = None
+    predicted_motion: JointStates | None = None
 
 
 @dataclass(frozen=True)
