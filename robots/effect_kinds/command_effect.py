@@ -19,9 +19,9 @@ class CommandEffect(Effect):
     """A change of the command.
 
     Attributes:
-        law: maps the edges of the steps, shape (m + 1,) [s], the logged commands of one joint, held over each step, shape
-            (m,), and the parameters to the mean command that acts in each step, shape (m,), and its derivative by
-            each parameter, by name, shape (m,) each. At the null values the command comes back unchanged and the
+        law: maps the edges of the steps, shape (m + 1,) [s], the logged commands of one joint, held over each step,
+            shape (m,), and the parameters to the mean command that acts in each step, shape (m,), and its derivative
+            by each parameter, by name, shape (m,) each. At the null values the command comes back unchanged and the
             derivatives are those from above.
     """
 

@@ -27,8 +27,9 @@ class EffectParameter:
         name: last part of the full name OWNER.EFFECT.NAME.
         unit: SI unit as text; "1" for a pure number.
         start: where a calibration starts after the effect was added, in `unit`.
-        prior_sigma: standard deviation of the prior about the null value (for a shape: about the start), in `unit`;
-            wide, about ten times the largest size that is physically plausible.
+        prior_sigma: standard deviation of the prior about the null value, in `unit`; wide, about ten times the largest
+            size that is physically plausible. For a shape and for a logarithmic one the prior is about the start, and
+            prior_sigma / start is the standard deviation of the logarithm: 3 means a factor of 20 either way.
         null: value at which the effect vanishes.
         sign: "+" if only values above null are physical, else "+-".
         logarithmic: whether a calibration estimates the logarithm, because the law has no meaning at or below zero.

@@ -5,11 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import Effect
+
+if TYPE_CHECKING:
+    from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -27,3 +31,7 @@ class InertiaEffect(Effect):
 
     change: Callable[[Array], dict[str, Array]] = field(repr=False)
     last_only: bool = False
+
+    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+        """All joints, or the last one."""
+        return robot.joints[-1:] if self.last_only else super().owners_of(robot)

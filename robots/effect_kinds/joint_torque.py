@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Effect
+
+if TYPE_CHECKING:
+    from jointscope.robots.robot import Robot
 
 SIDES = ("motor", "link", "spring")
 SHARPNESS = 200.0  # [s/rad] of tanh(k v) where the robot file does not say otherwise
@@ -75,7 +78,7 @@ class JointTorque(Effect):
     """A torque added to the right-hand side of the motor's or the link's equation, or to the torque of the spring.
 
     Attributes:
-        side: "motor": b a_motor = ... + law;  "link": M a_link + ... = law;  "spring": tau_c = K deflection + ... + law,
+        side: "motor": b a_motor = ... + law; "link": M a_link + ... = law; "spring": tau_c = K deflection + ... + law,
             which acts on both sides.
         law: torque [N m], shape (m,), zero at the null values; complex-safe.
         memory: the effect's own state; None for a law without memory.
@@ -84,6 +87,11 @@ class JointTorque(Effect):
     side: str
     law: Law = field(repr=False)
     memory: Memory | None = None
+
+    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+        """The joints; for a torque of the spring those that have one."""
+        joints = super().owners_of(robot)
+        return tuple(j for j in joints if j in robot.layout.motors) if self.side == "spring" else joints
 
 
 def smooth_sign(x: Any, width: float) -> Any:

@@ -23,11 +23,17 @@ EFFECT = JointTorque(
     example={"coefficient": 2.0},
     card=Card(
         title="viscous friction on the motor side",
-        law="b a_motor = ... - d v_motor",
-        explanation="Grease in gear and bearings resists in proportion to the speed of the motor.",
-        source="Armstrong-Helouvry, Dupont, Canudas de Wit (1994), survey of friction models, sec. 2.1",
+        law="b a_motor = ... - d v_motor, with d = coefficient",
+        explanation="Grease in gear and bearings resists in proportion to the speed of the motor. The same coefficient "
+        "on all joints is nothing but a larger motor.k_mi.",
+        source="Armstrong-Helouvry, Dupont, Canudas de Wit (1994), A survey of models, analysis tools and compensation "
+        "methods for the control of machines with friction, Automatica 30(7); neglected in Schuethe et al. (2016), "
+        "sec. 3.2",
         typical="1 to 10 % of the back-EMF constant on the link side",
         excitation="fast motion in both directions at several speeds",
-        look_alikes={"link_viscous": "with a stiff spring both sides move alike"},
+        look_alikes={
+            "link_viscous": "with a stiff spring both sides move alike",
+            "motor_stribeck": "at speeds below the Stribeck velocity both change friction with speed",
+        },
     ),
 )

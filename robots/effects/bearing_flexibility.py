@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A soft bearing: the base of a joint tilts about the two axes across its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jointscope.robots.effect_kinds.effect import Card, EffectParameter
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.structured_tree import across_axes, inertia_about_joint
+
+if TYPE_CHECKING:
+    from jointscope.robots.robot import Robot
+
+STIFFER = 10.0  # than the joint's own spring
+DAMPING_RATIO = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingFlexibility(Structure):
+    """Two sprung hinges; natural scales come from the joint's own spring and body."""
+
+    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+        """Starts ten times stiffer than the joint's spring, with the inertia of the model's body."""
+        model = robot.tree.model
+        joint = model.getJointId(owner)
+        body = inertia_about_joint(model, joint)
+        spring = robot.parameters.get(f"{owner}.stiffness")
+        start: dict[str, float] = {}
+        for axis, k in zip("xy", across_axes(model, joint), strict=True):
+            inertia = float(body[k, k])
+            compliance = next(p.start for p in self.parameters if p.name == f"compliance_{axis}")
+            if spring is not None:
+                compliance = 1.0 / (STIFFER * spring.value)
+            start[f"compliance_{axis}"] = compliance
+            start[f"damping_{axis}"] = 2.0 * DAMPING_RATIO * float(np.sqrt(inertia / compliance))
+            start[f"inertia_{axis}"] = inertia
+        return tuple(
+            replace(p, start=start[p.name], prior_sigma=p.prior_sigma / p.start * start[p.name])
+            for p in self.parameters
+        )
+
+
+def _pair(name: str, unit: str, start: float, relative_sigma: float, weak: bool) -> tuple[EffectParameter, ...]:
+    """A parameter about each axis; the inertias are no size of the effect, they do not matter while it is rigid."""
+    return tuple(
+        EffectParameter(f"{name}_{axis}", unit, start, relative_sigma * start, sign="+", logarithmic=True, weak=weak)
+        for axis in "xy"
+    )
+
+
+EFFECT = BearingFlexibility(
+    id="bearing_flexibility",
+    form="bearing",
+    parameters=(
+        *_pair("compliance", "rad/(N m)", 1.0 / 3000.0, 3.0, weak=False),
+        *_pair("damping", "N m s/rad", 10.0, 3.0, weak=True),
+        *_pair("inertia", "kg m2", 2.0, 0.5, weak=True),
+    ),
+    example={
+        **{"compliance_x": 1.0 / 2500.0, "compliance_y": 1.0 / 3200.0},
+        **{"damping_x": 12.0, "damping_y": 14.0, "inertia_x": 2.4, "inertia_y": 2.7},
+    },
+    card=Card(
+        title="soft bearing",
+        law="two hinges before the joint, about the axes x, y of its frame across its own: their torques are "
+        "-angle / compliance - damping rate; at compliance 0 they are rigid",
+        explanation="The bearing or the stand gives way, so that the whole body tilts when other joints accelerate. "
+        "Gyros on the body then see rates about axes about which nothing should turn. The inertia of the body about "
+        "these axes, which a rigid bearing hides, comes along as a weak parameter.",
+        source="Schuethe, Wenk, Frese (2016), sec. 3.2 (not modelled), fig. 4, and sec. 6, which proposes the two "
+        "hinges; Neubauer et al. (2015), eq. (1), (4) and table 1: bearings as soft as drives",
+        typical="1 to 10 times as stiff as the drives; resonance at 3 to 30 Hz",
+        excitation="hard reversals of the joints after it while a gyro is on its body",
+        look_alikes={
+            "joint_elasticity": "both let the body oscillate after a stop; the bearing turns it about other axes",
+            "inertia_error": "the transverse inertias are moments of the same body",
+            "kinematic_coupling": "a soft bearing lets other joints move the owner's body",
+            "gyro_scale": "a small part of the tilt turns with the body's own rate",
+        },
+    ),
+)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An encoder reading that is older than its stamp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.effect import Card, EffectParameter
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+
+Array = NDArray[np.float64]
+
+
+def late(stamps: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
+    """The same for all samples [s]."""
+    ones = np.ones_like(stamps)
+    return p["delay"] * ones, {"delay": ones}
+
+
+EFFECT = TimeShift(
+    id="encoder_delay",
+    owners=("joint", "robot"),
+    late=late,
+    sensors="encoder",
+    parameters=(EffectParameter("delay", "s", start=1e-3, prior_sigma=0.5, sign="+"),),
+    example={"delay": 3e-3},
+    card=Card(
+        title="encoder reading older than its stamp",
+        law="reading(t) = q_motor(t - delay)",
+        explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
+        "joint: its encoder is read later than those of the others.",
+        source="Kelly, Sukhatme (2014), A general framework for temporal calibration of multiple proprioceptive and "
+        "exteroceptive sensors, in Experimental Robotics, Springer",
+        typical="0.1 to 10 ms",
+        excitation="fast oscillation, with a gyro that sees the same joint",
+        look_alikes={
+            "command_delay": "with the encoder late, motion seems to lag behind the command",
+            "motor_lag": "with the encoder late, motion seems to lag behind the command",
+            "gyro_delay": "only the difference in time between encoder and gyro shows, but for the command",
+            "clock_offset": "only differences in time show",
+        },
+    ),
+)
