@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What to type next."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from html import escape
+
+from jointscope.graphs.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery_result import Discovery
+from jointscope.robots.recording import Recording
+from jointscope.tools.report.model_answer import of_verdict
+from jointscope.tools.report.page import Section
+from jointscope.tools.report.robot_argument import robot_argument
+
+
+def after_diagnosis(result: Diagnosis) -> Section:
+    """Add the missing effect and calibrate, or let discover do it; or use the model."""
+    robot, bags, held = _quoted(robot_argument(result.robot)), _paths(result.recordings), _holdout(result.heldout)
+    found = [c.label for c in of_verdict(result, "missing")] or [c.label for c in of_verdict(result, "possible")][:1]
+    if result.adequate:
+        return _section(
+            [("The model is adequate: calibrate with all recordings and use it.", [_calibrate(robot, bags)])]
+        )
+    blocks = []
+    if found:
+        effect = _quoted(found[0])
+        commands = [f"jointscope add {robot} {effect} -o with_effect.yaml", _calibrate("with_effect.yaml", bags)]
+        if result.heldout is not None:
+            commands.append(f"jointscope compare {robot} calibrated.yaml {_quoted(result.heldout.path)}")
+        blocks.append(("Add the first effect, calibrate, and see whether the error falls:", commands))
+    discover = f"jointscope discover {robot} {bags}{held} -o found.yaml --report discovery.html"
+    blocks.append(("Or let the effects be added one by one, as long as the error falls:", [discover]))
+    return _section(blocks)
+
+
+def after_discovery(result: Discovery) -> Section:
+    """Look at the model that was found, and undo its last step."""
+    file = _quoted(result.robot_file or "found.yaml")
+    bag = _quoted(result.heldout.path) if result.heldout is not None else "ANOTHER_BAG"
+    first = _quoted(result.steps[0].robot_file or robot_argument(result.steps[0].robot))
+    blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
+    last = result.steps[-1].added
+    if last:
+        blocks.append(
+            ("Take the last effect out again:", [f"jointscope remove {file} {_quoted(last)} -o without.yaml"])
+        )
+    if not result.adequate:
+        blocks.append(("See what is still missing:", [f"jointscope diagnose {file} {_paths(result.recordings)}"]))
+    return _section(blocks)
+
+
+def _section(blocks: Sequence[tuple[str, Sequence[str]]]) -> Section:
+    body = "".join(f"<p>{escape(text)}</p><pre>{escape(chr(10).join(commands))}</pre>" for text, commands in blocks)
+    return Section("next", "What to do next", body)
+
+
+def _calibrate(robot: str, bags: str) -> str:
+    return f"jointscope calibrate {robot} {bags} -o calibrated.yaml"
+
+
+def _holdout(recording: Recording | None) -> str:
+    return f" --holdout {_quoted(recording.path)}" if recording is not None else ""
+
+
+def _paths(recordings: Sequence[Recording]) -> str:
+    return " ".join(_quoted(recording.path) for recording in recordings) or "BAG"
+
+
+def _quoted(text: str) -> str:
+    return shlex.quote(text)
