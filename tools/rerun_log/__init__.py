@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings for the rerun viewer: log_calibration and log_comparison write an .rrd file with its own layout."""
+"""Recordings for the rerun viewer: one function per kind of result, each writes an .rrd file with its own layout."""
 
 from jointscope.tools.rerun_log.log_calibration import log_calibration
 from jointscope.tools.rerun_log.log_comparison import log_comparison
+from jointscope.tools.rerun_log.log_diagnosis import log_diagnosis
+from jointscope.tools.rerun_log.log_discovery import log_discovery
 
-__all__ = ["log_calibration", "log_comparison"]
+__all__ = ["log_calibration", "log_comparison", "log_diagnosis", "log_discovery"]

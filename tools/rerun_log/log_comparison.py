@@ -6,21 +6,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from jointscope.graphs.comparison_result import ComparisonResult
 from jointscope.tools.report.numbers import percent, significant
-from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_lines
+from jointscope.tools.rerun_log.prediction_lines import prediction_bytes, prediction_views, send_predictions
 from jointscope.tools.rerun_log.rrd_file import rrd_file
 from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
+from jointscope.tools.rerun_log.viewer_text import viewer_text
 
 if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
-
-MODEL_COLOURS = (JOINT_COLOURS[2], JOINT_COLOURS[0], JOINT_COLOURS[1], *JOINT_COLOURS[3:])
-KINDS = {"error": "error 0.1 s ahead [sigma]", "ahead": "0.1 s ahead", "open_loop": "open loop"}
 
 
 def log_comparison(result: ComparisonResult, path: str | Path) -> None:
@@ -33,52 +28,16 @@ def log_comparison(result: ComparisonResult, path: str | Path) -> None:
     Raises:
         JointscopeError: the file cannot be written; nothing is left behind.
     """
-    expected = 8 * sum(4 * s.measured.size for model in result.models for s in model.sensors.values())
-    with rrd_file(path, _blueprint(result), expected) as stream:
+    with rrd_file(path, _blueprint(result), prediction_bytes(result)) as stream:
         _send_scores(stream, result)
-        for sensor, prediction in (result.models[0].sensors if result.models else {}).items():
-            for i in range(len(prediction.channels)):
-                _send_channel(stream, result, sensor, i)
-
-
-def _send_channel(stream: rr.RecordingStream, result: ComparisonResult, sensor: str, i: int) -> None:
-    """Measured, and all models in one entity: they share their times, which halves the file."""
-    first = result.models[0].sensors[sensor]
-    models = [m for m in result.models if sensor in m.sensors and len(m.sensors[sensor].times) == len(first.times)]
-    predictions = [m.sensors[sensor] for m in models]
-    labels = [m.label for m in models]
-    colours = [MODEL_COLOURS[result.models.index(m) % len(MODEL_COLOURS)] for m in models]
-    measured, channel = first.measured[:, i : i + 1], first.channels[i]
-    ahead = np.column_stack([p.ahead[:, i] for p in predictions])
-    free = np.column_stack([p.open_loop[:, i] for p in predictions])
-    # predictions end at some of the samples only; rows without any are left out, or the lines would fall apart
-    some = np.isfinite(ahead).any(axis=1)
-    for kind, values, rows in (("ahead", ahead, some), ("open_loop", free, np.ones_like(some))):
-        send_lines(stream, entity(kind, channel, "measured"), first.times, measured, ["measured"], [GREY], 2.5)
-        send_lines(stream, entity(kind, channel, "predicted"), first.times[rows], values[rows], labels, colours, 1.2)
-    error = ((measured - ahead) / first.sigma)[some]
-    send_lines(stream, entity("error", channel), first.times[some], error, labels, colours)
+        send_predictions(stream, result)
 
 
 def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
-    sensors = result.models[0].sensors if result.models else {}
-    tabs: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="/scores", name="scores")]
-    for kind, title in KINDS.items():
-        columns = [
-            rrb.Vertical(
-                *(
-                    rrb.TimeSeriesView(
-                        origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{p.unit}]")
-                    )
-                    for c in p.channels
-                )
-            )
-            for p in sensors.values()
-        ]
-        tabs.append(rrb.Horizontal(*columns, name=title))
-    return tabbed_blueprint(tabs)
+    scores = rrb.TextDocumentView(origin="/scores", name="scores")
+    return tabbed_blueprint([scores, *prediction_views(result)])
 
 
 def _send_scores(stream: rr.RecordingStream, result: ComparisonResult) -> None:
