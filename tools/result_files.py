@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jointscope
+from jointscope.robots.recording import Recording
 from jointscope.tools.whole_file import whole_file, write_json
 
 
@@ -80,6 +82,45 @@ def write_comparison(result: Any, files: ResultFiles) -> None:
         _write_views(stack, result, files, comparison_report, log_comparison)
 
 
+def write_diagnosis(result: Any, files: ResultFiles) -> None:
+    """Writes a Diagnosis.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report import diagnosis_report
+        from jointscope.tools.rerun_log import log_diagnosis
+
+        _write_views(stack, result, files, diagnosis_report, log_diagnosis)
+
+
+def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
+    """Writes a Discovery; its last robot goes to `files.robot`.
+
+    Args:
+        result: what was found.
+        files: where to.
+        start: name of the base robot's file.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.robot_writer import robot_text
+
+            last = len(result.steps) - 1
+            text = robot_text(
+                result.robot, files.robot.parent, step_provenance(result.steps[last], last, start, result.recordings)
+            )
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        from jointscope.tools.report import discovery_report
+        from jointscope.tools.rerun_log import log_discovery
+
+        _write_views(stack, result, files, discovery_report, log_discovery)
+
+
 def _write_views(
     stack: ExitStack,
     result: Any,
@@ -100,17 +141,30 @@ def _write_views(
 def provenance(result: Any) -> dict[str, Any]:
     """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
     return {
-        "version": jointscope.__version__,
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "start": result.start.path.name,
-        "bags": [
-            {
-                "path": bag.recording.path,
-                "sha256": bag.recording.sha256,
-                "seconds": round(bag.recording.duration, 3),
-            }
-            for bag in result.bags
-        ],
+        **_origin(result.start.path.name, [bag.recording for bag in result.bags]),
         "samples": int(result.samples),
         "cost": float(result.cost),
+    }
+
+
+def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Where a step of a discovery comes from: the same, and what was changed."""
+    errors = {"train_error": step.train_error, "heldout_error": step.heldout_error, "floor": step.floor}
+    return {
+        **_origin(start, recordings),
+        "discovery_step": index,
+        **{name: label for name, label in (("added", step.added), ("removed", step.removed)) if label},
+        **{name: float(f"{value:.6g}") for name, value in errors.items() if math.isfinite(value)},
+    }
+
+
+def _origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    return {
+        "version": jointscope.__version__,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "start": start,
+        "bags": [
+            {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
+            for recording in recordings
+        ],
     }

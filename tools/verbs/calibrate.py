@@ -9,6 +9,7 @@ from typing import Any
 
 from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_calibration
+from jointscope.tools.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.whole_file import check_outputs
 
 EXAMPLE = """example:
@@ -30,6 +31,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    add_effects_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
@@ -37,12 +39,13 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
     files = ResultFiles.of(args)
-    check_outputs(files.all, inputs=args.bags)
+    check_outputs(files.all, inputs=[*args.bags, *args.effects])
     from jointscope.graphs.calibrate import calibrate
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags import read_recording
     from jointscope.tools.calibration_text import calibration_text
 
+    load_user_effects(args.effects)
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]

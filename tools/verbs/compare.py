@@ -11,6 +11,7 @@ from typing import Any
 from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_comparison
+from jointscope.tools.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.whole_file import check_outputs
 
 EXAMPLE = """example:
@@ -34,21 +35,24 @@ def add_parser(subparsers: Any) -> None:
 
 
 def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
-    """Adds ROBOT... BAG."""
+    """Adds ROBOT... BAG [--effects FILE]."""
     parser.add_argument("robots", metavar="ROBOT", nargs="+", help="name of a ready robot, or a robot file")
     parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    add_effects_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compares, writes the files, and says what was found."""
     files = ResultFiles.of(args)
     names = labels(args.robots)
-    check_outputs(files.all, inputs=[args.bag, *(robot for robot in args.robots if Path(robot).is_file())])
+    robot_files = [robot for robot in args.robots if Path(robot).is_file()]
+    check_outputs(files.all, inputs=[args.bag, *robot_files, *args.effects])
     from jointscope.graphs.compare import compare
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags import read_recording
     from jointscope.tools.comparison_text import comparison_text
 
+    load_user_effects(args.effects)
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
     check_same_streams(robots)
     with progress_bar() as progress:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.tools.progress import progress_bar, reading
+from jointscope.tools.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
@@ -26,16 +27,18 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("--robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
+    add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
-    check_outputs([args.json], inputs=[args.bag])
+    check_outputs([args.json], inputs=[args.bag, *args.effects])
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags.describe_bag import describe_bag
 
+    load_user_effects(args.effects)
     robot = load_robot(args.robot) if args.robot else None
     with progress_bar() as progress:
         description = describe_bag(args.bag, robot, reading(args.bag, progress))

@@ -12,7 +12,7 @@ from jointscope.tools.verbs import compare
 EXAMPLE = """example:
   jointscope report doggy doggy_calibrated.yaml moves.mcap -o comparison.html
 
-The report of a calibration itself comes from `jointscope calibrate --report F.html`."""
+A calibration, a diagnosis and a discovery write theirs themselves: `jointscope diagnose ... --report F.html`."""
 
 
 def add_parser(subparsers: Any) -> None:

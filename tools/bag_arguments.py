@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ROBOT BAG... [--holdout BAG]: what the verbs take that learn from recordings and are judged by another one."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+from jointscope.tools.progress import Progress, reading
+from jointscope.tools.user_effects import add_effects_option
+
+
+def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments."""
+    parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
+    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument(
+        "--holdout", metavar="BAG", type=Path, help="a recording that is scored and reported, but never chooses"
+    )
+    add_effects_option(parser)
+
+
+def input_files(args: argparse.Namespace) -> list[Path]:
+    """Everything that must not be overwritten."""
+    robot = [Path(args.robot)] if Path(args.robot).is_file() else []
+    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *args.effects]
+
+
+def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
+    """The training recordings and the held-out one.
+
+    Raises:
+        RecordingError: a bag cannot be read, or the held-out one is also a training recording.
+    """
+    from jointscope.tools.bags import read_recording
+
+    recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+    if args.holdout is None:
+        return recordings, None
+    holdout = read_recording(args.holdout, robot, reading(args.holdout, progress))
+    _check_apart(recordings, holdout)
+    return recordings, holdout
+
+
+def _check_apart(recordings: Sequence[Recording], holdout: Recording) -> None:
+    for recording in recordings:
+        if recording.sha256 and recording.sha256 == holdout.sha256:
+            raise RecordingError(
+                f"--holdout {holdout.path} is also a training recording ({recording.path}); hold out one that the "
+                "model has not seen"
+            )

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope diagnose`: ranks the physical effects that a model lacks, each with its evidence."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import Any
+
+from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.progress import progress_bar
+from jointscope.tools.result_files import ResultFiles, add_result_options, write_diagnosis
+from jointscope.tools.user_effects import load_user_effects
+from jointscope.tools.whole_file import check_outputs
+
+EXAMPLE = """example:
+  jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
+
+The robot is calibrated first. Effects are chosen by blocks of the training recordings that were left out; the held-out
+recording never chooses. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "diagnose",
+        help="ranks the physical effects that a model lacks, each with its evidence",
+        description="Shows where a model fails and ranks the physical effects that it may lack.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_bag_arguments(parser)
+    add_result_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnoses, writes the files, and says what was found."""
+    files = ResultFiles.of(args)
+    check_outputs(files.all, inputs=input_files(args))
+    load_user_effects(args.effects)
+    from jointscope.graphs.diagnose import diagnose
+    from jointscope.robots.robot_file import load_robot
+    from jointscope.tools.diagnosis_text import diagnosis_text
+
+    robot = load_robot(args.robot)
+    with progress_bar() as progress:
+        recordings, holdout = read_bags(args, robot, progress)
+        result = diagnose(robot, recordings, holdout, progress=progress)
+        result = replace(result, recordings=tuple(recordings), heldout=holdout)
+        if files.report is not None or files.rrd is not None:
+            progress("writing", 1.0)
+        write_diagnosis(result, files)
+    print(diagnosis_text(result))
+    if files.all:
+        print(f"\nWrote {', '.join(map(str, files.all))}")
+    return 0

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope discover`: calibrates, diagnoses, adds what is missing, and repeats until nothing helps."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.robot import Robot
+from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.progress import Progress, progress_bar
+from jointscope.tools.result_files import ResultFiles, add_result_options, write_discovery
+from jointscope.tools.user_effects import load_user_effects
+from jointscope.tools.whole_file import check_outputs
+
+EXAMPLE = """example:
+  jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
+
+Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
+after the last finished step; found.discovery.json remembers what it started from."""
+
+MAX_STEPS = 8
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "discover",
+        help="calibrates, diagnoses, adds what is missing, and repeats until nothing helps",
+        description="Finds the physical effects that a model lacks and adds them one by one, as long as the error "
+        "falls on recordings, or blocks of them, that were not used for fitting.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_bag_arguments(parser)
+    parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    parser.add_argument("--restart", action="store_true", help="ignore the steps of an earlier run")
+    add_result_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Discovers, writes the files, and tells the steps."""
+    from jointscope.tools.discovery_state import state_file, step_file
+
+    files = ResultFiles.of(args)
+    beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MAX_STEPS + 1))]
+    check_outputs([*files.all, *beside], inputs=input_files(args))
+    load_user_effects(args.effects)
+    from jointscope.robots.robot_file import load_robot
+    from jointscope.tools.discovery_text import discovery_text
+
+    robot = load_robot(args.robot)
+    with progress_bar() as progress:
+        recordings, holdout = read_bags(args, robot, progress)
+        result = _discover(args, robot, recordings, holdout, progress)
+        if files.report is not None or files.rrd is not None:
+            progress("writing", 1.0)
+        write_discovery(result, files, robot.path.name)
+    print(discovery_text(result))
+    print(f"\nWrote {', '.join(map(str, files.all))}")
+    return 0
+
+
+def _discover(
+    args: argparse.Namespace, robot: Robot, recordings: Sequence[Any], holdout: Any, progress: Progress
+) -> Any:
+    """The computation; whatever ends it, finished steps stay on disk."""
+    from jointscope.graphs.discover import discover
+    from jointscope.tools.discovery_state import DiscoveryState, hashes_of
+
+    hashes = hashes_of(robot, recordings, holdout, args.effects)
+    state = DiscoveryState(args.output, hashes, recordings, robot.path.name)
+    saved = () if args.restart else state.resume()
+    if saved:
+        print(f"Continuing after step {len(saved) - 1}, {saved[-1].robot_file}; --restart starts anew.\n", flush=True)
+    try:
+        result = discover(
+            robot,
+            recordings,
+            holdout,
+            save=state.save,
+            resume=saved or None,
+            max_steps=MAX_STEPS,
+            progress=progress,
+        )
+    except KeyboardInterrupt:
+        if not state.count:
+            raise
+        raise JointscopeError(f"interrupted after step {state.count - 1}; the same command continues there") from None
+    return replace(result, robot_file=str(args.output), recordings=tuple(recordings), heldout=holdout)
