@@ -13,7 +13,8 @@ from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.progress import progress_bar
-from jointscope.tools.simulator import DEFAULT_SECONDS, Disturbance, Simulation, simulate, simulated_effects
+from jointscope.tools.simulator import DEFAULT_SECONDS, Disturbance, Simulation, simulate
+from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
@@ -29,7 +30,7 @@ def add_parser(subparsers: Any) -> None:
         "simulate",
         help="a recording from an engine that is independent of the estimator's own model",
         description="Simulates a robot with MuJoCo and writes a bag and the truth beside it.",
-        epilog=EXAMPLE,
+        epilog=f"{EXAMPLE}\n\n{effect_list()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     defaults = ", ".join(f"{seconds:g} for {motion}" for motion, seconds in DEFAULT_SECONDS.items())
@@ -43,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
         action="append",
         default=[],
         metavar="ID@OWNER[:param=value,...]",
-        help=f"a physical effect; may be repeated; known: {', '.join(simulated_effects())}",
+        help="a physical effect, in a size that matters unless values are given; may be repeated; the list is below",
     )
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="true value of a parameter; may be repeated"

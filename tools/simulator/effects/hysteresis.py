@@ -20,9 +20,9 @@ from jointscope.tools.simulator.specification import add_dry_friction, motor_joi
 
 Array = NDArray[np.float64]
 
-ELEMENTS = 8
-SLIDER_RATE = 800.0  # [rad/s] of a slider on its spring: far above the robot, slow enough for the engine's step
-SLIDER_DAMPING_RATIO = 0.05
+ELEMENTS = 10
+SLIDER_RATE = 500.0  # [rad/s] of a slider on its spring: far above the robot; faster ones are lighter and creep more
+SLIDER_DAMPING_RATIO = 0.03
 
 
 class Hysteresis(SimulatedEffect):
@@ -66,11 +66,11 @@ def spread(torque: float, deflection: float) -> tuple[Array, Array]:
         deflection: length of Dahl's law [rad].
 
     Returns:
-        Strength [N m] and slip [rad] of each element, each of shape (ELEMENTS,), chosen so that the curve is met at
-        the slips.
+        Strength [N m] and slip [rad] of each element, each of shape (ELEMENTS,). The curve is met at all slips but the
+        last, which replaces the tail by a line of the same area.
     """
-    shares = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-    slips = -0.5 * deflection * np.log(1.0 - shares)
+    shares = np.arange(1, ELEMENTS + 1) / ELEMENTS
+    slips = -0.5 * deflection * np.log(1.0 - shares[:-1])
+    slips = np.append(slips, slips[-1] + deflection)
     slopes = np.diff(torque * shares, prepend=0.0) / np.diff(slips, prepend=0.0)
-    strengths = -np.diff(slopes, append=0.0) * slips
-    return strengths * torque / strengths.sum(), slips
+    return -np.diff(slopes, append=0.0) * slips, slips

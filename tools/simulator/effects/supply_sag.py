@@ -26,5 +26,5 @@ class SupplySag(SimulatedEffect):
 
     def command(self, time: float, issued: Array) -> Array:
         """What the drives get."""
-        load = np.mean(np.abs(issued) / full_command(self.robot))
+        load = float(np.mean(np.abs(issued) / full_command(self.robot)))
         return issued * max(0.0, 1.0 - self.parameters["drop"] * load)
