@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hides effects in simulated recordings, lets `discover` find them and prints the table as markdown.
+
+Usage: python benchmarks/bench_discovery.py [--quick] [--only PATTERN] [--jobs N] [--results FILE] [--list]
+"""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import hashlib
+import json
+import multiprocessing
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from functools import cache
+from pathlib import Path
+
+from bench import environment
+from discovery import section
+from discovery_case import run_case
+from discovery_row import Row
+from hidden_effects import Case, cases, tenth
+from patience import say
+
+import jointscope.graphs
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def main() -> None:
+    arguments = _parse()
+    wanted = tenth(cases()) if arguments.quick else cases()
+    wanted = [case for case in wanted if fnmatch.fnmatch(f"{case.kind}: {case.name}", f"*{arguments.only}*")]
+    if arguments.list:
+        print("\n".join(f"{case.kind}: {case.name}" for case in wanted))
+        return
+    results: Path = arguments.results
+    known = known_rows(results)
+    missing = [case for case in wanted if case.name not in known]
+    say(f"{len(wanted)} cases, {len(wanted) - len(missing)} of them in {results} already")
+    for row in measure(missing, arguments.jobs):
+        keep(results, row)
+        known[row.name] = row
+    rows = [known[case.name] for case in wanted if case.name in known]
+    print(f"# Discovery{' (quick run)' if arguments.quick else ''}\n\n{environment()}\n\n{section(rows).markdown()}")
+
+
+def measure(missing: list[Case], jobs: int) -> Iterator[Row]:
+    """Rows as they come; each process has one core, where the linear algebra of several would fight for all."""
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    began = time.perf_counter()
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        running = {pool.submit(run_case, case): case for case in missing}
+        for done, future in enumerate(as_completed(running), start=1):
+            case = running[future]
+            try:
+                row = future.result()
+            except BrokenProcessPool:
+                raise  # a process was killed, and the others with it: nothing was measured
+            except Exception as err:  # a bug shall not end a run of hours; it stands in the table
+                row = Row(case.name, case.kind, case.truth, error=f"{type(err).__name__}: {err}")
+            left = (time.perf_counter() - began) / done * (len(missing) - done)
+            say(
+                f"{done} of {len(missing)}, {left / 60:.0f} min left; {row.name}: {row.error or row.accepted or 'none'}"
+            )
+            yield row
+
+
+def keep(path: Path, row: Row) -> None:
+    """Appends a row to the results file."""
+    with path.open("a", encoding="utf-8") as lines:
+        lines.write(json.dumps({"code": code(), **row.to_json()}) + "\n")
+
+
+def known_rows(path: Path) -> dict[str, Row]:
+    """Rows of an earlier run with the same code, by name."""
+    found: dict[str, Row] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
+        try:
+            content = json.loads(line)
+        except json.JSONDecodeError:
+            continue  # the run was interrupted here
+        if content.pop("code") == code():
+            found[content["name"]] = Row.of_json(content)
+    return found
+
+
+@cache
+def code() -> str:
+    """Changes with the package and with the table, so that no stale row is used."""
+    package = Path(jointscope.graphs.__file__).parents[1]
+    files = [p for room in ("robots", "factors", "graphs", "tools/simulator") for p in (package / room).rglob("*.py")]
+    files.append(Path(__file__).with_name("hidden_effects.py"))
+    content = b"".join(path.read_bytes() for path in sorted(files))
+    return hashlib.sha256(content).hexdigest()[:12]
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python benchmarks/bench_discovery.py",
+        description="Hides effects in simulated recordings and lets `discover` find them; an interrupted run continues "
+        "where it stopped. Example: bench_discovery.py --only bearing --jobs 2",
+    )
+    parser.add_argument("--quick", action="store_true", help="about a tenth of the table, some of every kind")
+    parser.add_argument(
+        "--only", default="", metavar="PATTERN", help="only cases whose name matches, as 'pair:*cogging'"
+    )
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes, each on one core; 2 by default")
+    default = Path(tempfile.gettempdir()) / "jointscope-bench-discovery.jsonl"
+    parser.add_argument("--results", type=Path, default=default, metavar="FILE", help=f"rows as JSON lines; {default}")
+    parser.add_argument("--list", action="store_true", help="only print the names of the cases")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
