@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.step import Steps, row_names
-from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.robots.elastic_joints import Accelerations, ElasticJoints
 from jointscope.robots.robot import ProcessNoise
 
 Array = NDArray[np.float64]
@@ -42,11 +42,11 @@ class DynamicsFactor(ABC):
     @property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows: velocities, then positions; link before motor."""
-        return row_names(self.joints)
+        return row_names(self.model.layout)
 
     @property
     def sigmas(self) -> Array:
-        """Standard deviations of the rows, shape (m, 4n) [rad/s], [rad]."""
+        """Standard deviations of the rows, shape (m, d) [rad/s], [rad]."""
         return self.steps.sigmas
 
     def select(self, samples: Samples) -> DynamicsFactor:
@@ -58,7 +58,7 @@ class DynamicsFactor(ABC):
         return replace(self, steps=replace(self.steps, noise=noise))
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
-        """Defects of velocities and positions over each step, shape (m, 4n)."""
+        """Defects of velocities and positions over each step, shape (m, d)."""
         d_v, d_q = self.defects(x[0], x[1], calibration.values)
         return self.steps.combine(d_v, d_q)
 
@@ -67,12 +67,12 @@ class DynamicsFactor(ABC):
         return self.linearize_pairs(x[0], x[1], calibration)
 
     def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
-        """As `linearize` for consecutive ticks, x of shape (m + 1, 4n); may share work between steps."""
+        """As `linearize` for consecutive ticks, x of shape (m + 1, d); may share work between steps."""
         return self.linearize_pairs(x[:-1], x[1:], calibration)
 
     @abstractmethod
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
-        """Velocity and position defects, shape (m, 2n) each."""
+        """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
 
     @abstractmethod
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
@@ -85,11 +85,36 @@ class DynamicsFactor(ABC):
         by_x1: tuple[Array, Array],
         by_parameter: tuple[Array, Array],
         calibration: Calibration,
+        middle: Accelerations,
     ) -> Linearization:
-        """Puts the velocity and position halves together and changes parameters to coordinates."""
+        """Puts the halves together, adds the response to changed commands, changes parameters to coordinates.
+
+        Args:
+            defects: of rates and of positions.
+            by_x0: their derivatives by the first state.
+            by_x1: their derivatives by the second state.
+            by_parameter: their derivatives by the dynamics parameters.
+            calibration: where this is.
+            middle: accelerations within the step; they tell how a change of the command acts.
+        """
+        self._add_commands(by_parameter[0], calibration, middle)
         dynamics = self.steps.combine(*by_parameter) * calibration.value_by_coordinate
         return Linearization(
             self.steps.combine(*defects),
             (self.steps.combine(*by_x0), self.steps.combine(*by_x1)),
             {DYNAMICS: dynamics},
         )
+
+    def command(self, parameters: Array) -> Array:
+        """Commands that act in each step, shape (m, n), for values of the free parameters."""
+        return self.steps.acting(self.model.named(parameters))[0]
+
+    def _add_commands(self, by_parameter: Array, calibration: Calibration, middle: Accelerations) -> None:
+        """Derivative of the rate defects by what effects do to the commands; positions feel it h/2 less."""
+        slopes = self.steps.acting(self.model.named(calibration.values))[1]
+        if not slopes:
+            return
+        response = self.steps.h[:, None, None] * self.model.command_response(middle, calibration.values)
+        for name, slope in slopes.items():
+            if name in self.model.names:
+                by_parameter[:, :, self.model.names.index(name)] -= (response @ slope[:, :, None])[:, :, 0]

@@ -19,6 +19,7 @@ from jointscope.factors.factor import Linearization
 from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
@@ -29,9 +30,11 @@ class GyroFactor(SensorFactor[Gyro]):
 
     Attributes:
         tree: rigid bodies.
+        layout: of the states.
     """
 
     tree: RigidTree
+    layout: StateLayout
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -40,19 +43,20 @@ class GyroFactor(SensorFactor[Gyro]):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, 3) [rad/s]."""
-        n = self.tree.n
-        omega_body = self.tree.body_rate(self.sensor.body, x[0][:, :n], x[0][:, n : 2 * n])[0]
+        layout = self.layout
+        omega_body = self.tree.body_rate(self.sensor.body, x[0][:, layout.q_link], x[0][:, layout.v_link])[0]
         R = calibration.rotations[self.name]
         return omega_body @ R.T + calibration.biases[self.name] - self.measured
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives."""
-        m, n = len(self.measured), self.tree.n
-        omega_body, by_q, by_v = self.tree.body_rate(self.sensor.body, x[0][:, :n], x[0][:, n : 2 * n])
+        m, layout = len(self.measured), self.layout
+        motion = x[0][:, layout.q_link], x[0][:, layout.v_link]
+        omega_body, by_q, by_v = self.tree.body_rate(self.sensor.body, *motion)
         R = calibration.rotations[self.name]
-        by_state = np.zeros((m, 3, 4 * n))
-        by_state[:, :, :n] = R @ by_q
-        by_state[:, :, n : 2 * n] = R @ by_v
+        by_state = np.zeros((m, 3, layout.size))
+        by_state[:, :, layout.q_link] = R @ by_q
+        by_state[:, :, layout.v_link] = R @ by_v
         by_block = {
             rotation_block(self.name): -R @ skew(omega_body),
             bias_block(self.name): np.broadcast_to(np.eye(3), (m, 3, 3)),

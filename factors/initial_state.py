@@ -16,23 +16,26 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Linearization, Samples
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class InitialStateFactor:
-    """Prior on deflection and velocities of the first state.
+    """Prior on deflections, velocities and memories of the first state.
 
     Attributes:
-        joints: names of the joints.
-        deflection_sigma: tolerance of q_link - q_motor [rad].
+        layout: of the states.
+        deflection_sigma: tolerance of q_link - q_motor, and of the tilt of a bearing [rad].
         velocity_sigma: tolerance of the velocities [rad/s].
+        memory_sigmas: tolerance of each memory, shape (n_memory,).
     """
 
-    joints: tuple[str, ...]
+    layout: StateLayout
     deflection_sigma: float
     velocity_sigma: float
+    memory_sigmas: tuple[float, ...] = ()
 
     name = "initial_state"
     states = 1
@@ -44,26 +47,37 @@ class InitialStateFactor:
     @property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows."""
-        parts = ("deflection", "link_velocity", "motor_velocity")
-        return tuple(f"{joint}.initial_{part}" for part in parts for joint in self.joints)
+        layout = self.layout
+        deflections = [f"{name}.initial_deflection" for name in (*layout.motors, *self._hinges)]
+        velocities = [f"{name}.initial_link_velocity" for name in layout.links]
+        velocities += [f"{name}.initial_motor_velocity" for name in layout.motors]
+        return (*deflections, *velocities, *(f"{name}.initial" for name in layout.memories))
 
     @property
     def sigmas(self) -> Array:
-        """Tolerances, shape (3n,)."""
-        n = len(self.joints)
-        return np.concatenate([np.full(n, self.deflection_sigma), np.full(2 * n, self.velocity_sigma)])
+        """Tolerances, shape (r,)."""
+        deflections = np.full(len(self.layout.motors) + len(self._hinges), self.deflection_sigma)
+        velocities = np.full(len(self.layout.velocities), self.velocity_sigma)
+        return np.concatenate([deflections, velocities, self.memory_sigmas])
+
+    @property
+    def _hinges(self) -> list[str]:
+        return [name for name in self.layout.links if name not in self.layout.joints]
 
     @property
     def _matrix(self) -> Array:
-        eye, zero = np.eye(len(self.joints)), np.zeros((len(self.joints),) * 2)
-        return np.block([[eye, zero, -eye, zero], [zero, eye, zero, zero], [zero, zero, zero, eye]])
+        layout, eye = self.layout, np.eye(self.layout.size)
+        elastic = [layout.joints.index(joint) for joint in layout.motors]
+        hinges = [layout.links.index(name) for name in self._hinges]
+        deflections = eye[layout.joint_q[elastic]] - eye[layout.motor_q[elastic]]
+        return np.vstack([deflections, eye[hinges], eye[layout.rates]])
 
     def select(self, samples: Samples) -> InitialStateFactor:
         """There is one sample only."""
         return self
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
-        """Deflections and velocities, shape (1, 3n)."""
+        """Deflections, velocities and memories, shape (1, r)."""
         return x[0] @ self._matrix.T
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:

@@ -5,18 +5,22 @@ White noise on the velocities makes the cubic Hermite polynomial the most likely
 
     q(t) = h00 q0 + h h10 v0 + h01 q1 + h h11 v1,   v(t) = dq/dt
 
-Variables: X(k), X(k+1) and those of the sensor. A measurement is never moved in time.
+Variables: X(k), X(k+1) and those of the sensor; dynamics where effects make the stamps late. A measurement is never
+moved in time; where its lateness is a parameter, the state is taken at another fraction of the step.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Factor, Linearization, Samples
+from jointscope.robots.lateness import Lateness
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
@@ -27,13 +31,19 @@ class InterpolatedFactor:
 
     Attributes:
         inner: factor of the sensor.
-        fraction: (t - t_k) / h of each sample, in [0, 1], shape (m,).
+        fraction: (t - t_k) / h of each sample, shape (m,); outside [0, 1] the polynomial goes on.
         h: distance of the two ticks, shape (m,) [s].
+        layout: of the states.
+        late: how late the stamps are beyond `fraction`; None if they are right.
+        fixed: parameters that calibration leaves alone, by full name.
     """
 
     inner: Factor
     fraction: Array
     h: Array
+    layout: StateLayout
+    late: Lateness | None = None
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
     states = 2
 
@@ -52,8 +62,9 @@ class InterpolatedFactor:
 
     @property
     def blocks(self) -> tuple[str, ...]:
-        """Blocks of the sensor."""
-        return self.inner.blocks
+        """Blocks of the sensor, and dynamics where the stamps are late."""
+        inner = self.inner.blocks
+        return inner if self.late is None or DYNAMICS in inner else (*inner, DYNAMICS)
 
     @property
     def sigmas(self) -> Array:
@@ -62,45 +73,92 @@ class InterpolatedFactor:
 
     def select(self, samples: Samples) -> InterpolatedFactor:
         """The same factor for some of the samples."""
-        return replace(self, inner=self.inner.select(samples), fraction=self.fraction[samples], h=self.h[samples])
+        late = self.late
+        if late is not None:
+            late = replace(late, stamps=late.stamps[samples], anchor=late.anchor[samples])
+        part = replace(self, inner=self.inner.select(samples), fraction=self.fraction[samples], h=self.h[samples])
+        return replace(part, late=late)
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
-        return self.inner.residual((interpolate(x[0], x[1], self.fraction, self.h),), calibration)
+        fraction, _ = self._fraction(calibration)
+        return self.inner.residual((interpolate(self.layout, x[0], x[1], fraction, self.h),), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
-        """Residual and derivatives by both states."""
-        inner = self.inner.linearize((interpolate(x[0], x[1], self.fraction, self.h),), calibration)
-        J = inner.by_state[0]
+        """Residual and derivatives by both states, and by what makes the stamps late."""
+        fraction, slopes = self._fraction(calibration)
+        inner = self.inner.linearize((interpolate(self.layout, x[0], x[1], fraction, self.h),), calibration)
+        J, s = inner.by_state[0], fraction[:, None, None]
         J0, J1 = np.empty_like(J), np.empty_like(J)
-        position, velocity = ([w[:, None, None] for w in part] for part in _weights(self.fraction, self.h))
-        for q, v in _position_velocity_columns(J.shape[2]):
-            J0[:, :, q] = position[0] * J[:, :, q] + velocity[0] * J[:, :, v]
-            J0[:, :, v] = position[1] * J[:, :, q] + velocity[1] * J[:, :, v]
-            J1[:, :, q] = position[2] * J[:, :, q] + velocity[2] * J[:, :, v]
-            J1[:, :, v] = position[3] * J[:, :, q] + velocity[3] * J[:, :, v]
-        return Linearization(inner.residual, (J0, J1), inner.by_block)
+        position, velocity = ([w[:, None, None] for w in part] for part in _weights(fraction, self.h))
+        q, v, z = self.layout.positions, self.layout.velocities, self.layout.memory
+        J0[:, :, q] = position[0] * J[:, :, q] + velocity[0] * J[:, :, v]
+        J0[:, :, v] = position[1] * J[:, :, q] + velocity[1] * J[:, :, v]
+        J1[:, :, q] = position[2] * J[:, :, q] + velocity[2] * J[:, :, v]
+        J1[:, :, v] = position[3] * J[:, :, q] + velocity[3] * J[:, :, v]
+        J0[:, :, z], J1[:, :, z] = (1.0 - s) * J[:, :, z], s * J[:, :, z]
+        by_block = dict(inner.by_block)
+        if slopes:
+            motion = rate_between(self.layout, x[0], x[1], fraction, self.h)
+            by_block[DYNAMICS] = self._by_lateness((J @ motion[:, :, None])[:, :, 0], slopes, by_block, calibration)
+        return Linearization(inner.residual, (J0, J1), by_block)
+
+    def _by_lateness(
+        self, rate: Array, slopes: dict[str, Array], by_block: dict[str, Array], calibration: Calibration
+    ) -> Array:
+        """Derivative by the dynamics; `rate` is that of the reading, shape (m, r)."""
+        total = np.zeros((*rate.shape, len(calibration.names)))
+        if DYNAMICS in by_block:
+            total += by_block[DYNAMICS]
+        for name, slope in slopes.items():
+            if name in calibration.names:
+                k = calibration.names.index(name)
+                total[:, :, k] -= rate * slope[:, None] * calibration.value_by_coordinate[k]
+        return total
+
+    def _fraction(self, calibration: Calibration) -> tuple[Array, dict[str, Array]]:
+        """Fraction of the step at which each sample was taken, and the slopes of its lateness."""
+        if self.late is None:
+            return self.fraction, {}
+        values = {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        late, slopes = self.late.since_anchor(values)
+        return self.fraction - late / self.h, slopes
 
 
-def interpolate(x0: Array, x1: Array, fraction: Array, h: Array) -> Array:
+def interpolate(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: Array) -> Array:
     """States between two ticks.
 
     Args:
-        x0: states at the first tick, shape (m, 4n).
-        x1: states at the second tick, shape (m, 4n).
-        fraction: (t - t_k) / h, in [0, 1], shape (m,).
+        layout: of the states.
+        x0: states at the first tick, shape (m, d).
+        x1: states at the second tick, shape (m, d).
+        fraction: (t - t_k) / h, shape (m,).
         h: distance of the ticks, shape (m,) [s].
 
     Returns:
-        Shape (m, 4n).
+        Shape (m, d); positions and velocities by the cubic polynomial, memories linearly.
     """
     x = np.empty_like(x0)
+    q, v, z = layout.positions, layout.velocities, layout.memory
     weights = _weights(fraction, h)
-    for q, v in _position_velocity_columns(x0.shape[1]):
-        pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
-        x[:, q] = sum(w[:, None] * part for w, part in zip(weights[0], pairs, strict=True))
-        x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
+    pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
+    x[:, q] = sum(w[:, None] * part for w, part in zip(weights[0], pairs, strict=True))
+    x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
+    x[:, z] = x0[:, z] + fraction[:, None] * (x1[:, z] - x0[:, z])
     return x
+
+
+def rate_between(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: Array) -> Array:
+    """Time derivative of `interpolate`, shape (m, d)."""
+    rate = np.empty_like(x0)
+    q, v, z = layout.positions, layout.velocities, layout.memory
+    s = fraction
+    pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
+    curvature = ((12 * s - 6) / h**2, (6 * s - 4) / h, -(12 * s - 6) / h**2, (6 * s - 2) / h)
+    rate[:, q] = sum(w[:, None] * part for w, part in zip(_weights(s, h)[1], pairs, strict=True))
+    rate[:, v] = sum(w[:, None] * part for w, part in zip(curvature, pairs, strict=True))
+    rate[:, z] = (x1[:, z] - x0[:, z]) / h[:, None]
+    return rate
 
 
 def _weights(s: Array, h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
@@ -109,9 +167,3 @@ def _weights(s: Array, h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     slope = 6 * s * (s - 1) / h
     velocity = (slope, (1 - s) * (1 - 3 * s), -slope, s * (3 * s - 2))
     return position, velocity
-
-
-def _position_velocity_columns(size: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Columns of positions and velocities in a state, for the link and for the motor side."""
-    n = size // 4
-    return (slice(0, n), slice(n, 2 * n)), (slice(2 * n, 3 * n), slice(3 * n, 4 * n))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
-from jointscope.factors.step import positions_of, selectors, velocities_of
+from jointscope.factors.step import selectors
 
 Array = NDArray[np.float64]
 
@@ -21,24 +21,25 @@ class MidpointDynamics(DynamicsFactor):
     """d_v = v1 - v0 - h a(x_mid, u), d_q = q1 - q0 - h v_mid."""
 
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
-        """Velocity and position defects, shape (m, 2n) each."""
-        return self._defects(x0, x1, self.model.accelerations(0.5 * (x0 + x1), self.steps.u, parameters))
+        """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
+        return self._defects(x0, x1, self.model.accelerations(0.5 * (x0 + x1), self.command(parameters), parameters))
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
         """Defects and derivatives for m pairs of states."""
         h = self.steps.h[:, None, None]
-        Q, V = selectors(self.model.n)
-        a = self.model.with_derivatives(0.5 * (x0 + x1), self.steps.u, calibration.values)
+        Q, V = selectors(self.model.layout)
+        a = self.model.with_derivatives(0.5 * (x0 + x1), self.command(calibration.values), calibration.values)
         half = 0.5 * h * a.by_state
         return self.assemble(
             self._defects(x0, x1, a.value),
-            (-V - half, -Q - 0.5 * h * V),
-            (V - half, Q - 0.5 * h * V),
-            (-h * a.by_parameter, np.zeros_like(a.by_parameter)),
+            (-V - half, -Q - 0.5 * h * V[: len(Q)]),
+            (V - half, Q - 0.5 * h * V[: len(Q)]),
+            (-h * a.by_parameter, np.zeros_like(a.by_parameter[:, : len(Q)])),
             calibration,
+            a,
         )
 
     def _defects(self, x0: Array, x1: Array, a: Array) -> tuple[Array, Array]:
-        h = self.steps.h[:, None]
-        v0, v1 = velocities_of(x0), velocities_of(x1)
-        return v1 - v0 - h * a, positions_of(x1) - positions_of(x0) - 0.5 * h * (v0 + v1)
+        h, layout = self.steps.h[:, None], self.model.layout
+        moved = (x0 + x1)[:, layout.velocities]
+        return (x1 - x0)[:, layout.rates] - h * a, (x1 - x0)[:, layout.positions] - 0.5 * h * moved

@@ -15,13 +15,20 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Linearization
 from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.sensors import MotorEncoder
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class MotorEncoderFactor(SensorFactor[MotorEncoder]):
-    """Residual = predicted - measured motor angle; measured has shape (m, n) [rad]."""
+    """Residual = predicted - measured motor angle; measured has shape (m, n) [rad].
+
+    Attributes:
+        layout: of the states.
+    """
+
+    layout: StateLayout
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -30,12 +37,11 @@ class MotorEncoderFactor(SensorFactor[MotorEncoder]):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, n) [rad]."""
-        n = self.measured.shape[1]
-        return x[0][:, 2 * n : 3 * n] + self.sensor.zero - self.measured
+        return x[0][:, self.layout.motor_q] + self.sensor.zero - self.measured
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and its constant derivative."""
         m, n = self.measured.shape
-        by_state = np.zeros((m, n, 4 * n))
-        by_state[:, np.arange(n), 2 * n + np.arange(n)] = 1.0
+        by_state = np.zeros((m, n, self.layout.size))
+        by_state[:, np.arange(n), self.layout.motor_q] = 1.0
         return Linearization(self.residual(x, calibration), (by_state,))

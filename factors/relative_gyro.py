@@ -24,6 +24,7 @@ from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
@@ -33,12 +34,14 @@ class RelativeGyroFactor(SensorFactor[Gyro]):
     """Residual = rate predicted from another gyro and the joints in between - measured rate.
 
     Attributes:
-        tree: rigid bodies.
+        tree: rigid bodies, without hinges of bearings.
+        layout: of the states.
         reference: the gyro further down the tree, on the body that the first joint moves.
         measured_reference: rates of `reference` at the same times, shape (m, 3) [rad/s].
     """
 
     tree: RigidTree
+    layout: StateLayout
     reference: Gyro
     measured_reference: Array
 
@@ -58,8 +61,8 @@ class RelativeGyroFactor(SensorFactor[Gyro]):
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives."""
-        m, n = len(self.measured), self.tree.n
-        q, v = x[0][:, :n], x[0][:, n : 2 * n]
+        m, n, layout = len(self.measured), self.tree.n, self.layout
+        q, v = x[0][:, layout.joint_q], x[0][:, layout.joint_v]
         own, other = self.name, self.reference.name
         R_own, R_other = calibration.rotations[own], calibration.rotations[other]
         v_between = v.copy()
@@ -74,9 +77,9 @@ class RelativeGyroFactor(SensorFactor[Gyro]):
             by_q[:, :, j] -= np.cross(by_v[:, :, j], carried)
         by_v[:, :, 0] = 0.0
         omega_body = carried + omega_relative
-        by_state = np.zeros((m, 3, 4 * n))
-        by_state[:, :, :n] = R_own @ by_q
-        by_state[:, :, n : 2 * n] = R_own @ by_v
+        by_state = np.zeros((m, 3, layout.size))
+        by_state[:, :, layout.joint_q] = R_own @ by_q
+        by_state[:, :, layout.joint_v] = R_own @ by_v
         by_block = {
             rotation_block(own): -R_own @ skew(omega_body),
             bias_block(own): np.broadcast_to(np.eye(3), (m, 3, 3)),

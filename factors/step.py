@@ -11,13 +11,15 @@ Schuethe et al. 2016) the second half is d_q itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
+from jointscope.robots.command_path import CommandPath
 from jointscope.robots.robot import ProcessNoise
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
@@ -28,15 +30,21 @@ class Steps:
 
     Attributes:
         h: length of each step, shape (m,) [s].
-        u: command that acts during each step, shape (m, n), SI unit of the command.
+        u: command logged for each step, shape (m, n), SI unit of the command.
         noise: densities of the process noise.
-        weight: W of each step, shape (m, n, n); None for the identity.
+        layout: of the states.
+        weight: W of each step, shape (m, n_link, n_link); None for the identity.
+        path: how the commands act, where effects change them; None where they act as logged.
+        index: place of each step in the path, shape (m,).
     """
 
     h: Array
     u: Array
     noise: ProcessNoise
+    layout: StateLayout
     weight: Array | None = None
+    path: CommandPath | None = None
+    index: NDArray[np.intp] | None = None
 
     def __len__(self) -> int:
         return len(self.h)
@@ -44,7 +52,19 @@ class Steps:
     def select(self, samples: Samples) -> Steps:
         """Some of the steps."""
         weight = None if self.weight is None else self.weight[samples]
-        return Steps(self.h[samples], self.u[samples], self.noise, weight)
+        index = None if self.index is None else self.index[samples]
+        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index)
+
+    def acting(self, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
+        """Commands that act, shape (m, n), and their derivatives by parameters of effects, by full name.
+
+        Args:
+            values: parameters of the robot by full name.
+        """
+        if self.path is None:
+            return self.u, {}
+        u, slopes = self.path.acting(values)
+        return u[self.index], {name: slope[self.index] for name, slope in slopes.items()}
 
     @property
     def integrated(self) -> bool:
@@ -53,20 +73,21 @@ class Steps:
 
     @property
     def sigmas(self) -> Array:
-        """Standard deviations of the rows (velocities, then positions; link before motor), shape (m, 4n)."""
-        density = np.concatenate([self.noise.link_velocity, self.noise.motor_velocity])
+        """Standard deviations of the rows (velocities, memories, positions; link before motor), shape (m, d)."""
+        density = np.concatenate([self.noise.link_velocity, self.noise.motor_velocity, self.noise.memory])
         root = np.sqrt(self.h)[:, None]
-        velocity = density * root
+        rates = density * root
+        velocity = rates[:, : len(self.layout.velocities)]
         if self.integrated:
-            return np.hstack([velocity, velocity * self.h[:, None] / np.sqrt(12.0)])
-        return np.hstack([velocity, np.broadcast_to(self.noise.position * root, velocity.shape)])
+            return np.hstack([rates, velocity * self.h[:, None] / np.sqrt(12.0)])
+        return np.hstack([rates, np.broadcast_to(self.noise.position * root, velocity.shape)])
 
     def combine(self, d_v: Array, d_q: Array) -> Array:
-        """Stacks velocity and position defects (axis 1) into the rows whose noise is independent."""
+        """Stacks rate and position defects (axis 1) into the rows whose noise is independent."""
         if not self.integrated:
             return np.concatenate([d_v, d_q], axis=1)
         half = (0.5 * self.h).reshape(-1, *([1] * (d_v.ndim - 1)))
-        return np.concatenate([self._weighted(d_v), self._weighted(d_q - half * d_v)], axis=1)
+        return np.concatenate([self._weighted(d_v), self._weighted(d_q - half * d_v[:, : d_q.shape[1]])], axis=1)
 
     def _weighted(self, defect: Array) -> Array:
         """Link rows as impulses on the mean inertia, motor rows as they are."""
@@ -78,27 +99,14 @@ class Steps:
         return np.concatenate([link, defect[:, n:]], axis=1)
 
 
-def row_names(joints: tuple[str, ...]) -> tuple[str, ...]:
+def row_names(layout: StateLayout) -> tuple[str, ...]:
     """Names of the rows of a dynamics factor."""
-    sides = [f"{joint}.link" for joint in joints] + [f"{joint}.motor" for joint in joints]
-    return tuple(f"{side}_{half}" for half in ("velocity", "position") for side in sides)
+    sides = [f"{name}.link" for name in layout.links] + [f"{joint}.motor" for joint in layout.motors]
+    velocities = [f"{side}_velocity" for side in sides]
+    return (*velocities, *layout.memories, *(f"{side}_position" for side in sides))
 
 
-def selectors(n: int) -> tuple[Array, Array]:
-    """Matrices that pick all positions, and all velocities (link, then motor) from a state, shape (2n, 4n)."""
-    eye, zero = np.eye(n), np.zeros((n, n))
-    positions = np.block([[eye, zero, zero, zero], [zero, zero, eye, zero]])
-    velocities = np.block([[zero, eye, zero, zero], [zero, zero, zero, eye]])
-    return positions, velocities
-
-
-def positions_of(x: Array) -> Array:
-    """Link, then motor positions of states, shape (m, 2n)."""
-    n = x.shape[1] // 4
-    return np.hstack([x[:, :n], x[:, 2 * n : 3 * n]])
-
-
-def velocities_of(x: Array) -> Array:
-    """Link, then motor velocities of states, shape (m, 2n)."""
-    n = x.shape[1] // 4
-    return np.hstack([x[:, n : 2 * n], x[:, 3 * n :]])
+def selectors(layout: StateLayout) -> tuple[Array, Array]:
+    """Matrices that pick all positions, and all velocities with memories, from a state: (k, d) and (r, d)."""
+    eye = np.eye(layout.size)
+    return eye[layout.positions], eye[layout.rates]

@@ -21,6 +21,7 @@ from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro
+from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 
@@ -31,9 +32,11 @@ class VerticalGyroFactor(SensorFactor[Gyro]):
 
     Attributes:
         tree: rigid bodies.
+        layout: of the states.
     """
 
     tree: RigidTree
+    layout: StateLayout
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -53,13 +56,13 @@ class VerticalGyroFactor(SensorFactor[Gyro]):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual, shape (m, 1) [rad/s]."""
-        return (x[0][:, self.tree.n] - self._body_rate(calibration) @ self.axis)[:, None]
+        return (x[0][:, self.layout.joint_v[0]] - self._body_rate(calibration) @ self.axis)[:, None]
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives."""
-        m, n = len(self.measured), self.tree.n
-        by_state = np.zeros((m, 1, 4 * n))
-        by_state[:, 0, n] = 1.0
+        m = len(self.measured)
+        by_state = np.zeros((m, 1, self.layout.size))
+        by_state[:, 0, self.layout.joint_v[0]] = 1.0
         R, omega_body = calibration.rotations[self.name], self._body_rate(calibration)
         by_block = {
             rotation_block(self.name): -(self.axis @ skew(omega_body))[:, None, :],

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.bias_at_rest import BiasAtRestFactor
+from jointscope.factors.distorted import DistortedFactor
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.factor import Factor
@@ -26,13 +27,17 @@ from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.priors import BiasPrior
 from jointscope.factors.relative_gyro import RelativeGyroFactor
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
+from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.timeline import Timeline
+from jointscope.robots.command_path import CommandPath
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.robots.lateness import Lateness, late_channels
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.sensors import Gyro, MotorEncoder
+from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 
@@ -86,10 +91,16 @@ class BagProblem:
     def of(robot: Robot, recording: Recording) -> BagProblem:
         """Builds the factors of a recording."""
         timeline = Timeline.of(recording)
-        steps = Steps(timeline.h, timeline.u, robot.noise, _impulse_weights(robot, recording, timeline))
+        weights = _impulse_weights(robot, recording, timeline)
+        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
+        index = np.arange(len(timeline.h))
+        steps = Steps(
+            timeline.h, timeline.u, robot.noise, robot.layout, weights, path if path.changes else None, index
+        )
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
-        initial = InitialStateFactor(robot.joints, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA)
+        spreads = tuple(here.effect.memory.spread for here in robot.memories)
+        initial = InitialStateFactor(robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads)
         placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
         for name in robot.sensors:
             placed += _place_sensor(robot, recording, timeline, name)
@@ -112,12 +123,15 @@ class BagProblem:
 
 
 def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> Array:
-    """M(q) of every step over the mean inertia of each joint, shape (m, n, n); q from the motor encoders."""
+    """M(q) of every step over the mean inertia of each coordinate, shape (m, n_link, n_link); q from the encoders."""
     encoder = recording.streams[robot.motor_encoder.name]
     middle = timeline.ticks[:-1] + 0.5 * timeline.h
     angles = [np.interp(middle, encoder.times, column) for column in encoder.values.T]
-    M = robot.tree.mass_matrix(np.column_stack(angles) - robot.motor_encoder.zero)
-    M_at_zero = robot.tree.mass_matrix(np.zeros((1, robot.n)))[0]
+    layout, tree = robot.layout, robot.kinematic_tree
+    q = np.zeros((len(middle), layout.n_link))
+    q[:, layout.joint_link] = np.column_stack(angles) - robot.motor_encoder.zero
+    M = tree.mass_matrix(q)
+    M_at_zero = tree.mass_matrix(np.zeros((1, layout.n_link)))[0]
     alone = 1.0 / np.diag(np.linalg.inv(M_at_zero))
     return M / alone[:, None]
 
@@ -158,7 +172,28 @@ def _without_states(factor: Factor, m: int) -> Placed:
 
 
 def _place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: str) -> list[Placed]:
-    """The samples of one sensor: those at a tick, and those between two."""
+    """The samples of one sensor: those at a tick, those between two, and channels whose stamps are late apart."""
+    placed = []
+    for channels, late in late_channels(robot, name):
+        if not late:
+            placed += _place_on_time(robot, recording, timeline, name, channels)
+            continue
+        stream = recording.streams[name]
+        lateness = Lateness.of(robot, late, stream.times)
+        taken = stream.times - lateness.anchor
+        inside = (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
+        step, fraction = timeline.locate(taken[inside])
+        inner = _some(_sensor_factor(robot, recording, name, stream, inside), channels, robot.sensors[name])
+        here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
+        factor = InterpolatedFactor(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
+        placed.append(Placed(factor, step, stream.times[inside]))
+    return placed
+
+
+def _place_on_time(
+    robot: Robot, recording: Recording, timeline: Timeline, name: str, channels: NDArray[np.intp]
+) -> list[Placed]:
+    """Channels with right stamps."""
     sensor = robot.sensors[name]
     stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
     step, fraction = timeline.locate(stream.times)
@@ -168,14 +203,24 @@ def _place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: 
     aligned = distance * _rate_of_change(stream) < ALIGNED * sensor.sigma
     placed = []
     if np.any(aligned):
-        factor = _sensor_factor(robot, recording, name, stream, aligned)
+        factor = _some(_sensor_factor(robot, recording, name, stream, aligned), channels, sensor)
         placed.append(Placed(factor, nearest[aligned], stream.times[aligned]))
     if not np.all(aligned):
         between = ~aligned
-        inner = _sensor_factor(robot, recording, name, stream, between)
-        factor = InterpolatedFactor(inner, fraction[between], h[between])
+        inner = _some(_sensor_factor(robot, recording, name, stream, between), channels, sensor)
+        factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
         placed.append(Placed(factor, step[between], stream.times[between]))
     return placed
+
+
+def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:
+    """The factor for some of a sensor's channels; the paper's forms of a gyro are never divided."""
+    return factor if len(channels) == len(sensor.channels) else SomeChannels(factor, channels)
+
+
+def _values(robot: Robot) -> dict[str, float]:
+    """Present values of all parameters."""
+    return {name: parameter.value for name, parameter in robot.parameters.items()}
 
 
 def _rate_of_change(stream: Stream) -> Array:
@@ -186,26 +231,39 @@ def _rate_of_change(stream: Stream) -> Array:
 
 
 def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
-    sensor, values = robot.sensors[name], stream.values[chosen]
-    if isinstance(sensor, MotorEncoder):
-        return factor_on_state(robot, name, values)
+    sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
+    if isinstance(sensor, MotorEncoder) or sensor.form == "full":
+        return factor_on_state(robot, name, values, times)
     if sensor.form == "vertical":
-        return VerticalGyroFactor(sensor, values, robot.tree)
-    if sensor.form == "relative":
-        reference = robot.sensors[str(sensor.reference)]
-        assert isinstance(reference, Gyro)
-        other = recording.streams[reference.name]
-        nearest = _nearest(other.times, stream.times[chosen])
-        return RelativeGyroFactor(sensor, values, robot.tree, reference, other.values[nearest])
-    return factor_on_state(robot, name, values)
+        return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)
+    reference = robot.sensors[str(sensor.reference)]
+    assert isinstance(reference, Gyro)
+    other = recording.streams[reference.name]
+    nearest = _nearest(other.times, times)
+    return RelativeGyroFactor(sensor, values, robot.tree, robot.layout, reference, other.values[nearest])
 
 
-def factor_on_state(robot: Robot, name: str, values: Array) -> Factor:
-    """A sensor with all its channels predicted from the state, whatever form its file chooses; values: shape (m, c)."""
+def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Factor:
+    """A sensor with all its channels predicted from the state, whatever form its file chooses.
+
+    Args:
+        robot: the model.
+        name: name of the sensor.
+        values: measured, shape (m, c).
+        times: stamps since the start of the recording, shape (m,) [s].
+    """
     sensor = robot.sensors[name]
+    inner: GyroFactor | MotorEncoderFactor
     if isinstance(sensor, MotorEncoder):
-        return MotorEncoderFactor(sensor, values)
-    return GyroFactor(sensor, values, robot.tree)
+        inner = MotorEncoderFactor(sensor, values, robot.layout)
+        seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
+    else:
+        inner = GyroFactor(sensor, values, robot.kinematic_tree, robot.layout)
+        seats = {name: np.arange(len(sensor.channels))}
+    effects = [here for here in robot.effects if isinstance(here.effect, ReadingEffect) and here.owner in seats]
+    if not effects:
+        return inner
+    return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, _values(robot))
 
 
 def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:

@@ -77,7 +77,7 @@ class Solved:
     def of(problems: list[BagProblem], solution: Solution, hold: Sequence[str]) -> Solved:
         """Uncertainties and one pass over all residuals."""
         found, covariance = posteriors(problems, solution, hold)
-        evidence = NoiseEvidence.empty(problems[0].robot.n)
+        evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
         residuals = [
             _collect(problem, solution, i, posterior, evidence)
             for i, (problem, posterior) in enumerate(zip(problems, found, strict=True))
@@ -148,16 +148,27 @@ def _collect(
         sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
         expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
         if isinstance(part.factor, DynamicsFactor):
-            half = part.residual.shape[1] // 2
-            collected.process.append(((part.residual * sigmas)[:, :half], expected[:, :half]))
+            rates = problem.robot.layout.n_rates
+            collected.process.append(((part.residual * sigmas)[:, :rates], expected[:, :rates]))
         elif part.factor.name in collected.series:
-            collected.series[part.factor.name].append((part.residual * sigmas, expected, _one(part)))
+            collected.series[part.factor.name].append(_Samples.of(part, part.residual * sigmas, expected))
     return collected
 
 
-def _one(part: ResidualPart) -> Array:
-    """Squares and freedom of the part, for chi2: sum r^2 and sum (1 - leverage), shape (2, r)."""
-    return np.array([np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)])
+@dataclass(frozen=True)
+class _Samples:
+    """Some samples of a sensor: residuals, their expected sigma, and sums for chi2, one column per row of the factor."""
+
+    rows: tuple[str, ...]
+    residual: Array
+    expected: Array
+    squares: Array
+    freedom: Array
+
+    @staticmethod
+    def of(part: ResidualPart, residual: Array, expected: Array) -> _Samples:
+        squares, freedom = np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)
+        return _Samples(part.factor.rows, residual, expected, squares, freedom)
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
@@ -185,25 +196,32 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
     )
 
 
-def _series(problem: BagProblem, sensor: Sensor, parts: list[tuple[Array, Array, Array]]) -> ResidualSeries:
+def _series(problem: BagProblem, sensor: Sensor, parts: list[_Samples]) -> ResidualSeries:
     """Residuals of one sensor in the order of time."""
-    placed = [p for p in problem.sensors if p.factor.name == sensor.name]
-    times = np.concatenate([p.times for p in placed])
-    order = np.argsort(times, kind="stable")
-    residual = np.concatenate([r for r, _, _ in parts])[order]
-    expected = np.concatenate([s for _, s, _ in parts])[order]
+    rows = parts[0].rows
+    channels = sensor.channels if set(rows) <= set(sensor.channels) else rows
     stream = problem.recording.streams[sensor.name]
-    index = np.searchsorted(stream.times, times[order])
-    channels = placed[0].factor.rows
-    measured = stream.values[index] if len(channels) == stream.values.shape[1] else np.zeros_like(residual)
+    times = np.concatenate([p.times for p in problem.sensors if p.factor.name == sensor.name])
+    table = np.full((3, len(stream), len(channels)), np.nan)
+    sums, start = np.zeros((2, len(channels))), 0
+    for part in parts:
+        index = np.searchsorted(stream.times, times[start : start + len(part.residual)])
+        columns = [channels.index(row) for row in part.rows]
+        table[0][np.ix_(index, columns)], table[1][np.ix_(index, columns)] = part.residual, part.expected
+        sums[0, columns] += part.squares
+        sums[1, columns] += part.freedom
+        start += len(part.residual)
+    table[2] = stream.values if len(channels) == stream.values.shape[1] else 0.0
+    seen = np.all(np.isfinite(table), axis=(0, 2))
+    residual, expected, measured = table[:, seen]
     return ResidualSeries(
         channels=channels,
         unit=sensor.unit,
-        times=times[order],
+        times=stream.times[seen],
         measured=measured,
         predicted=measured + residual,
         sigma=expected,
-        chi2=np.divide(*np.sum([c for _, _, c in parts], axis=0)),
+        chi2=sums[0] / sums[1],
     )
 
 

@@ -20,6 +20,7 @@ from jointscope.graphs.bag_problem import BagProblem, factor_on_state
 from jointscope.graphs.batch_solver import Progress, solve
 from jointscope.graphs.calibrate import approach, calibrate, check_recordings
 from jointscope.graphs.causal_filter import FilteredStates, filter_states
+from jointscope.graphs.channel_floor import channel_floors
 from jointscope.graphs.comparison_result import (
     OPEN_LOOP,
     ChannelComparison,
@@ -29,10 +30,12 @@ from jointscope.graphs.comparison_result import (
     WorstWindow,
 )
 from jointscope.graphs.initial_guess import initial_biases
-from jointscope.graphs.noise_floor import floor_of, settled_from
+from jointscope.graphs.joint_states import JointStates
+from jointscope.graphs.noise_floor import settled_from
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.robots.errors import RobotError
+from jointscope.robots.lateness import Lateness, late_channels
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Sensor
@@ -53,10 +56,12 @@ class Ahead:
     Attributes:
         sample: index of the sample in its stream, shape (s,).
         predicted: predicted measurement, shape (s, c).
+        states: predicted states, shape (s, d).
     """
 
     sample: NDArray[np.intp]
     predicted: Array
+    states: Array
 
 
 @in_solver_context
@@ -92,19 +97,23 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
     ahead = {h: _predict_ahead(problem, calibration, predictor, causal, h) for h in HORIZONS}
     open_loop = _predict_open_loop(problem, calibration, predictor, states[0])
     sensors = {
-        name: _sensor_prediction(recording.streams[name], robot.sensors[name], ahead[HORIZON], open_loop)
+        name: _sensor_prediction(recording.streams[name], robot.sensors[name], ahead, open_loop)
         for name in robot.sensors
     }
     channels = _channels(robot, recording, ahead, open_loop)
     error = float(np.sqrt(np.mean([(c.horizons[str(HORIZON)] / c.noise_sigma) ** 2 for c in channels.values()])))
+    floors = channel_floors(problem, states, calibration, HORIZON)
     return ModelComparison(
         label=label,
         robot=robot,
         error=error,
-        floor=floor_of(problem, states, calibration, HORIZON),
+        floor=float(np.sqrt(np.mean(np.square(list(floors.values()))))),
         channels=channels,
         worst=_worst_windows(sensors),
         sensors=sensors,
+        floors=floors,
+        motion=JointStates.of(robot, problem.timeline.ticks, states),
+        predicted_motion=_predicted_motion(robot, recording, ahead[HORIZON]),
     )
 
 
@@ -136,30 +145,60 @@ def _predict_ahead(
     timeline = problem.timeline
     ticks, h = timeline.ticks, float(np.median(timeline.h))
     stride = max(round(SPACING[horizon] / h), 1)
-    longest = int(np.ceil((horizon + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
+    groups = _groups(problem)
+    latest = max(float(np.max(np.abs(problem.recording.streams[g.sensor].times - g.taken), initial=0.0)) for g in groups)
+    longest = int(np.ceil((horizon + latest + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
     start = np.arange(np.searchsorted(ticks, settled_from(problem)), len(ticks) - 1 - longest, stride)
     if len(start) == 0:
         return {
-            name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))))
+            name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))), causal.mean[:0])
             for name, s in problem.robot.sensors.items()
         }
-    wanted = {
-        name: _target_samples(problem.recording.streams[name], ticks[start] + horizon) for name in problem.robot.sensors
-    }
-    steps = {name: timeline.locate(problem.recording.streams[name].times[w])[0] for name, (w, _) in wanted.items()}
-    found = {name: np.full((len(start), causal.mean.shape[1]), np.nan) for name in wanted}
+    wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
+    taken = [g.taken[wanted[g.sensor][0]] for g in groups]
+    steps = [timeline.locate(times)[0] for times in taken]
+    found = [np.full((len(start), causal.mean.shape[1]), np.nan) for _ in groups]
     for step, before, after in predictor.paths(causal.mean[start], start, longest):
-        for name, (sample, _) in wanted.items():
-            here = steps[name] == step
+        for states, times, ends in zip(found, taken, steps, strict=True):
+            here = ends == step
             if np.any(here):
-                times = problem.recording.streams[name].times[sample[here]]
-                found[name][here] = _between(timeline.ticks, step[here], times, before[here], after[here])
+                states[here] = _between(problem, step[here], times[here], before[here], after[here])
     result = {}
     for name, (sample, near) in wanted.items():
-        good = near & np.all(np.isfinite(found[name]), axis=1)
-        predicted = predict_sensor(problem.robot, name, found[name][good], calibration)
-        result[name] = Ahead(sample[good], predicted)
+        own = [(g, states) for g, states in zip(groups, found, strict=True) if g.sensor == name]
+        good = near & np.all([np.all(np.isfinite(states), axis=1) for _, states in own], axis=0)
+        stamps = problem.recording.streams[name].times[sample[good]]
+        predicted = np.full((len(stamps), len(problem.robot.sensors[name].channels)), np.nan)
+        for group, states in own:
+            all_channels = predict_sensor(problem.robot, name, states[good], calibration, stamps)
+            predicted[:, group.channels] = all_channels[:, group.channels]
+        result[name] = Ahead(sample[good], predicted, own[0][1][good])
     return result
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Channels of a sensor that were sampled at the same instants.
+
+    Attributes:
+        sensor: name.
+        channels: indices of the channels.
+        taken: when the samples were really taken, shape (m,) [s].
+    """
+
+    sensor: str
+    channels: NDArray[np.intp]
+    taken: Array
+
+
+def _groups(problem: BagProblem) -> list[_Group]:
+    """All channels of all sensors, by when they were sampled."""
+    found = []
+    for name in problem.robot.sensors:
+        stamps = problem.recording.streams[name].times
+        for channels, late in late_channels(problem.robot, name):
+            found.append(_Group(name, channels, stamps - Lateness.of(problem.robot, late, stamps).anchor))
+    return found
 
 
 def _sums(h: Array, horizon: float) -> Array:
@@ -169,24 +208,25 @@ def _sums(h: Array, horizon: float) -> Array:
     return total / count
 
 
-def _target_samples(stream: Stream, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Nearest sample to each time, and whether it lies within half a period."""
-    right = np.clip(np.searchsorted(stream.times, times), 1, len(stream) - 1)
-    nearest = np.where(times - stream.times[right - 1] < stream.times[right] - times, right - 1, right)
-    period = float(np.median(np.diff(stream.times)))
-    return nearest, np.abs(stream.times[nearest] - times) <= 0.5 * period + 1e-9
+def _target_samples(taken: Array, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period."""
+    right = np.clip(np.searchsorted(taken, times), 1, len(taken) - 1)
+    nearest = np.where(times - taken[right - 1] < taken[right] - times, right - 1, right)
+    period = float(np.median(np.diff(taken)))
+    return nearest, np.abs(taken[nearest] - times) <= 0.5 * period + 1e-9
 
 
-def _between(ticks: Array, step: NDArray[np.intp], times: Array, before: Array, after: Array) -> Array:
+def _between(problem: BagProblem, step: NDArray[np.intp], times: Array, before: Array, after: Array) -> Array:
     """States between two ticks."""
+    ticks = problem.timeline.ticks
     h = ticks[step + 1] - ticks[step]
-    return interpolate(before, after, np.clip((times - ticks[step]) / h, 0.0, 1.0), h)
+    return interpolate(problem.robot.layout, before, after, np.clip((times - ticks[step]) / h, 0.0, 1.0), h)
 
 
-def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration) -> Array:
-    """What a sensor would measure at states of shape (s, d), shape (s, c)."""
+def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration, stamps: Array) -> Array:
+    """What a sensor would read at states of shape (s, d) with these stamps, shape (s,) [s]; shape (s, c)."""
     nothing = np.zeros((len(x), len(robot.sensors[name].channels)))
-    return factor_on_state(robot, name, nothing).residual((x,), calibration)
+    return factor_on_state(robot, name, nothing, stamps).residual((x,), calibration)
 
 
 def _predict_open_loop(
@@ -198,26 +238,44 @@ def _predict_open_loop(
     path[0] = x0
     for step, _, after in predictor.paths(x0[None], np.zeros(1, np.intp), len(ticks) - 1):
         path[step[0] + 1] = after[0]
-    found = {}
-    for name, sensor in problem.robot.sensors.items():
-        times = problem.recording.streams[name].times
-        inside = (times >= ticks[0]) & (times <= ticks[-1])
-        step, _ = problem.timeline.locate(times[inside])
-        x = _between(ticks, step, times[inside], path[step], path[step + 1])
-        predicted = np.full((len(times), len(sensor.channels)), np.nan)
-        predicted[inside] = predict_sensor(problem.robot, name, x, calibration)
-        found[name] = predicted
+    streams = problem.recording.streams
+    found = {name: np.full(streams[name].values.shape, np.nan) for name in problem.robot.sensors}
+    for group in _groups(problem):
+        inside = (group.taken >= ticks[0]) & (group.taken <= ticks[-1])
+        step, _ = problem.timeline.locate(group.taken[inside])
+        x = _between(problem, step, group.taken[inside], path[step], path[step + 1])
+        stamps = streams[group.sensor].times[inside]
+        predicted = predict_sensor(problem.robot, group.sensor, x, calibration, stamps)
+        found[group.sensor][np.ix_(inside, group.channels)] = predicted[:, group.channels]
     return found
 
 
 def _sensor_prediction(
-    stream: Stream, sensor: Sensor, ahead: dict[str, Ahead], open_loop: dict[str, Array]
+    stream: Stream, sensor: Sensor, ahead: dict[float, dict[str, Ahead]], open_loop: dict[str, Array]
 ) -> SensorPrediction:
-    predicted = np.full(stream.values.shape, np.nan)
-    predicted[ahead[sensor.name].sample] = ahead[sensor.name].predicted
+    at_samples = {}
+    for horizon in (HORIZONS[0], HORIZON):
+        at_samples[horizon] = np.full(stream.values.shape, np.nan)
+        at_samples[horizon][ahead[horizon][sensor.name].sample] = ahead[horizon][sensor.name].predicted
     return SensorPrediction(
-        sensor.channels, sensor.unit, sensor.sigma, stream.times, stream.values, open_loop[sensor.name], predicted
+        sensor.channels,
+        sensor.unit,
+        sensor.sigma,
+        stream.times,
+        stream.values,
+        open_loop[sensor.name],
+        at_samples[HORIZON],
+        at_samples[HORIZONS[0]],
     )
+
+
+def _predicted_motion(robot: Robot, recording: Recording, ahead: dict[str, Ahead]) -> JointStates | None:
+    """Motion where predictions of the motor encoders end; None without predictions."""
+    name = robot.motor_encoder.name
+    sample, first = np.unique(ahead[name].sample, return_index=True)
+    if len(sample) < 2:
+        return None
+    return JointStates.of(robot, recording.streams[name].times[sample], ahead[name].states[first])
 
 
 def _channels(

@@ -33,7 +33,12 @@ BAND = (0.5, 10.0)  # [Hz] the regression uses motion between these frequencies
 
 
 def initial_states(problem: BagProblem, calibration: Calibration) -> Array:
-    """States at all ticks, shape (m + 1, 4n)."""
+    """States at all ticks, shape (m + 1, d); bearings do not tilt, memories are empty."""
+    return problem.robot.layout.from_joints(_joint_states(problem, calibration))
+
+
+def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:
+    """(q_link, v_link, q_motor, v_motor) of the joints, shape (m + 1, 4n)."""
     ticks = problem.timeline.ticks
     encoder = problem.recording.streams[problem.robot.motor_encoder.name]
     angles = encoder.values - problem.robot.motor_encoder.zero
@@ -80,7 +85,7 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
     """All signals of the two equations, equally filtered, shape (m, n) each."""
     robot, ticks = problem.robot, problem.timeline.ticks
     h = float(np.median(problem.timeline.h))
-    q_link, v_link, _, v_motor = np.split(x, 4, axis=1)
+    q_link, v_link, _, v_motor = np.split(robot.layout.by_joint(x), 4, axis=1)
     u = np.vstack([problem.timeline.u, problem.timeline.u[-1:]])
     a_link = np.gradient(v_link, ticks, axis=0)
     low = butter(2, min(BAND[1], 0.4 / h), fs=1.0 / h, output="sos")

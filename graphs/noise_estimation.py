@@ -41,17 +41,17 @@ class NoiseEvidence:
     """Sums over dynamics residuals.
 
     Attributes:
-        squares: whitened squared velocity defects, shape (2n,).
-        freedom: samples minus leverages, shape (2n,).
+        squares: whitened squared defects of velocities and memories, shape (r,).
+        freedom: samples minus leverages, shape (r,).
     """
 
     squares: Array
     freedom: Array
 
     @staticmethod
-    def empty(n: int) -> NoiseEvidence:
-        """No residuals yet, for n joints."""
-        return NoiseEvidence(np.zeros(2 * n), np.zeros(2 * n))
+    def empty(rates: int) -> NoiseEvidence:
+        """No residuals yet, for a number of equations."""
+        return NoiseEvidence(np.zeros(rates), np.zeros(rates))
 
     def add(self, part: ResidualPart) -> None:
         """Takes in some residuals; those of other factors are ignored."""
@@ -62,23 +62,23 @@ class NoiseEvidence:
 
     @property
     def factors(self) -> Array:
-        """Factor by which each density should change, shape (2n,)."""
+        """Factor by which each density should change, shape (r,)."""
         return np.sqrt(self.squares / np.maximum(self.freedom, 1.0))
 
 
 def scaled(noise: ProcessNoise, factors: Array) -> ProcessNoise:
-    """Noise with each density multiplied, not below the smallest."""
-    n = len(noise.link_velocity)
+    """Noise with each density multiplied, not below the smallest; densities of memories stay."""
+    link, motor, _ = np.split(factors, [len(noise.link_velocity), len(noise.link_velocity) + len(noise.motor_velocity)])
     return replace(
         noise,
-        link_velocity=np.maximum(noise.link_velocity * factors[:n], SMALLEST_DENSITY),
-        motor_velocity=np.maximum(noise.motor_velocity * factors[n:], SMALLEST_DENSITY),
+        link_velocity=np.maximum(noise.link_velocity * link, SMALLEST_DENSITY),
+        motor_velocity=np.maximum(noise.motor_velocity * motor, SMALLEST_DENSITY),
     )
 
 
 def densities(noise: ProcessNoise) -> Array:
-    """All densities, link before motor, shape (2n,)."""
-    return np.concatenate([noise.link_velocity, noise.motor_velocity])
+    """All densities, link before motor before memories, shape (r,)."""
+    return np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
 
 
 def estimate_noise(
@@ -133,7 +133,7 @@ def _cycle(
         # too far for a step that nobody checks: two checked ones first
         return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
     found, _ = posteriors(problems, here, hold)
-    evidence = NoiseEvidence.empty(problems[0].robot.n)
+    evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
     for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
         dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]
         dx = step.dx[i]

@@ -61,14 +61,14 @@ def floor_of(problem: BagProblem, x: Array, calibration: Calibration, horizon: f
 
 
 def _quiet_factors(problem: BagProblem, x: Array, calibration: Calibration) -> Array:
-    """Process noise of quiet blocks over that of the model, at most 1, shape (2n,)."""
+    """Process noise of quiet blocks over that of the model, at most 1, shape (r,)."""
     elimination = eliminate(build(problem, x, calibration))
     p = elimination.W.shape[1]
     posterior = StatePosterior.of(elimination, np.zeros((p, p)))
     squares, freedom, times = [], [], []
     linearized = linearize_all(problem, x, calibration, dynamics_only=True)
     for part in residual_parts(linearized, calibration, posterior):
-        half = part.residual.shape[1] // 2
+        half = problem.robot.layout.n_rates
         squares.append(part.residual[:, :half] ** 2)
         freedom.append(1.0 - part.leverage[:, :half])
         times.append(problem.timeline.ticks[part.ticks])
@@ -100,7 +100,7 @@ def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, 
     """Expected squared error of every channel in sigmas, shape (s, c)."""
     found = []
     for name, sensor in problem.robot.sensors.items():
-        factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))))
+        factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
         J = factor.linearize((x,), calibration).by_state[0] / sensor.sigma
         found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
     return np.hstack(found)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.timeline import Timeline
+from jointscope.robots.command_path import CommandPath
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.robot import Robot
 
@@ -33,7 +34,8 @@ class Predictor:
         self._model = ElasticJoints(robot)
         self._values = np.array([robot.parameters[name].value for name in self._model.names])
         self._euler = robot.choices.integrator == "euler"
-        self._h, self._u = timeline.h, timeline.u
+        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
+        self._h, self._u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
         friction = [robot.parameter(f"{j}.coulomb_torque").value for j in robot.joints]
         inertia = [robot.drive_parameter(j, "inertia").value for j in robot.joints]
         rate = robot.choices.friction_sharpness * float(np.max(np.array(friction) / np.array(inertia)))
@@ -75,6 +77,7 @@ class Predictor:
             x = after
 
     def _rate(self, x: Array, u: Array) -> Array:
-        n = self._model.n
-        a = self._model.accelerations(x, u, self._values)
-        return np.hstack([x[:, n : 2 * n], a[:, :n], x[:, 3 * n :], a[:, n:]])
+        layout, rate = self._model.layout, np.empty_like(x)
+        rate[:, layout.positions] = x[:, layout.velocities]
+        rate[:, layout.rates] = self._model.accelerations(x, u, self._values)
+        return rate

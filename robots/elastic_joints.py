@@ -1,37 +1,44 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Accelerations of a robot with elastic joints, with all derivatives, for many samples at once.
 
-    link side   M(q) a + c(q, v) + g(q) + tau_c = 0                          (eq. 1, 5)
-    motor side  b a_motor = tau_c + tau_motor(u, v_motor) - tau_friction     (eq. 2, 7)
-    coupling    tau_c = K (q_link - q_motor) + D (v_link - v_motor)          (eq. 6)
-    motor       tau_motor = k_pwm U u - k_mi v_motor                         (eq. 11)
-    friction    tau_friction = mu tanh(k v)                                  (eq. 12)
+    link side   M(q) a + c(q, v) + g(q) + tau_c = tau_link effects                      (eq. 1, 5)
+    motor side  b a_motor = tau_c + tau_motor(u, v_motor) - tau_friction + effects      (eq. 2, 7)
+    coupling    tau_c = K (q_link - q_motor) + D (v_link - v_motor) + effects           (eq. 6)
+    motor       tau_motor = k_pwm U u - k_mi v_motor                                    (eq. 11)
+    friction    tau_friction = mu tanh(k v)                                             (eq. 12)
+    bearing     tau = -q / compliance - damping v   on each hinge of a soft bearing
 
-The state is x = (q_link, v_link, q_motor, v_motor). Equation numbers: Schuethe, Wenk, Frese (2016).
+A rigid joint has no motor side: its motor torque and inertia act on the link. Equation numbers: Schuethe, Wenk,
+Frese (2016).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.effect_torques import EffectTorques, Springs
 from jointscope.robots.robot import Robot
+from jointscope.robots.structured_tree import StructuredTree
+from jointscope.robots.torque_terms import TorqueTerms
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class RigidDerivatives:
-    """Derivatives of the rigid bodies' accelerations by q, v and tau (M^-1), shape (m, n, n) each."""
+    """Derivatives of the rigid bodies' accelerations by q, v and tau (M^-1), shape (m, n_link, n_link) each."""
 
     by_position: Array
     by_velocity: Array
     by_torque: Array
 
     def between(self) -> RigidDerivatives:
-        """Means of neighbouring samples, shape (m - 1, n, n): off by h^2/8 of their second time derivative."""
+        """Means of neighbouring samples, shape (m - 1, ...): off by h^2/8 of their second time derivative."""
         parts = (self.by_position, self.by_velocity, self.by_torque)
         return RigidDerivatives(*(0.5 * (part[1:] + part[:-1]) for part in parts))
 
@@ -41,9 +48,9 @@ class Accelerations:
     """Accelerations of m samples and their derivatives.
 
     Attributes:
-        value: link accelerations, then motor accelerations, shape (m, 2n) [rad/s^2].
-        by_state: derivative by x, shape (m, 2n, 4n).
-        by_parameter: derivative by the free parameters, each in its own unit, shape (m, 2n, p).
+        value: link accelerations, motor accelerations, rates of memories, shape (m, r) [rad/s^2].
+        by_state: derivative by x, shape (m, r, d).
+        by_parameter: derivative by the free parameters, each in its own unit, shape (m, r, p).
         rigid: the part of the derivatives that comes from the rigid bodies.
     """
 
@@ -57,141 +64,293 @@ class ElasticJoints:
     """The equations of motion of one robot.
 
     Args:
-        robot: tree, drives and parameters.
+        robot: tree, drives, effects and parameters.
 
     Attributes:
         names: names of the free parameters, in the order of every parameter vector here.
-        n: number of joints.
+        layout: of the state.
     """
 
     def __init__(self, robot: Robot):
-        self.n = robot.n
-        self._tree = robot.tree
+        self.layout = layout = robot.layout
+        self._tree = StructuredTree(robot)
         self._volts = robot.command_volts
         self._torque_command = robot.command.unit == "N m"
         self._friction_on_link = robot.choices.friction_velocity == "link"
         self._sharpness = robot.choices.friction_sharpness
         self.names = tuple(name for name, parameter in robot.parameters.items() if not parameter.fixed)
-        self._fixed: dict[str, Array] = {}
-        self._index: dict[str, NDArray[np.intp]] = {}
-        laws = ("coulomb_torque", "stiffness", "damping", "inertia")
-        for law in laws if self._torque_command else (*laws, "k_pwm", "k_mi"):
-            drive = [robot.drive_parameter(joint, law) for joint in robot.joints]
-            self._fixed[law] = np.array([parameter.value for parameter in drive])
-            self._index[law] = np.array([-1 if p.fixed else self.names.index(p.name) for p in drive])
+        self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._find_laws(robot)
+        self._elastic = np.flatnonzero([joint in layout.motors for joint in robot.joints])
+        self._own_motor = np.array([layout.n_link + layout.motors.index(robot.joints[i]) for i in self._elastic], int)
+        # equation in which each motor's torque stands
+        self._motor_row = layout.joint_link.copy()
+        self._motor_row[self._elastic] = self._own_motor
+        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, self._sharpness)
+        self._bearings = [h for h in robot.effects if isinstance(h.effect, Structure) and h.effect.form == "bearing"]
+
+    @property
+    def tree(self) -> StructuredTree:
+        """The rigid bodies."""
+        return self._tree
 
     def accelerations(self, x: Array, u: Array, parameters: Array) -> Array:
-        """Link and motor accelerations.
+        """Link and motor accelerations, and rates of memories.
 
         Args:
-            x: states, shape (m, 4n).
+            x: states, shape (m, d).
             u: commands in their SI unit, shape (m, n).
             parameters: values of the free parameters, shape (p,).
 
         Returns:
-            Shape (m, 2n) [rad/s^2].
+            Shape (m, r) [rad/s^2].
         """
-        q_link, v_link, q_motor, v_motor = np.split(x, 4, axis=1)
-        law = self._laws(parameters)
-        tau_c = law["stiffness"] * (q_link - q_motor) + law["damping"] * (v_link - v_motor)
-        a_link = self._tree.acceleration(q_link, v_link, -tau_c)
-        v_friction = v_link if self._friction_on_link else v_motor
-        tau_friction = law["coulomb_torque"] * np.tanh(self._sharpness * v_friction)
-        a_motor = (tau_c + self._motor_torque(u, v_motor, law) - tau_friction) / law["inertia"]
-        return np.hstack([a_link, a_motor])
+        values = self.named(parameters)
+        terms = self._terms(x, values, derivatives=False)
+        terms.value[:, self._motor_row] += self._drive(u, values)
+        return self._solve(x, terms, values)[0]
 
     def with_derivatives(
         self, x: Array, u: Array, parameters: Array, rigid: RigidDerivatives | None = None
     ) -> Accelerations:
-        """Link and motor accelerations with derivatives; arguments as in `accelerations` and `without_command`."""
+        """Accelerations with derivatives; arguments as in `accelerations` and `without_command`."""
+        if self._commands_move_links:
+            return self._differentiate(x, parameters, rigid, u)
         return self.with_command(self.without_command(x, parameters, rigid), u, parameters)
+
+    def at_ticks(
+        self, x: Array, u: Array, parameters: Array
+    ) -> tuple[Accelerations, Accelerations, RigidDerivatives | None]:
+        """Accelerations at the beginning and the end of m steps, with the command of each step.
+
+        Args:
+            x: states at the m + 1 ticks, shape (m + 1, d).
+            u: commands of the m steps, shape (m, n).
+            parameters: values of the free parameters, shape (p,).
+
+        Returns:
+            Both, and the rigid bodies' derivatives between the ticks where they are cheap to know.
+        """
+        if self._commands_move_links:
+            first, last = (self._differentiate(part, parameters, None, u) for part in (x[:-1], x[1:]))
+            return first, last, None
+        free = self.without_command(x, parameters)
+        first, last = (self.with_command(_part(free, part), u, parameters) for part in (slice(None, -1), slice(1, None)))
+        return first, last, free.rigid.between()
 
     def without_command(self, x: Array, parameters: Array, rigid: RigidDerivatives | None = None) -> Accelerations:
         """As `with_derivatives` at u = 0; the dear part, which consecutive steps share.
 
         Args:
-            x: states, shape (m, 4n).
+            x: states, shape (m, d).
             parameters: values of the free parameters, shape (p,).
             rigid: derivatives of the rigid bodies where they are known well enough; the accelerations themselves are
                 always exact.
         """
-        n, m = self.n, len(x)
-        q_link, v_link, q_motor, v_motor = np.split(x, 4, axis=1)
-        law = self._laws(parameters)
-        K, D, b = law["stiffness"], law["damping"], law["inertia"]
-        deflection, rate = q_link - q_motor, v_link - v_motor
-        tau_c = K * deflection + D * rate
-        if rigid is None:
-            a_link, *derivatives = self._tree.acceleration_derivatives(q_link, v_link, -tau_c)
-            rigid = RigidDerivatives(*derivatives)
-        else:
-            a_link = self._tree.acceleration(q_link, v_link, -tau_c)
-        da_dq, da_dv, M_inverse = rigid.by_position, rigid.by_velocity, rigid.by_torque
-        v_friction = v_link if self._friction_on_link else v_motor
-        smooth_sign = np.tanh(self._sharpness * v_friction)
-        zero_command = np.zeros((1, n))
-        a_motor = (tau_c + self._motor_torque(zero_command, v_motor, law) - law["coulomb_torque"] * smooth_sign) / b
-
-        by_state = np.zeros((m, 2 * n, 4 * n))
-        by_state[:, :n, :n] = da_dq - M_inverse * K
-        by_state[:, :n, n : 2 * n] = da_dv - M_inverse * D
-        by_state[:, :n, 2 * n : 3 * n] = M_inverse * K
-        by_state[:, :n, 3 * n :] = M_inverse * D
-        joint = np.arange(n)
-        motor = n + joint
-        by_state[:, motor, joint] = K / b
-        by_state[:, motor, n + joint] = D / b
-        by_state[:, motor, 2 * n + joint] = -K / b
-        by_state[:, motor, 3 * n + joint] = -D / b
-        if not self._torque_command:
-            by_state[:, motor, 3 * n + joint] -= law["k_mi"] / b
-        slope = self._sharpness * (1.0 - smooth_sign**2) * law["coulomb_torque"] / b
-        by_state[:, motor, (n if self._friction_on_link else 3 * n) + joint] -= slope
-
-        by_parameter = np.zeros((m, 2 * n, len(self.names)))
-        for i in range(n):
-            self._add(by_parameter, "stiffness", i, slice(0, n), -M_inverse[:, :, i] * deflection[:, i, None])
-            self._add(by_parameter, "damping", i, slice(0, n), -M_inverse[:, :, i] * rate[:, i, None])
-            self._add(by_parameter, "stiffness", i, n + i, deflection[:, i] / b[i])
-            self._add(by_parameter, "damping", i, n + i, rate[:, i] / b[i])
-            self._add(by_parameter, "coulomb_torque", i, n + i, -smooth_sign[:, i] / b[i])
-            self._add(by_parameter, "inertia", i, n + i, -a_motor[:, i] / b[i])
-            if not self._torque_command:
-                self._add(by_parameter, "k_mi", i, n + i, -v_motor[:, i] / b[i])
-        return Accelerations(np.hstack([a_link, a_motor]), by_state, by_parameter, rigid)
+        return self._differentiate(x, parameters, rigid, None)
 
     def with_command(self, free: Accelerations, u: Array, parameters: Array) -> Accelerations:
-        """Adds the command to the result of `without_command`.
+        """Adds the command to the result of `without_command`; for robots without rigid joints.
 
         Args:
             free: accelerations at u = 0; not changed.
             u: commands in their SI unit, shape (m, n).
             parameters: values of the free parameters, shape (p,).
         """
-        n = self.n
-        law = self._laws(parameters)
-        b = law["inertia"]
-        torque = u if self._torque_command else law["k_pwm"] * self._volts * u
-        value = free.value.copy()
-        value[:, n:] += torque / b
-        by_parameter = free.by_parameter.copy()
-        for i in range(n):
-            self._add(by_parameter, "inertia", i, n + i, -torque[:, i] / b[i] ** 2)
+        values = self.named(parameters)
+        b, rows, torque = self._law(values, "inertia"), self._motor_row, self._drive(u, values)
+        value, by_parameter = free.value.copy(), free.by_parameter.copy()
+        value[:, rows] += torque / b
+        for i, row in enumerate(rows):
+            self._add(by_parameter, "inertia", i, row, -torque[:, i] / b[i] ** 2)
             if not self._torque_command:
-                self._add(by_parameter, "k_pwm", i, n + i, self._volts * u[:, i] / b[i])
+                self._add(by_parameter, "k_pwm", i, row, self._volts * u[:, i] / b[i])
         return Accelerations(value, free.by_state, by_parameter, free.rigid)
 
-    def _motor_torque(self, u: Array, v_motor: Array, law: dict[str, Array]) -> Array:
-        if self._torque_command:
-            return np.broadcast_to(u, v_motor.shape)
-        return law["k_pwm"] * self._volts * u - law["k_mi"] * v_motor
+    def drive_gain(self, parameters: Array) -> Array:
+        """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
+        return self._drive(np.ones((1, len(self._motor_row))), self.named(parameters))[0]
 
-    def _laws(self, parameters: Array) -> dict[str, Array]:
-        """Each law's parameter for every joint, shape (n,)."""
-        padded = np.append(parameters, np.nan)
-        return {law: np.where(i < 0, self._fixed[law], padded[i]) for law, i in self._index.items()}
+    def command_response(self, accelerations: Accelerations, parameters: Array) -> Array:
+        """Derivative of the accelerations by the command of each joint, shape (m, r, n)."""
+        layout, gain = self.layout, self.drive_gain(parameters)
+        response = np.zeros((len(accelerations.value), layout.n_rates, len(gain)))
+        b = self._law(self.named(parameters), "inertia")
+        for i, row in enumerate(self._motor_row):
+            if row >= layout.n_link:
+                response[:, row, i] = gain[i] / b[i]
+            else:
+                response[:, : layout.n_link, i] = accelerations.rigid.by_torque[:, :, row] * gain[i]
+        return response
 
-    def _add(self, by_parameter: Array, law: str, joint: int, rows: slice | int, column: Array) -> None:
+    @property
+    def _commands_move_links(self) -> bool:
+        """Whether a command accelerates a link at once, as the motor of a rigid joint does."""
+        return len(self._elastic) < len(self._motor_row)
+
+    def _differentiate(
+        self, x: Array, parameters: Array, rigid: RigidDerivatives | None, u: Array | None
+    ) -> Accelerations:
+        layout, values = self.layout, self.named(parameters)
+        terms = self._terms(x, values, derivatives=True)
+        if u is not None:
+            terms.value[:, self._motor_row] += self._drive(u, values)
+            for i, row in enumerate(self._motor_row):
+                if not self._torque_command and terms.by_parameter is not None:
+                    self._add(terms.by_parameter, "k_pwm", i, row, self._volts * u[:, i])
+        value, found = self._solve(x, terms, values, rigid, derivatives=True)
+        assert found is not None and terms.by_state is not None and terms.by_parameter is not None
+        by_state, by_parameter, n = terms.by_state, terms.by_parameter, layout.n_link
+        a_link, M_inverse = value[:, :n], found.by_torque
+        by_state[:, :n] = M_inverse @ by_state[:, :n]
+        by_state[:, :n, layout.q_link] += found.by_position
+        by_state[:, :n, layout.v_link] += found.by_velocity
+        by_parameter[:, :n] = M_inverse @ by_parameter[:, :n]
+        if self._tree.varies:
+            q, v, tau = x[:, layout.q_link], x[:, layout.v_link], terms.value[:, :n]
+            for name, slope in self._tree.by_parameter(q, v, tau, a_link, M_inverse, values).items():
+                if name in self.names:
+                    by_parameter[:, :n, self.names.index(name)] += slope
+        b = self._law(values, "inertia")
+        for i, row in zip(self._elastic, self._own_motor, strict=True):
+            by_state[:, row] /= b[i]
+            by_parameter[:, row] /= b[i]
+            self._add(by_parameter, "inertia", i, row, -value[:, row] / b[i])
+        return Accelerations(value, by_state, by_parameter, found)
+
+    def _solve(
+        self,
+        x: Array,
+        terms: TorqueTerms,
+        values: Mapping[str, float],
+        rigid: RigidDerivatives | None = None,
+        derivatives: bool = False,
+    ) -> tuple[Array, RigidDerivatives | None]:
+        """Accelerations of summed torques, and the derivatives of the rigid bodies where wanted."""
+        layout, n = self.layout, self.layout.n_link
+        motion = x[:, layout.q_link], x[:, layout.v_link], terms.value[:, :n]
+        if derivatives and rigid is None:
+            a_link, *parts = self._tree.acceleration_derivatives(*motion, values)
+            rigid = RigidDerivatives(*parts)
+        else:
+            a_link = self._tree.acceleration(*motion, values)
+        value = terms.value.copy()
+        value[:, :n] = a_link
+        value[:, self._own_motor] /= self._law(values, "inertia")[self._elastic]
+        return value, rigid
+
+    def _terms(self, x: Array, values: Mapping[str, float], derivatives: bool) -> TorqueTerms:
+        """All torques but the command's."""
+        terms = TorqueTerms.zeros(len(x), self.layout, len(self.names), derivatives)
+        springs = self._springs(x, values)
+        self._add_springs(terms, springs)
+        self._add_motors(terms, x, values)
+        self._add_bearings(terms, x, values)
+        self._effects.add(terms, x, springs, values)
+        return terms
+
+    def _springs(self, x: Array, values: Mapping[str, float]) -> Springs:
+        layout = self.layout
+        K, D = self._law(values, "stiffness"), self._law(values, "damping")
+        deflection = x[:, layout.joint_q] - x[:, layout.motor_q]
+        rate = x[:, layout.joint_v] - x[:, layout.motor_v]
+        slopes = [1.0 if kind == "value" else -(k**2) for k, kind in zip(K, self._stiffness_kind, strict=True)]
+        stiffness_by = list(zip(self._index["stiffness"].tolist(), slopes, strict=True))
+        damping_by = [(int(index), 1.0) for index in self._index["damping"]]
+        return Springs(K, D, deflection, rate, K * deflection + D * rate, stiffness_by, damping_by)
+
+    def _add_springs(self, terms: TorqueTerms, springs: Springs) -> None:
+        layout, K, D = self.layout, springs.stiffness, springs.damping
+        for i, motor in zip(self._elastic, self._own_motor, strict=True):
+            for row, sign in ((int(layout.joint_link[i]), -1.0), (int(motor), 1.0)):
+                terms.value[:, row] += sign * springs.torque[:, i]
+                if terms.by_state is None or terms.by_parameter is None:
+                    continue
+                terms.by_state[:, row, layout.joint_q[i]] += sign * K[i]
+                terms.by_state[:, row, layout.motor_q[i]] -= sign * K[i]
+                terms.by_state[:, row, layout.joint_v[i]] += sign * D[i]
+                terms.by_state[:, row, layout.motor_v[i]] -= sign * D[i]
+                slope = springs.stiffness_by[i][1]
+                self._add(terms.by_parameter, "stiffness", i, row, sign * slope * springs.deflection[:, i])
+                self._add(terms.by_parameter, "damping", i, row, sign * springs.rate[:, i])
+
+    def _add_motors(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
+        """Friction, and the back-EMF where the command is a voltage."""
+        layout, mu = self.layout, self._law(values, "coulomb_torque")
+        friction_v = layout.joint_v if self._friction_on_link else layout.motor_v
+        smooth_sign = np.tanh(self._sharpness * x[:, friction_v])
+        k_mi = np.zeros(len(mu)) if self._torque_command else self._law(values, "k_mi")
+        v_motor = x[:, layout.motor_v]
+        torque = -mu * smooth_sign - k_mi * v_motor
+        for i, row in enumerate(self._motor_row):
+            terms.value[:, row] += torque[:, i]
+            if terms.by_state is None or terms.by_parameter is None:
+                continue
+            terms.by_state[:, row, friction_v[i]] -= mu[i] * self._sharpness * (1.0 - smooth_sign[:, i] ** 2)
+            terms.by_state[:, row, layout.motor_v[i]] -= k_mi[i]
+            self._add(terms.by_parameter, "coulomb_torque", i, row, -smooth_sign[:, i])
+            if not self._torque_command:
+                self._add(terms.by_parameter, "k_mi", i, row, -v_motor[:, i])
+
+    def _add_bearings(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
+        layout = self.layout
+        for here in self._bearings:
+            for axis in "xy":
+                link = layout.links.index(f"{here.owner}.bearing_{axis}")
+                names = here.parameter(f"compliance_{axis}"), here.parameter(f"damping_{axis}")
+                compliance, damping = values[names[0]], values[names[1]]
+                q, v = x[:, link], x[:, layout.n_link + link]
+                terms.value[:, link] -= q / compliance + damping * v
+                if terms.by_state is None or terms.by_parameter is None:
+                    continue
+                terms.by_state[:, link, link] -= 1.0 / compliance
+                terms.by_state[:, link, layout.n_link + link] -= damping
+                for name, slope in zip(names, (q / compliance**2, -v), strict=True):
+                    if name in self.names:
+                        terms.by_parameter[:, link, self.names.index(name)] += slope
+
+    def _drive(self, u: Array, values: Mapping[str, float]) -> Array:
+        """Torque of the command, shape (m, n) [N m]."""
+        return u if self._torque_command else self._law(values, "k_pwm") * self._volts * u
+
+    def _find_laws(self, robot: Robot) -> None:
+        """For every law and joint the parameter that holds its value."""
+        laws = ("coulomb_torque", "inertia") if self._torque_command else ("coulomb_torque", "inertia", "k_pwm", "k_mi")
+        self._sources = {law: [robot.drive_parameter(joint, law).name for joint in robot.joints] for law in laws}
+        self._sources |= {"stiffness": [], "damping": []}
+        self._stiffness_kind = []
+        for joint in robot.joints:
+            elasticity = f"{joint}.joint_elasticity."
+            added = f"{elasticity}compliance" in robot.parameters
+            base = f"{joint}.stiffness" in robot.parameters and joint in robot.layout.motors
+            self._stiffness_kind.append("compliance" if added else "value" if base else "none")
+            self._sources["stiffness"].append(
+                f"{elasticity}compliance" if added else f"{joint}.stiffness" if base else ""
+            )
+            self._sources["damping"].append(f"{elasticity}damping" if added else f"{joint}.damping" if base else "")
+        self._index = {
+            law: np.array([self.names.index(name) if name in self.names else -1 for name in names])
+            for law, names in self._sources.items()
+        }
+
+    def _law(self, values: Mapping[str, float], law: str) -> Array:
+        """A law's parameter for every joint, shape (n,)."""
+        found = np.array([values[name] if name else 0.0 for name in self._sources[law]])
+        if law == "stiffness":
+            return np.array(
+                [1.0 / v if k == "compliance" else v for v, k in zip(found, self._stiffness_kind, strict=True)]
+            )
+        return found
+
+    def named(self, parameters: Array) -> dict[str, float]:
+        """All parameters by name: the free ones as given, the fixed ones of the robot."""
+        return {**self._values, **dict(zip(self.names, parameters.tolist(), strict=True))}
+
+    def _add(self, by_parameter: Array, law: str, joint: int, row: int, column: Array) -> None:
         index = self._index[law][joint]
         if index >= 0:
-            by_parameter[:, rows, index] += column
+            by_parameter[:, row, index] += column
+
+
+def _part(a: Accelerations, samples: slice) -> Accelerations:
+    return Accelerations(a.value[samples], a.by_state[samples], a.by_parameter[samples], a.rigid)

@@ -24,6 +24,7 @@ class Parameter:
         sigma: standard deviation after calibration, in `unit`; None before.
         published: value from the literature for comparison; None where there is none.
         effect: id of the effect the parameter belongs to; None for the base model.
+        null: value at which the effect vanishes; None for the base model and for shapes.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Parameter:
     sigma: float | None = None
     published: float | None = None
     effect: str | None = None
+    null: float | None = None
 
     @property
     def owner(self) -> str:

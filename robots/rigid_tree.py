@@ -7,6 +7,7 @@ All functions take many samples at once; where pinocchio has no call for many, i
 from __future__ import annotations
 
 import contextlib
+import copy
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -43,6 +44,21 @@ class RigidTree:
         self._rates = BodyRates(self.model)
         self.gravity = np.asarray(gravity, float)
         self._check_inertias()
+
+    def with_model(self, model: pin.Model) -> RigidTree:
+        """The same tree with other bodies or more joints; its inertias are not checked."""
+        tree = copy.copy(self)
+        tree.joints = tuple(list(model.names)[1:])
+        tree.model, tree.data = model, model.createData()
+        tree._pool = pin.ModelPool(model, 1)
+        tree._rates = BodyRates(model)
+        return tree
+
+    def with_coriolis(self, coriolis: bool) -> RigidTree:
+        """The same tree with or without Coriolis and centrifugal terms."""
+        tree = copy.copy(self)
+        tree.coriolis = coriolis
+        return tree
 
     @property
     def n(self) -> int:
@@ -107,6 +123,13 @@ class RigidTree:
         if not self.coriolis:
             da_dv[:] = 0.0
         return a, da_dq, da_dv, M_inverse
+
+    def torque(self, q: Array, v: Array, a: Array) -> Array:
+        """Joint torques M a + c + g of given motion, shape (m, n) [N m]; arguments of shape (m, n)."""
+        tau = np.empty(q.shape[::-1], order="F")
+        columns = (np.asfortranarray(part.T) for part in (q, v, a))
+        pin.rneaInParallel(1, self._pool, *columns, tau)
+        return np.ascontiguousarray(tau.T)
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q), shape (m, n, n) [kg m^2], for positions q of shape (m, n) [rad]."""

@@ -7,17 +7,24 @@ A Robot is immutable; a calibration returns a new one. It is read from and writt
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_at import EffectAt
+from jointscope.robots.effect_kinds.effect import Effect
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.structured_tree import bearing_names, with_bearings
 
 Array = NDArray[np.float64]
 
@@ -32,6 +39,7 @@ class ModelChoices:
         friction_velocity: "motor", or "link" as eq. (12) is printed.
         friction_sharpness: k in tanh(k v) [s/rad].
         bias_at_rest: whether gyro samples before the first command measure the bias directly (eq. 32).
+        rigid_joints: joints whose link follows the motor without a spring.
     """
 
     integrator: str = "simpson"
@@ -39,6 +47,7 @@ class ModelChoices:
     friction_velocity: str = "motor"
     friction_sharpness: float = 200.0
     bias_at_rest: bool = False
+    rigid_joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -48,9 +57,10 @@ class ProcessNoise:
     Attributes:
         estimate: whether a calibration estimates the densities.
         model: "integrated" (the positions follow from the velocities) or "independent" (eq. 36).
-        link_velocity: density of the torque on each link over the joint's inertia at zero angles, shape (n_joints,)
+        link_velocity: density of the torque on each link coordinate over its inertia at zero angles, shape (n_link,)
             [rad/s/sqrt(s)].
-        motor_velocity: density of each motor equation, shape (n_joints,) [rad/s/sqrt(s)].
+        motor_velocity: density of each motor equation, shape (n_motor,) [rad/s/sqrt(s)].
+        memory: density of each memory of the state, shape (n_memory,).
         position: density of the positions for model "independent" [rad/sqrt(s)].
     """
 
@@ -59,6 +69,7 @@ class ProcessNoise:
     link_velocity: Array
     motor_velocity: Array
     position: float = 0.0
+    memory: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,8 @@ class Robot:
         command: where the commands are; its unit is "duty", "V" or "N m".
         sensors: by name.
         parameters: by full name, in the order of the file.
-        noise: process noise.
+        noise: process noise, in the order of `layout`.
+        effects: physical effects that were added to the base model.
         path: the file it was read from.
         document: the file's content with comments, for writing it again.
     """
@@ -92,6 +104,7 @@ class Robot:
     noise: ProcessNoise
     path: Path
     document: Any
+    effects: tuple[EffectAt, ...] = ()
 
     @property
     def n(self) -> int:
@@ -115,6 +128,31 @@ class Robot:
     def channels(self) -> tuple[str, ...]:
         """Names of all measured channels."""
         return tuple(channel for sensor in self.sensors.values() for channel in sensor.channels)
+
+    @cached_property
+    def layout(self) -> StateLayout:
+        """Where everything is in a state vector."""
+        soft = [here.owner for here in self.effects if _is(here.effect, "bearing")]
+        elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
+        links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
+        motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
+        memories = [here.label for here in self.effects if getattr(here.effect, "memory", None) is not None]
+        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(memories))
+
+    @cached_property
+    def kinematic_tree(self) -> RigidTree:
+        """The rigid bodies with the hinges of soft bearings."""
+        soft = tuple(here.owner for here in self.effects if _is(here.effect, "bearing"))
+        return self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
+
+    @property
+    def memories(self) -> tuple[EffectAt, ...]:
+        """Effects with a state of their own, in the order of the layout."""
+        return tuple(h for h in self.effects if isinstance(h.effect, JointTorque) and h.effect.memory is not None)
+
+    def has_effect(self, effect_id: str, owner: str) -> bool:
+        """Whether an effect is part of the robot."""
+        return any(here.effect.id == effect_id and here.owner == owner for here in self.effects)
 
     @property
     def command_volts(self) -> float:
@@ -146,3 +184,7 @@ class Robot:
     def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
         """The same robot with some sensors replaced."""
         return replace(self, sensors={**self.sensors, **sensors})
+
+
+def _is(effect: Effect, form: str) -> bool:
+    return isinstance(effect, Structure) and effect.form == form

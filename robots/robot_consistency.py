@@ -68,6 +68,10 @@ def _check_parameters(robot: Robot, place: str) -> None:
     """All parameters known, in their units, and none missing."""
     units = {f"{owner}.{name}": unit for owner in ("motor", *robot.joints) for name, unit in DRIVE_PARAMETERS.items()}
     units |= {f"{joint}.{name}": unit for joint in robot.joints for name, unit in JOINT_PARAMETERS.items()}
+    of_effects = {
+        here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_of(robot, here.owner)
+    }
+    units |= of_effects
     for name, parameter in robot.parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
@@ -79,5 +83,10 @@ def _check_parameters(robot: Robot, place: str) -> None:
             if not {f"{joint}.{name}", f"motor.{name}"} & set(robot.parameters):
                 raise RobotError(f"{place}: parameters: 'motor.{name}' is missing, or '{joint}.{name}'")
         for name in JOINT_PARAMETERS:
+            if joint in robot.choices.rigid_joints and name != "coulomb_torque":
+                continue
             if f"{joint}.{name}" not in robot.parameters:
                 raise RobotError(f"{place}: parameters: '{joint}.{name}' is missing")
+    for name in of_effects:
+        if name not in robot.parameters:
+            raise RobotError(f"{place}: parameters: '{name}' is missing; its effect is listed under effects")

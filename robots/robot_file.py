@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML, YAMLError
 
-from jointscope.robots.errors import RobotError
+from jointscope.robots.effect_at import EffectAt
+from jointscope.robots.effect_catalogue import parse_effect
+from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
@@ -30,6 +34,7 @@ READY_PREFIX = "ready:"
 INTEGRATORS = ("euler", "midpoint", "simpson")
 GYRO_FORMS = ("full", "vertical", "relative")
 COMMAND_UNITS = ("duty", "V", "N m")
+HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
 CONSTANTS = ("motor.supply_voltage", "motor.gear")
 
 
@@ -59,14 +64,14 @@ def load_robot(name_or_path: str | Path) -> Robot:
     joints = top.texts("joints")
     if len(set(joints)) != len(joints) or not joints:
         raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
-    choices = top.section("model", {}).build(_model_choices)
+    choices = top.section("model", {}).build(lambda s: _model_choices(s, joints))
     gravity = top.array("gravity", (3,))
     tree = RigidTree(_urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis)
     constants = top.section("constants", {}).build(_constants)
     command = top.section("command").build(lambda s: _topic(s, joints, COMMAND_UNITS))
     sensors = {name: section.build(_sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
-    noise = top.section("noise").build(lambda s: _noise(s, len(joints)))
+    noise_section = top.section("noise")
     robot = Robot(
         name=top.text("name"),
         description=top.text("description", ""),
@@ -77,14 +82,38 @@ def load_robot(name_or_path: str | Path) -> Robot:
         command=command,
         sensors=sensors,
         parameters=parameters,
-        noise=noise,
+        noise=ProcessNoise(False, "integrated", np.zeros(0), np.zeros(0)),
         path=path,
         document=document,
     )
+    robot = with_effects(robot, top.texts("effects", ()))
+    robot = replace(robot, noise=noise_section.build(lambda s: _noise(s, robot)))
     top.raw("calibration")
     top.finish()
     check_robot(robot)
     return robot
+
+
+def with_effects(robot: Robot, labels: Sequence[str]) -> Robot:
+    """The robot with effects ID@OWNER; its parameters must be there already, its noise is as it was.
+
+    Raises:
+        EffectError: unknown effect or owner, or one that is there twice.
+    """
+    found: list[EffectAt] = []
+    for label in labels:
+        effect, owner = parse_effect(label, robot)
+        if any(here.label == label for here in found):
+            raise EffectError(f"effect {label} is there twice; remove one")
+        found.append(EffectAt(effect, owner))
+    parameters = dict(robot.parameters)
+    for here in found:
+        for p in here.effect.parameters_of(robot, here.owner):
+            name = here.parameter(p.name)
+            if name in parameters:
+                null = None if p.is_shape else p.null
+                parameters[name] = replace(parameters[name], effect=here.effect.id, null=null)
+    return replace(robot, effects=tuple(found), parameters=parameters)
 
 
 def read_document(path: Path) -> Any:
@@ -150,14 +179,23 @@ def _urdf_path(reference: str, robot_file: Path) -> Path:
     return robot_file.parent / reference
 
 
-def _model_choices(section: Section) -> ModelChoices:
+def _model_choices(section: Section, joints: tuple[str, ...]) -> ModelChoices:
     return ModelChoices(
         integrator=section.text("integrator", "simpson", INTEGRATORS),
         coriolis=section.flag("coriolis", True),
         friction_velocity=section.text("friction_velocity", "motor", ("motor", "link")),
         friction_sharpness=section.number("friction_sharpness", 200.0, positive=True),
         bias_at_rest=section.flag("bias_at_rest", False),
+        rigid_joints=_rigid_joints(section, joints),
     )
+
+
+def _rigid_joints(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
+    rigid = section.texts("rigid_joints", ())
+    unknown = [joint for joint in rigid if joint not in joints]
+    if unknown:
+        raise RobotError(f"{section.place}.rigid_joints: no joint {unknown[0]!r}{did_you_mean(unknown[0], joints)}")
+    return rigid
 
 
 def _constants(section: Section) -> dict[str, float]:
@@ -241,21 +279,31 @@ def _parameter(name: str) -> Any:
             fixed=fixed,
             sigma=section.number("sigma", None, positive=True),
             published=section.number("published", None),
+            null=section.number("null", None),
         )
 
     return make
 
 
-def _noise(section: Section, n: int) -> ProcessNoise:
+def _noise(section: Section, robot: Robot) -> ProcessNoise:
+    """Process noise in the order of the robot's layout; the file lists joints, and what effects bring by name."""
     model = section.text("model", "integrated", ("integrated", "independent"))
-    noise = ProcessNoise(
+    layout, n = robot.layout, robot.n
+    own = section.section("effects", {})
+    hinges = {name: own.number(name, HINGE_DENSITY, positive=True) for name in layout.links if name not in layout.joints}
+    joints = {key: section.array(key, (n,)) for key in ("link_velocity", "motor_velocity")}
+    for key, values in joints.items():
+        if np.any(values <= 0):
+            raise RobotError(f"{section.place}.{key}: expected numbers above zero")
+    link = dict(zip(layout.joints, joints["link_velocity"], strict=True)) | hinges
+    motor = dict(zip(layout.joints, joints["motor_velocity"], strict=True))
+    memory = [own.number(h.label, h.effect.memory.noise, positive=True) for h in robot.memories]
+    own.finish()
+    return ProcessNoise(
         estimate=section.flag("estimate", True),
         model=model,
-        link_velocity=section.array("link_velocity", (n,)),
-        motor_velocity=section.array("motor_velocity", (n,)),
+        link_velocity=np.array([link[name] for name in layout.links]),
+        motor_velocity=np.array([motor[name] for name in layout.motors]),
         position=section.number("position", positive=True) if model == "independent" else 0.0,
+        memory=np.array(memory),
     )
-    for key in ("link_velocity", "motor_velocity"):
-        if np.any(getattr(noise, key) <= 0):
-            raise RobotError(f"{section.place}.{key}: expected numbers above zero")
-    return noise

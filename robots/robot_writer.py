@@ -50,11 +50,23 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
         if gyro.R_sigma is not None:
             rotation.pop("sigma", None)
             rotation.insert(1, "sigma", _row(gyro.R_sigma, 3))
-    document["noise"]["link_velocity"] = _row(robot.noise.link_velocity, 4)
-    document["noise"]["motor_velocity"] = _row(robot.noise.motor_velocity, 4)
+    _write_noise(document["noise"], robot)
     if provenance is not None:
         document["calibration"] = _plain(provenance)
     return dump_document(document)
+
+
+def _write_noise(section: Any, robot: Robot) -> None:
+    """Densities of the joints as lists, those that effects bring along by name."""
+    layout, noise = robot.layout, robot.noise
+    section["link_velocity"] = _row(noise.link_velocity[layout.joint_link], 4)
+    motors = dict(zip(layout.motors, noise.motor_velocity, strict=True))
+    before = dict(zip(layout.joints, section["motor_velocity"], strict=True))
+    section["motor_velocity"] = _row(np.array([motors.get(joint, before[joint]) for joint in layout.joints]), 4)
+    own = {name: v for name, v in zip(layout.links, noise.link_velocity, strict=True) if name not in layout.joints}
+    own |= dict(zip(layout.memories, noise.memory, strict=True))
+    if own:
+        section["effects"] = _flow({name: _rounded(value, 4) for name, value in own.items()})
 
 
 def _rounded(value: float, digits: int = 9) -> float:

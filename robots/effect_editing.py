@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Adds effects to a robot and takes them away again; the robot's document changes with it, its comments stay."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from jointscope.robots.effect_at import EffectAt
+from jointscope.robots.effect_catalogue import parse_effect
+from jointscope.robots.effect_kinds.effect import EffectParameter
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.errors import EffectError
+from jointscope.robots.parameter import Parameter
+from jointscope.robots.robot import ProcessNoise, Robot
+from jointscope.robots.robot_file import HINGE_DENSITY
+
+
+def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) -> Robot:
+    """A robot with one more effect, at its start values.
+
+    Args:
+        robot: the robot.
+        label: ID@OWNER.
+        start: other start values, by the last part of the parameter's name.
+
+    Raises:
+        EffectError: unknown effect or owner, the effect is there already, or the model has it by itself.
+    """
+    effect, owner = parse_effect(label, robot)
+    here = EffectAt(effect, owner)
+    if robot.has_effect(effect.id, owner):
+        raise EffectError(f"{robot.name} has {label} already; remove it first, or calibrate")
+    why_not = cannot_be_added(robot, here)
+    if why_not:
+        raise EffectError(f"{label} cannot be added to {robot.name}: {why_not}")
+    parameters = dict(robot.parameters)
+    document = copy.deepcopy(robot.document)
+    document.setdefault("effects", CommentedSeq()).append(label)
+    for p in effect.parameters_of(robot, owner):
+        parameter = parameter_of(here, p, (start or {}).get(p.name, p.start))
+        parameters[parameter.name] = parameter
+        document["parameters"][parameter.name] = _entry(parameter)
+    new = replace(robot, parameters=parameters, effects=(*robot.effects, here), document=document)
+    return replace(new, noise=carried_noise(robot, new))
+
+
+def remove_effect(robot: Robot, label: str) -> Robot:
+    """A robot without one of its effects.
+
+    Raises:
+        EffectError: the robot does not have it.
+    """
+    gone = [here for here in robot.effects if here.label == label]
+    if not gone:
+        known = ", ".join(here.label for here in robot.effects) or "none"
+        raise EffectError(f"{robot.name} does not have the effect {label!r}; it has {known}")
+    document = copy.deepcopy(robot.document)
+    document["effects"].remove(label)
+    if not document["effects"]:
+        del document["effects"]
+    start = gone[0].parameter("")
+    parameters = {name: p for name, p in robot.parameters.items() if not name.startswith(start)}
+    for name in robot.parameters:
+        if name.startswith(start):
+            document["parameters"].pop(name, None)
+    if "effects" in document["noise"]:
+        del document["noise"]["effects"]
+    effects = tuple(here for here in robot.effects if here.label != label)
+    new = replace(robot, parameters=parameters, effects=effects, document=document)
+    return replace(new, noise=carried_noise(robot, new))
+
+
+def cannot_be_added(robot: Robot, here: EffectAt) -> str:
+    """Why an effect makes no sense in this model; empty if it does."""
+    effect, owner = here.effect, here.owner
+    why_not = effect.may_act_on(robot, owner)
+    if why_not:
+        return why_not
+    if isinstance(effect, Structure):
+        if effect.form == "integration":
+            return "it is the error of the integrator; choose `model: integrator: simpson` instead"
+        if effect.form == "coriolis" and robot.choices.coriolis:
+            return "the model contains the Coriolis terms (`model: coriolis: true`)"
+        if effect.form == "elasticity" and owner in robot.layout.motors:
+            return f"{owner} is elastic already; list it under `model: rigid_joints` to make it rigid"
+    if getattr(effect, "side", "") == "spring" and owner not in robot.layout.motors:
+        return f"{owner} is rigid and has no spring; add joint_elasticity@{owner} first"
+    return ""
+
+
+def parameter_of(here: EffectAt, p: EffectParameter, value: float) -> Parameter:
+    """A parameter of an added effect: prior about the null value, or about the start where it has none."""
+    centre = p.start if p.is_shape or p.logarithmic else p.null
+    return Parameter(
+        name=here.parameter(p.name),
+        value=value,
+        unit=p.unit,
+        prior=centre,
+        prior_sigma=p.prior_sigma,
+        positive=p.logarithmic,
+        effect=here.effect.id,
+        null=None if p.is_shape else p.null,
+    )
+
+
+def carried_noise(old: Robot, new: Robot) -> ProcessNoise:
+    """Process noise of a robot in the layout of another one."""
+    before, after, noise = old.layout, new.layout, old.noise
+    link = dict(zip(before.links, noise.link_velocity, strict=True))
+    motor = dict(zip(before.motors, noise.motor_velocity, strict=True))
+    memory = dict(zip(before.memories, noise.memory, strict=True))
+    return replace(
+        noise,
+        link_velocity=np.array([link.get(name, HINGE_DENSITY) for name in after.links]),
+        motor_velocity=np.array([motor.get(name, link.get(name, HINGE_DENSITY)) for name in after.motors]),
+        memory=np.array([memory.get(h.label, h.effect.memory.noise) for h in new.memories]),
+    )
+
+
+def _entry(parameter: Parameter) -> CommentedMap:
+    entry = CommentedMap({"value": parameter.value, "unit": parameter.unit, "prior": parameter.prior})
+    entry["prior_sigma"] = parameter.prior_sigma
+    if not parameter.positive:
+        entry["positive"] = False
+    if parameter.null is not None:
+        entry["null"] = parameter.null
+    entry.fa.set_flow_style()
+    return entry
