@@ -34,7 +34,7 @@ class EffectParameter:
         sign: "+" if only values above null are physical, else "+-".
         logarithmic: whether a calibration estimates the logarithm, because the law has no meaning at or below zero.
         grid: for a shape, which has no null value (the speed of a Stribeck curve): values that a diagnosis tries;
-            empty for a size.
+            empty for a size. One value, the start, where a diagnosis need not try others.
         weak: whether the data may leave it open; its prior then holds it near the start.
     """
 

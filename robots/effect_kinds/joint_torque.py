@@ -9,14 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Effect
-
-if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
 
 SIDES = ("motor", "link", "spring")
 SHARPNESS = 200.0  # [s/rad] of tanh(k v) where the robot file does not say otherwise
@@ -87,11 +84,6 @@ class JointTorque(Effect):
     side: str
     law: Law = field(repr=False)
     memory: Memory | None = None
-
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
-        """The joints; for a torque of the spring those that have one."""
-        joints = super().owners_of(robot)
-        return tuple(j for j in joints if j in robot.layout.motors) if self.side == "spring" else joints
 
 
 def smooth_sign(x: Any, width: float) -> Any:

@@ -25,7 +25,7 @@ EFFECT = JointTorque(
     parameters=(EffectParameter("half_gap", "rad", start=0.005, prior_sigma=0.015, sign="+", logarithmic=True),),
     example={"half_gap": 0.01},
     card=Card(
-        title="backlash",
+        title="play of the transmission",
         law="tau_c = K dz(q_link - q_motor, g) + D (v_link - v_motor), dz(x, g) = x - g above g, 0 within, x + g below "
         "-g; g = half_gap",
         explanation="Teeth do not fill each other's gaps: after a reversal the motor turns through the gap before the "

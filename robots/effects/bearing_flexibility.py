@@ -38,17 +38,23 @@ class BearingFlexibility(Structure):
             start[f"compliance_{axis}"] = compliance
             start[f"damping_{axis}"] = 2.0 * DAMPING_RATIO * float(np.sqrt(inertia / compliance))
             start[f"inertia_{axis}"] = inertia
-        return tuple(
-            replace(p, start=start[p.name], prior_sigma=p.prior_sigma / p.start * start[p.name])
-            for p in self.parameters
-        )
+        return tuple(_at(p, start[p.name]) for p in self.parameters)
 
 
-def _pair(name: str, unit: str, start: float, relative_sigma: float, weak: bool) -> tuple[EffectParameter, ...]:
-    """A parameter about each axis; the inertias are no size of the effect, they do not matter while it is rigid."""
-    return tuple(
-        EffectParameter(f"{name}_{axis}", unit, start, relative_sigma * start, sign="+", logarithmic=True, weak=weak)
-        for axis in "xy"
+def _at(p: EffectParameter, start: float) -> EffectParameter:
+    """The parameter with another start and the same relative prior."""
+    grid = (start,) if p.is_shape else ()
+    return replace(p, start=start, prior_sigma=p.prior_sigma / p.start * start, grid=grid)
+
+
+def _size(name: str, unit: str, start: float) -> EffectParameter:
+    return EffectParameter(name, unit, start, 3.0 * start, sign="+", logarithmic=True)
+
+
+def _shape(name: str, unit: str, start: float, relative_sigma: float, weak: bool = False) -> EffectParameter:
+    """Damping and inertia do not matter while the bearing is rigid, so they have no null value of their own."""
+    return EffectParameter(
+        name, unit, start, relative_sigma * start, sign="+", logarithmic=True, grid=(start,), weak=weak
     )
 
 
@@ -56,9 +62,9 @@ EFFECT = BearingFlexibility(
     id="bearing_flexibility",
     form="bearing",
     parameters=(
-        *_pair("compliance", "rad/(N m)", 1.0 / 3000.0, 3.0, weak=False),
-        *_pair("damping", "N m s/rad", 10.0, 3.0, weak=True),
-        *_pair("inertia", "kg m2", 2.0, 0.5, weak=True),
+        *(_size(f"compliance_{axis}", "rad/(N m)", 1.0 / 3000.0) for axis in "xy"),
+        *(_shape(f"damping_{axis}", "N m s/rad", 10.0, 3.0) for axis in "xy"),
+        *(_shape(f"inertia_{axis}", "kg m2", 2.0, 0.5, weak=True) for axis in "xy"),
     ),
     example={
         **{"compliance_x": 1.0 / 2500.0, "compliance_y": 1.0 / 3200.0},

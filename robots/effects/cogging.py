@@ -46,11 +46,11 @@ EFFECT = Cogging(
     parameters=(
         EffectParameter("cos", "N m", start=0.0, prior_sigma=100.0),
         EffectParameter("sin", "N m", start=0.0, prior_sigma=100.0),
-        EffectParameter("order", "1", start=12.0, prior_sigma=36.0, sign="+", logarithmic=True, grid=ORDERS, weak=True),
+        EffectParameter("order", "1", start=12.0, prior_sigma=36.0, sign="+", logarithmic=True, grid=ORDERS),
     ),
     example={"cos": 0.6, "sin": 0.8, "order": 12.0},
     card=Card(
-        title="cogging",
+        title="torque ripple of motor or gear",
         law="b a_motor = ... + A cos(N q_motor) + B sin(N q_motor), with A = cos, B = sin, N = order: periods per turn "
         "of the joint",
         explanation="Magnets snap to the teeth of the iron, and teeth of gears and belts mesh: the torque has a ripple "

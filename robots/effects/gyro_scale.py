@@ -22,7 +22,7 @@ EFFECT = ReadingEffect(
     id="gyro_scale",
     owners=("gyro",),
     law=law,
-    parameters=tuple(EffectParameter(axis, "1", start=0.0, prior_sigma=0.5, weak=True) for axis in AXES),
+    parameters=tuple(EffectParameter(axis, "1", start=0.0, prior_sigma=0.5) for axis in AXES),
     example={"x": 0.02, "y": -0.015, "z": 0.01},
     card=Card(
         title="scale error of a gyro",

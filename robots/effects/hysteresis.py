@@ -32,7 +32,7 @@ EFFECT = JointTorque(
     parameters=(
         EffectParameter("torque", "N m", start=0.5, prior_sigma=100.0, sign="+"),
         EffectParameter(
-            "deflection", "rad", start=0.005, prior_sigma=0.015, sign="+", logarithmic=True, grid=DEFLECTIONS, weak=True
+            "deflection", "rad", start=0.005, prior_sigma=0.015, sign="+", logarithmic=True, grid=DEFLECTIONS
         ),
     ),
     example={"torque": 2.0, "deflection": 0.005},

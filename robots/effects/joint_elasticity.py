@@ -40,7 +40,10 @@ class JointElasticity(Structure):
             "compliance": 1.0 / (inertia * RESONANCE**2),
             "damping": 2.0 * DAMPING_RATIO * inertia * RESONANCE,
         }
-        return tuple(replace(p, start=start[p.name], prior_sigma=3.0 * start[p.name]) for p in self.parameters)
+        compliance, damping = (
+            replace(p, start=start[p.name], prior_sigma=3.0 * start[p.name]) for p in self.parameters
+        )
+        return compliance, replace(damping, grid=(damping.start,))
 
 
 EFFECT = JointElasticity(
@@ -48,7 +51,7 @@ EFFECT = JointElasticity(
     form="elasticity",
     parameters=(
         EffectParameter("compliance", "rad/(N m)", start=1e-3, prior_sigma=3e-3, sign="+", logarithmic=True),
-        EffectParameter("damping", "N m s/rad", start=1.0, prior_sigma=3.0, sign="+", logarithmic=True, weak=True),
+        EffectParameter("damping", "N m s/rad", start=1.0, prior_sigma=3.0, sign="+", logarithmic=True, grid=(1.0,)),
     ),
     example={"compliance": 1.0 / 200.0, "damping": 4.0},
     card=Card(

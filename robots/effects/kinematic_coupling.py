@@ -46,8 +46,8 @@ class KinematicCoupling(RobotTorque):
     """One coefficient for each of the other joints."""
 
     def owners_of(self, robot: Robot) -> tuple[str, ...]:
-        """Joints with a spring, if there is any other joint."""
-        return robot.layout.motors if robot.n > 1 else ()
+        """The joints, if there is more than one."""
+        return robot.joints if robot.n > 1 else ()
 
     def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
         """from_<joint> of every joint but the owner."""

@@ -26,9 +26,7 @@ EFFECT = JointTorque(
     law=law,
     parameters=(
         EffectParameter("torque", "N m", start=0.5, prior_sigma=100.0, sign="+"),
-        EffectParameter(
-            "velocity", "rad/s", start=0.1, prior_sigma=0.3, sign="+", logarithmic=True, grid=VELOCITIES, weak=True
-        ),
+        EffectParameter("velocity", "rad/s", start=0.1, prior_sigma=0.3, sign="+", logarithmic=True, grid=VELOCITIES),
     ),
     example={"torque": 2.0, "velocity": 0.1},
     card=Card(
