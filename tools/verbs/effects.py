@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope effects`: lists the physical effects that a model may lack, or prints the card of one."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from jointscope.tools.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.whole_file import check_outputs, write_json
+
+EXAMPLE = """examples:
+  jointscope effects
+  jointscope effects bearing_flexibility
+  jointscope effects --effects my_effects.py
+
+docs/your_own_effect.md shows how to write an effect of your own."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "effects",
+        help="lists the physical effects that a model may lack, or prints the card of one",
+        description="Lists the catalogue of physical effects. With an id: the card of that effect: its equation, "
+        "parameters, the motion that shows it, and what it is confused with.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("id", metavar="ID", nargs="?", help="an effect")
+    add_effects_option(parser)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Lists, or prints one card."""
+    check_outputs([args.json], inputs=args.effects)
+    from jointscope.robots.effect_catalogue import catalogue, find_effect
+    from jointscope.tools.effect_text import card_text, effect_json, list_text
+
+    load_user_effects(args.effects)
+    if args.id is None:
+        known = catalogue()
+        content, text = {"effects": {e.id: effect_json(e) for e in known.values()}}, list_text(known.values())
+    else:
+        effect = find_effect(args.id)
+        content, text = effect_json(effect), card_text(effect)
+    if args.json is not None:
+        write_json(args.json, content)
+    print(text)
+    return 0
