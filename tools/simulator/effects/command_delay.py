@@ -26,9 +26,8 @@ class CommandDelay(SimulatedEffect):
     def bind(self, model: Any, data: Any, address: Address) -> None:
         """Prepares a memory of as many fine steps as the delay is long."""
         steps = self.parameters["delay"] / float(model.opt.timestep)
-        nearest = round(steps)
-        whole = nearest if abs(steps - nearest) < 1e-9 else int(steps)
-        self._share = steps - whole if whole != nearest else 0.0
+        whole = int(steps + 1e-9)
+        self._share = max(0.0, steps - whole)
         self._history = deque([np.zeros(self.robot.n)] * (whole + 2), maxlen=whole + 2)
         self._owned = [self.robot.joints.index(joint) for joint in self.joints]
 

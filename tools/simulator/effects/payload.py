@@ -32,6 +32,7 @@ class Payload(SimulatedEffect):
         body.add_body(
             name=f"{self.owner}.payload",
             pos=DISTANCE * axis,
+            ipos=np.zeros(3),  # the engine would take `pos` a second time
             explicitinertial=True,
             mass=self.parameters["inertia"] / DISTANCE**2,
             inertia=[1e-9] * 3,  # [kg m2] a point, as near as the engine allows
