@@ -113,7 +113,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         sensors=sensors,
         floors=floors,
         motion=JointStates.of(robot, problem.timeline.ticks, states),
-        predicted_motion=_predicted_motion(robot, recording, ahead[HORIZON]),
+        predicted_motion=_predicted_motion(robot, recording, ahead[HORIZONS[0]]),
     )
 
 

@@ -91,7 +91,7 @@ class ModelComparison:
         sensors: predictions by sensor name.
         floors: `floor` by channel [sensor sigma]; empty where it was not kept.
         motion: smoothed motion of the joints at all ticks; None where it was not kept.
-        predicted_motion: motion 0.1 s ahead of the causal states; None where it was not kept.
+        predicted_motion: motion 0.01 s ahead of the causal states; None where it was not kept.
     """
 
     label: str

@@ -165,7 +165,7 @@ def _follows(group: Sequence[Finding]) -> str:
     if abs(r) >= STRONG:
         joint, signal = name.split(".", 1)
         signal = signal.replace("sign(velocity)", "sign of the velocity")
-        return f"{label}follows the {signal} of {joint} (correlation {r:+.2f})"
+        return f"{label}follows the predicted {signal} of {joint} (correlation {r:+.2f})"
     if worst.whiteness_p < COLOURED:
         return f"{label}is not white noise (p < {COLOURED:g}), so something systematic is left in it"
     return ""
