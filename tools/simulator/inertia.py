@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def full_inertia(matrix: Array) -> Array:
+    """The six numbers, shape (6,) [kg m2], of a symmetric matrix, shape (3, 3)."""
+    return np.array([*np.diag(matrix), matrix[0, 1], matrix[0, 2], matrix[1, 2]])
+
+
 def inertia_matrix(full: Array) -> Array:
     """The symmetric matrix, shape (3, 3) [kg m2], of six numbers, shape (6,)."""
     xx, yy, zz, xy, xz, yz = full

@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.robot import Robot
+from jointscope.tools.simulator.inertia import full_inertia
 from jointscope.tools.simulator.mujoco_module import load_mujoco
 
 Array = NDArray[np.float64]
@@ -68,7 +69,6 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
         name, parent = model.names[j], model.parents[j]
         placement, inertia = model.jointPlacements[j], model.inertias[j]
         parent_body = spec.body(link_body(model.names[parent])) if parent else spec.worldbody
-        I = inertia.inertia  # noqa: E741  about the centre of mass, in the axes of the joint
         body = parent_body.add_body(
             name=link_body(name),
             pos=placement.translation,
@@ -76,18 +76,18 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
             explicitinertial=True,
             mass=max(inertia.mass, 1e-9),  # [kg] the engine refuses a moving body without any
             ipos=inertia.lever,
-            fullinertia=[I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]],
+            fullinertia=full_inertia(inertia.inertia),  # about the centre of mass, in the axes of the joint
         )
-        axis, kind = _joint_axis(mujoco, model, j)
+        axis, turns = joint_axis(model, j)
+        kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(name=name, type=kind, axis=axis)
 
 
-def _joint_axis(mujoco: Any, model: pin.Model, j: int) -> tuple[Array, Any]:
-    """Axis of a joint in its own frame, and its type: what pinocchio made of the URDF's <axis>."""
+def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
+    """Axis of a joint in its own frame, and whether it turns: what pinocchio made of the URDF's <axis>."""
     column = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), j)[:, model.joints[j].idx_v]
-    if np.any(column[3:]):
-        return column[3:], mujoco.mjtJoint.mjJNT_HINGE
-    return column[:3], mujoco.mjtJoint.mjJNT_SLIDE
+    turns = bool(np.any(column[3:]))
+    return (column[3:] if turns else column[:3]), turns
 
 
 def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) -> None:

@@ -9,19 +9,20 @@ shows; it may be given here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
 from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.inertia import is_possible
+from jointscope.tools.simulator.inertia import full_inertia, is_possible
 from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import link_body, set_linear
+from jointscope.tools.simulator.specification import joint_axis, link_body, set_linear
 
 # What another effect may have given the joint.
 PASSIVE = ("stiffness", "damping", "frictionloss", "solref_friction", "solimp_friction", "armature")
+LARGER = (1.2, 1.35)  # transverse inertia by default, over that of the URDF
 
 
 class BearingFlexibility(SimulatedEffect):
@@ -29,17 +30,25 @@ class BearingFlexibility(SimulatedEffect):
 
     id = "bearing_flexibility"
     acts_on = ("joint",)
-    defaults: ClassVar[Mapping[str, float]] = {
-        "compliance_x": 1.0 / 2500.0,  # [rad/(N m)]
-        "compliance_y": 1.0 / 3200.0,  # [rad/(N m)]
-        "damping_x": 12.0,  # [N m s/rad]
-        "damping_y": 14.0,  # [N m s/rad]
-        "inertia_x": 2.4,  # [kg m2] of the moved body about x
-        "inertia_y": 2.7,  # [kg m2] of the moved body about y
-    }
-
     never_negative = ("compliance_x", "compliance_y", "damping_x", "damping_y")
     above_zero = ("inertia_x", "inertia_y")
+
+    def default_parameters(self) -> Mapping[str, float]:
+        """A soft bearing; inertias above the URDF's, which are often guessed, where a body can have that."""
+        model = self.robot.tree.model
+        j = model.getJointId(self.owner)
+        across, full = _across(joint_axis(model, j)[0]), full_inertia(model.inertias[j].inertia)
+        larger = full.copy()
+        larger[across] *= LARGER
+        x, y = (larger if is_possible(larger) else full)[across]
+        return {
+            "compliance_x": 1.0 / 2500.0,  # [rad/(N m)]
+            "compliance_y": 1.0 / 3200.0,  # [rad/(N m)]
+            "damping_x": 12.0,  # [N m s/rad]
+            "damping_y": 14.0,  # [N m s/rad]
+            "inertia_x": float(x),  # [kg m2] of the moved body about x
+            "inertia_y": float(y),  # [kg m2] of the moved body about y
+        }
 
     def edit(self, spec: Any) -> None:
         """Puts the hinges before the joint, and the transverse inertia on its body."""
@@ -48,7 +57,7 @@ class BearingFlexibility(SimulatedEffect):
         kind, axis = joint.type, np.array(joint.axis)
         passive = {name: np.copy(getattr(joint, name)) for name in PASSIVE}
         body = spec.body(link_body(self.owner))
-        across = np.sort(np.argsort(np.abs(axis))[:2])
+        across = _across(axis)
         self._override_inertia(body, across)
         spec.delete(joint)  # joints of a body act in the order in which they were added
         for name, k in zip("xy", across, strict=True):
@@ -71,3 +80,8 @@ class BearingFlexibility(SimulatedEffect):
                 f"{inertia[across][1]:g} kg m2 are impossible beside the rest of the body's inertia"
             )
         body.fullinertia = inertia
+
+
+def _across(axis: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The two coordinate axes that are across the joint's axis, in their order."""
+    return np.sort(np.argsort(np.abs(axis))[:2])
