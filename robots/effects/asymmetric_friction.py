@@ -36,6 +36,7 @@ EFFECT = JointTorque(
         look_alikes={
             "torque_offset": "while the motor moves both are a constant torque",
             "gravity_imbalance": "near one position the weight is a constant torque, too",
+            "pwm_deadband": "while accelerating, a lost command is more friction",
         },
     ),
 )

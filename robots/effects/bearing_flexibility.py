@@ -86,6 +86,7 @@ EFFECT = BearingFlexibility(
             "inertia_error": "the transverse inertias are moments of the same body",
             "kinematic_coupling": "a soft bearing lets other joints move the owner's body",
             "gyro_scale": "a small part of the tilt turns with the body's own rate",
+            "gyro_delay": "far below a resonance, tilting shifts the rate in phase",
         },
     ),
 )

@@ -41,6 +41,7 @@ EFFECT = TimeShift(
             "motor_lag": "with the encoder late, motion seems to lag behind the command",
             "gyro_delay": "only the difference in time between encoder and gyro shows, but for the command",
             "clock_offset": "only differences in time show",
+            "joint_elasticity": "below the resonance the difference between motor and link looks like one in time",
         },
     ),
 )

@@ -10,7 +10,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Memory, smooth_sign
 
 DEFLECTIONS = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03)  # [rad]
-WIDTH = 0.02  # [rad/s] over which the sign of the deflection's rate is rounded
+WIDTH = 1e-3  # [rad/s] over which the sign of the deflection's rate is rounded; much slower, z would pass 1
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
@@ -51,6 +51,7 @@ EFFECT = JointTorque(
             "backlash": "both lag behind after a reversal; hysteresis takes energy, a gap does not",
             "load_dependent_friction": "both take energy out of every change of the load",
             "spring_cubic": "both change the apparent stiffness with the size of the deflection",
+            "link_coulomb": "while the motor stands the deflection turns round with the link",
         },
     ),
 )

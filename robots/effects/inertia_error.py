@@ -44,6 +44,7 @@ EFFECT = InertiaEffect(
             "bearing_flexibility": "its transverse inertias are moments of the same body",
             "gravity_imbalance": "where gravity acts, a wrong first moment comes with a wrong inertia",
             "kinematic_coupling": "a wrong product of inertia couples the joints, too, but with the acceleration",
+            "coriolis": "a wrong inertia matters most in the same fast motion",
         },
     ),
 )

@@ -32,6 +32,7 @@ EFFECT = JointTorque(
         look_alikes={
             "motor_viscous": "with a stiff spring both sides move alike",
             "link_coulomb": "within a narrow range of speeds a constant and a proportional torque agree",
+            "coriolis": "within a narrow range of speeds any drag looks alike",
         },
     ),
 )
