@@ -33,7 +33,7 @@ def card_text(effect: Effect) -> str:
     """Everything a user should know about an effect before it goes into a model."""
     card = effect.card
     heading = f"{effect.id}: {card.title}"
-    lines = [heading, "=" * len(heading), "", *textwrap.wrap(card.explanation, WIDTH), ""]
+    lines = [heading, "=" * len(heading), "", *textwrap.wrap(card.explanation, WIDTH, break_on_hyphens=False), ""]
     lines += _entry("law", card.law)
     lines += _entry("owner", ", ".join(effect.owners) + (" (the last one)" if getattr(effect, "last_only", 0) else ""))
     lines += _entry("typical size", card.typical)
@@ -45,7 +45,8 @@ def card_text(effect: Effect) -> str:
     if card.look_alikes:
         lines += ["", "hard to tell from"]
         for other, reason in card.look_alikes.items():
-            lines += textwrap.wrap(f"{other}: {reason}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+            text = f"{other}: {reason}"
+            lines += textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
     return "\n".join(lines)
 
 
@@ -94,4 +95,4 @@ def _remark(p: EffectParameter) -> str:
 
 def _entry(label: str, text: str) -> list[str]:
     indent = " " * LABEL
-    return textwrap.wrap(f"{label:<{LABEL}}{text}", WIDTH, subsequent_indent=indent, drop_whitespace=True)
+    return textwrap.wrap(f"{label:<{LABEL}}{text}", WIDTH, subsequent_indent=indent, break_on_hyphens=False)
