@@ -86,8 +86,8 @@ def slowest_visible_speed(robot: Robot) -> float:
 
 
 def _load(motion: JointStates) -> tuple[Array, str]:
-    """Load of each joint and its unit."""
-    if np.any(np.isfinite(motion.load)):
+    """Load of each joint and its unit; rigid joints have springs without torque."""
+    if np.any(np.isfinite(motion.load) & (motion.load != 0.0)):
         return motion.load, "N m"
     return np.gradient(motion.v, motion.times, axis=0), "rad/s^2"
 

@@ -200,6 +200,14 @@ def test_a_stop_is_no_reversal(doggy):
     assert not motion_regimes(doggy, JointStates(t, 0.0 * v, v, v, v)).masks["reversal"].any()
 
 
+def test_without_springs_the_acceleration_is_the_load(doggy):
+    t = np.arange(0.0, 12.0, 0.001)
+    q, v = np.sin(np.outer(t, [1.0, 2.0, 3.0])), np.cos(np.outer(t, [1.0, 2.0, 3.0])) * [1.0, 2.0, 3.0]
+    regimes = motion_regimes(doggy, JointStates(t, q, v, 0.0 * q, 0.0 * q))
+    assert regimes.load_unit == "rad/s^2"
+    assert regimes.thresholds["loaded"][1] == pytest.approx(4.0 * np.cos(0.1 * np.pi), rel=0.02)
+
+
 def test_nearness_to_a_limit_comes_from_the_urdf(doggy):
     t = np.arange(0.0, 1.0, 0.001)
     lower, upper = doggy.tree.limits[1]
