@@ -171,6 +171,10 @@ class ElasticJoints:
         """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
         return self._drive(np.ones((1, len(self._motor_row))), self.named(parameters))[0]
 
+    def motor_inertia(self, values: Mapping[str, float]) -> Array:
+        """Inertia of each motor, shape (n,) [kg m2]."""
+        return self._law(values, "inertia")
+
     def command_response(self, accelerations: Accelerations, parameters: Array) -> Array:
         """Derivative of the accelerations by the command of each joint, shape (m, r, n)."""
         layout, gain = self.layout, self.drive_gain(parameters)
@@ -242,14 +246,15 @@ class ElasticJoints:
     def _terms(self, x: Array, values: Mapping[str, float], derivatives: bool) -> TorqueTerms:
         """All torques but the command's."""
         terms = TorqueTerms.zeros(len(x), self.layout, len(self.names), derivatives)
-        springs = self._springs(x, values)
+        springs = self.springs(x, values)
         self._add_springs(terms, springs)
         self._add_motors(terms, x, values)
         self._add_bearings(terms, x, values)
         self._effects.add(terms, x, springs, values)
         return terms
 
-    def _springs(self, x: Array, values: Mapping[str, float]) -> Springs:
+    def springs(self, x: Array, values: Mapping[str, float]) -> Springs:
+        """Springs of all joints at states of shape (m, d)."""
         layout = self.layout
         K, D = self._law(values, "stiffness"), self._law(values, "damping")
         deflection = x[:, layout.joint_q] - x[:, layout.motor_q]

@@ -55,12 +55,12 @@ def late_channels(robot: Robot, name: str) -> list[tuple[NDArray[np.intp], tuple
     sensor = robot.sensors[name]
     groups: dict[tuple[str, ...], tuple[list[int], tuple[EffectAt, ...]]] = {}
     for j in range(len(sensor.channels)):
-        effects = tuple(here for here in robot.effects if _shifts(here, robot, name, j))
+        effects = tuple(here for here in robot.effects if shifts(here, robot, name, j))
         groups.setdefault(tuple(here.label for here in effects), ([], effects))[0].append(j)
     return [(np.array(channels, dtype=np.intp), effects) for channels, effects in groups.values()]
 
 
-def _shifts(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
+def shifts(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
     """Whether an effect makes a channel late."""
     if not isinstance(here.effect, TimeShift):
         return False
