@@ -23,8 +23,8 @@ class JointStates:
 
     Attributes:
         times: strictly increasing, shape (m,) [s].
-        q: link positions, shape (m, n) [rad].
-        v: link velocities, shape (m, n) [rad/s].
+        q: motor positions in link units, shape (m, n) [rad]; the link's position swings about them.
+        v: motor velocities in link units, shape (m, n) [rad/s].
         deflection: q_link - q_motor, shape (m, n) [rad]; NaN where it is not known.
         load: torque in the spring, K deflection + D rate, shape (m, n) [N m]; NaN where it is not known.
     """
@@ -49,7 +49,7 @@ class JointStates:
             np.array([_drive_value(robot, joint, name) for joint in robot.joints]) for name in ("stiffness", "damping")
         )
         load = stiffness * (q_link - q_motor) + damping * (v_link - v_motor)
-        return JointStates(times, q_link, v_link, q_link - q_motor, load)
+        return JointStates(times, q_motor, v_motor, q_link - q_motor, load)
 
     @staticmethod
     def of_positions(times: Array, q: Array) -> JointStates:
