@@ -56,13 +56,20 @@ def torque_views(missing: MissingTorque, root: str, name: str) -> list[rrb.Conta
         )
         for side in (0, 1)
     ]
+    bounds = rrb.VisualBounds2D(x_range=(-0.15 * WIDTH, 1.15 * WIDTH), y_range=(-0.2 * HEIGHT, 1.2 * HEIGHT))
     maps = [
-        rrb.Spatial2DView(origin="/" + entity(root, "maps", str(k + 1)), name=viewer_text(f"{m.row} over {m.signal}"))
+        rrb.Spatial2DView(
+            origin="/" + entity(root, "maps", str(k + 1)),
+            name=viewer_text(f"{m.row} over {m.signal}"),
+            visual_bounds=bounds,
+        )
         for k, m in enumerate(_maps(missing))
     ]
     tabs: list[rrb.Container] = [rrb.Horizontal(*columns, name=viewer_text(f"missing torque{name}"))]
     if maps:
-        tabs.append(rrb.Grid(*maps, grid_columns=3, name=viewer_text(f"its shape{name}")))
+        tabs.append(
+            rrb.Grid(*maps, grid_columns=3, name=viewer_text(f"its shape: blue median, grey middle half{name}"))
+        )
     return tabs
 
 
