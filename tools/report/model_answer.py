@@ -65,7 +65,8 @@ def discovery_answer(result: Discovery) -> Answer:
 
 def changes(result: Discovery) -> list[str]:
     """Effects that were added and are still there, then what was removed from the base model."""
-    added, removed = [], []
+    added: list[str] = []
+    removed: list[str] = []
     for step in result.steps:
         if step.removed in added:
             added.remove(step.removed)

@@ -100,7 +100,7 @@ def _send_map(stream: rr.RecordingStream, path: str, m: ResidualMap, missing: Mi
         return np.column_stack([WIDTH * (x - left) / (right - left), HEIGHT * (high - y) / max(high - low, 1e-12)])
 
     def lines(strips: list[Array], colours: list[Colour], widths: list[float]) -> rr.LineStrips2D:
-        return rr.LineStrips2D(strips, colors=colours, radii=[rr.Radius.ui_points(w) for w in widths])
+        return rr.LineStrips2D(strips, colors=colours, radii=rr.Radius.ui_points(widths))
 
     frame = [np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT], [0, 0]], dtype=float)]
     zero = [place(np.array([left, right]), np.zeros(2))]

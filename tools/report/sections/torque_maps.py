@@ -60,11 +60,12 @@ def candidate_colour(missing: MissingTorque, label: str) -> str:
 
 
 def _grid(maps: list[ResidualMap], missing: MissingTorque, keys: list[Key]) -> str:
-    panels = "".join(_panel(m, missing) for m in maps)
+    panels = "".join(map_picture(m, missing) for m in maps)
     return figure([f'<div class="maps">{panels}</div>'], keys)
 
 
-def _panel(m: ResidualMap, missing: MissingTorque) -> str:
+def map_picture(m: ResidualMap, missing: MissingTorque) -> str:
+    """One map."""
     marks: list[Mark] = [
         Band("middle half", m.centers, m.low, m.high, "m0"),
         Curve("missing torque", m.centers, m.median, "m0", "thick"),

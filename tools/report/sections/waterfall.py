@@ -28,11 +28,12 @@ def waterfall(result: Discovery) -> Section:
     )
     keys = [Key("blocks left out of training", TRAINING, "thick")]
     keys += [Key("held-out recording", HELD_OUT, "thick")] if result.held_out else []
-    body = figure([_bars(result)], [*keys, Key("floor", "ink", "thick")]) + _table(result)
+    body = figure([waterfall_picture(result)], [*keys, Key("floor", "ink", "thick")]) + _table(result)
     return Section("waterfall", "Step by step", body, lead)
 
 
-def _bars(result: Discovery) -> str:
+def waterfall_picture(result: Discovery) -> str:
+    """Two bars per step and the floor as a mark on them."""
     errors = [e for step in result.steps for e in (step.train_error, step.heldout_error) if math.isfinite(e)]
     largest = 1.15 * max([2.0, *errors])
     height = ROW * len(result.steps)
