@@ -25,6 +25,7 @@ EXAMPLE = """examples:
   jointscope info calibration.mcap --robot doggy
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html
   jointscope compare doggy doggy_calibrated.yaml moves.mcap
+  jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
 
 `jointscope VERB --help` explains a verb."""
 

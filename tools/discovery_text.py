@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.tools.diagnosis_text import ranking_text
+from jointscope.tools.report.candidate_numbers import effect_rows
 from jointscope.tools.report.model_answer import discovery_answer, unexplained_share
-from jointscope.tools.report.numbers import percent, significant, with_sigma
+from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.text_table import text_table
 
 
@@ -43,11 +44,7 @@ def waterfall_text(result: Discovery) -> str:
 
 def _sizes(result: Discovery) -> str:
     """Parameters of the effects in the last model."""
-    rows = []
-    for p in result.robot.parameters.values():
-        if p.effect is not None:
-            value, sigma = with_sigma(p.value, p.sigma if p.sigma is not None else float("nan"))
-            rows.append([p.name, value, sigma, "" if p.unit == "1" else p.unit])
+    rows = effect_rows(result.robot)
     return (
         "Effects in the last model:\n" + text_table(["parameter", "value", "± sigma", "unit"], rows, "<>><")
         if rows

@@ -44,6 +44,7 @@ def test_the_ranking_shows_sizes_with_sigmas_units_verdicts_and_reasons(page):
     for part in (
         "compliance_x = 0.0004020 ± 0.0000061 rad/(N m)",
         "looks like gyro_scale@imu1",
+        "stiffness_x = 2488 ± 38 N m/rad",
         "Its sign is not physical.",
         "12.9 held out",
         "ΔBIC −420000",
@@ -149,7 +150,7 @@ def test_the_screen_shows_ranking_sizes_and_what_to_do():
     text = diagnosis_text(fake_diagnosis())
     assert text.splitlines()[0] == "The model is not adequate: it lacks bearing_flexibility@joint1."
     for line in (
-        "  1  bearing_flexibility@joint1  missing            3.10·10⁶    2  1.0·10⁻¹²      98 %        1.31      1.29  "
+        "  1  bearing_flexibility@joint1  missing            3.10·10⁶    2  1.0·10⁻¹²      98 %        1.24      1.23  "
         "gyro_scale@imu1",
         "  7  integration_error@robot     absent (numerics)      61.0    1      0.020         —           —         —",
         "  bearing_flexibility@joint1  compliance_x  0.0004020  0.0000061  rad/(N m)  refit",

@@ -41,8 +41,15 @@ def test_every_section_is_there_in_order_and_holds_only_numbers(page):
 
 
 def test_the_waterfall_shows_both_errors_and_the_floor_of_every_step(page):
-    for part in ("0: base model", f"1: + {BEARING}", "12.3 σ", "13.2 σ", "1.31 σ", "1.29 σ", "13.2 → 1.29"):
+    for part in ("0: base model", f"1: + {BEARING}", "12.3 σ", "13.2 σ", "1.24 σ", "1.23 σ", "13.2 → 1.23"):
         assert part in page.text, part
+
+
+def test_effects_are_told_with_sigma_and_the_stiffness_beside_its_compliance(result, page):
+    for part in ("joint1.bearing_flexibility.compliance_x 0.0004020 0.0000060 rad/(N m)", "2488 37 N m/rad"):
+        assert part in page.text, part
+    lines = discovery_text(result).splitlines()
+    assert "  joint1.bearing_flexibility.stiffness_x        2488         37  N m/rad" in lines
 
 
 def test_before_and_after_stand_in_one_picture(page):
@@ -53,15 +60,14 @@ def test_without_a_held_out_recording_the_blocks_judge():
     result = fake_discovery(held_out=False)
     page = ResultPage(discovery_report(result))
     page.check()
-    assert "on blocks that were left out went from 12.3 to 1.31 sensor sigmas" in page.text
+    assert "on blocks that were left out went from 12.3 to 1.24 sensor sigmas" in page.text
     assert "held-out recording</button>" not in page.html
     assert result.to_json()["steps"][0]["heldout_error"] is None
     assert "nan" not in discovery_text(result)
 
 
 def test_a_single_step_that_was_adequate_at_once(result):
-    alone = dataclasses.replace(result, steps=result.steps[1:], adequate=True)
-    alone = dataclasses.replace(alone, steps=(dataclasses.replace(alone.steps[0], added=None),))
+    alone = dataclasses.replace(result, steps=result.steps[:1], adequate=True)
     page = ResultPage(discovery_report(alone))
     page.check()
     assert "The model is adequate as it was." in page.text
@@ -97,9 +103,9 @@ def test_the_screen_shows_the_waterfall_and_why_it_stopped(result):
     lines = discovery_text(result).splitlines()
     for line in (
         "The model is adequate with bearing_flexibility@joint1.",
-        "The error on the held-out recording went from 13.2 to 1.29 sensor sigmas; noise alone would give 1.21.",
+        "The error on the held-out recording went from 13.2 to 1.23 sensor sigmas; noise alone would give 1.21.",
         "     0  base model                        12.3      13.2   1.20         99 %",
-        "     1  + bearing_flexibility@joint1      1.31      1.29   1.21         12 %",
+        "     1  + bearing_flexibility@joint1      1.24      1.23   1.21        3.2 %",
         "Stopped: The model is adequate.",
     ):
         assert line in lines, line

@@ -6,11 +6,14 @@ from __future__ import annotations
 import math
 
 from jointscope.graphs.diagnosis_result import Candidate
+from jointscope.robots.robot import Robot
 from jointscope.tools.report.numbers import percent, significant, with_sigma
 
 SMALLEST_P = 1e-12  # smaller ones mean nothing: no noise is so well known
 VERDICT_LEVELS = {"missing": "bad", "possible": "warn", "absent": "good", "untestable": "info"}
 NOTHING = "—"
+
+Row = tuple[str, str, str, str]  # name, value, sigma, unit
 
 
 def p_text(p: float) -> str:
@@ -27,12 +30,28 @@ def share_text(share: float) -> str:
     return percent(share) if abs(share) >= 1e-3 else "0 %"
 
 
-def parameter_texts(candidate: Candidate) -> list[tuple[str, str, str, str]]:
-    """Name, value, sigma and unit of every parameter."""
-    rows = []
-    for name, p in candidate.parameters.items():
-        value, sigma = with_sigma(p.value, p.sigma)
-        rows.append((name, value, sigma, "" if p.unit == "1" else p.unit))
+def parameter_texts(candidate: Candidate) -> list[Row]:
+    """Name, value, sigma and unit of every parameter; a stiffness beside its compliance."""
+    rows = [row for name, p in candidate.parameters.items() for row in value_rows(name, p.value, p.sigma, p.unit)]
+    return rows
+
+
+def effect_rows(robot: Robot) -> list[Row]:
+    """The same of all effects in a robot, by full name."""
+    return [
+        row
+        for p in robot.parameters.values()
+        if p.effect is not None
+        for row in value_rows(p.name, p.value, math.nan if p.sigma is None else p.sigma, p.unit)
+    ]
+
+
+def value_rows(name: str, value: float, sigma: float, unit: str) -> list[Row]:
+    """One row; for a compliance a second one with the stiffness, which is what people know."""
+    rows = [(name, *with_sigma(value, sigma), "" if unit == "1" else unit)]
+    if unit == "rad/(N m)" and "compliance" in name and value > 0.0:
+        stiffness = with_sigma(1.0 / value, sigma / value**2)
+        rows.append((name.replace("compliance", "stiffness"), *stiffness, "N m/rad"))
     return rows
 
 

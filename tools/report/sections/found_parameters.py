@@ -8,18 +8,19 @@ from html import escape
 
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.parameter import Parameter
-from jointscope.tools.report.candidate_numbers import parameter_texts
-from jointscope.tools.report.numbers import minus, significant, with_sigma
+from jointscope.tools.report.candidate_numbers import effect_rows, parameter_texts
+from jointscope.tools.report.numbers import minus, with_sigma
 from jointscope.tools.report.page import Section, foldable, table
 
 
 def found_parameters(result: Discovery) -> Section:
     """Sizes first; the other parameters before and after fold."""
     first, last = result.steps[0].robot, result.robot
-    effects = [p for p in last.parameters.values() if p.effect is not None]
-    rows = [[f"<code>{escape(p.name)}</code>", *_value(p), escape(_unit(p)), _in_sigmas(p)] for p in effects]
-    head = ["parameter", "value", "± sigma", "unit", "value in sigmas"]
-    body = table(head, rows, [1, 2, 4]) if rows else _from_ranking(result)
+    rows = [
+        [f"<code>{escape(name)}</code>", f"<b>{value}</b>", sigma, escape(unit)]
+        for name, value, sigma, unit in effect_rows(last)
+    ]
+    body = table(["parameter", "value", "± sigma", "unit"], rows, [1, 2]) if rows else _from_ranking(result)
     shared = [name for name in last.parameters if name in first.parameters and not last.parameters[name].fixed]
     if len(result.steps) > 1 and shared:
         pairs = [(first.parameters[name], last.parameters[name]) for name in shared]
@@ -54,10 +55,6 @@ def _value(p: Parameter) -> tuple[str, str]:
 
 def _unit(p: Parameter) -> str:
     return "" if p.unit == "1" else p.unit
-
-
-def _in_sigmas(p: Parameter) -> str:
-    return significant(p.value / p.sigma) if p.sigma else "—"
 
 
 def _change(a: Parameter, b: Parameter) -> str:

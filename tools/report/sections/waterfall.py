@@ -16,6 +16,7 @@ from jointscope.tools.report.scale import log_ticks
 LEFT, BAR, RIGHT = 300, 640, 100  # [px] names, longest bar, numbers
 ROW = 52  # [px]
 LEAST = 0.5  # [sensor sigma] left end of the axis
+AXIS = "error [sensor sigma]: blue left out of training, orange held out, mark: floor"
 TRAINING, HELD_OUT = "m0", "m1"
 
 
@@ -49,7 +50,7 @@ def waterfall_picture(result: Discovery) -> str:
     rows = "".join(_row(step, k, at) for k, step in enumerate(result.steps))
     return (
         f'<svg viewBox="0 0 {LEFT + BAR + RIGHT} {height + 36}" role="img" aria-label="error of every step">{ticks}'
-        f'{rows}<text class="xlabel" x="{LEFT + BAR / 2:.0f}" y="{height + 31}">error [sensor sigma]</text></svg>'
+        f'{rows}<text class="xlabel" x="{LEFT + BAR / 2:.0f}" y="{height + 31}">{AXIS}</text></svg>'
     )
 
 
