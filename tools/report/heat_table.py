@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -44,4 +45,4 @@ def _cell(cell: HeatCell) -> str:
 
 
 def _breakable(name: str) -> str:
-    return escape(name).replace(".", ".<wbr>").replace("_", "_<wbr>")
+    return re.sub(r"([._])(?=[a-z])", r"\1<wbr>", escape(name))

@@ -20,7 +20,9 @@ def failure_correlations(failure: FailureAnalysis, id_: str = "correlations") ->
         "same sign, orange: opposite. Commands come from a controller that sees the same errors, so a correlation with "
         "the command alone proves nothing."
     )
-    signals = list(dict.fromkeys(s for c in failure.channels.values() for s in c.correlations))
+    # by joint; within a joint in the order of the worst channel, which has its strongest first
+    found = dict.fromkeys(s for c in failure.channels.values() for s in c.correlations)
+    signals = sorted(found, key=lambda signal: signal.partition(".")[0])
     title = "What the errors go along with"
     if not signals:
         return Section(id_, title, "<p>Correlations were not computed.</p>", lead)

@@ -13,16 +13,17 @@ from jointscope.tools.report.page import Section
 
 def regimes(failure: FailureAnalysis, id_: str = "regimes") -> Section:
     """One row per channel, worst first; one column per regime that occurs."""
-    occur = [r for r in REGIMES if r in failure.time_in_regime]
-    occur += [r for r in failure.time_in_regime if r not in REGIMES]
+    time = {regime: share for regime, share in failure.time_in_regime.items() if share > 0.0}
+    occur = [r for r in REGIMES if r in time] + [r for r in time if r not in REGIMES]
     lead = (
-        "Error in sensor sigmas within each regime of motion, and how much of the time is spent there. "
-        "Under the pointer: the part of the channel's squared error, and the joint whose motion matters."
+        "Error in sensor sigmas within each regime of motion, and how much of the time is spent there; regimes of "
+        "different joints overlap. Under the pointer: the part of the channel's squared error, and the joint whose "
+        "motion matters."
     )
     if not occur or not failure.channels:
         return Section(id_, "When the model fails", "<p>The recording is too short to tell regimes apart.</p>", lead)
     largest = max([2.0, *(e for c in failure.channels.values() for e in c.regimes.values() if math.isfinite(e))])
-    columns = [f"{r} ({percent(failure.time_in_regime[r])} of the time)" for r in occur]
+    columns = [f"{r} ({percent(time[r])} of the time)" for r in occur]
     rows = [(name, [_cell(name, c, r, largest) for r in occur]) for name, c in failure.channels.items()]
     return Section(id_, "When the model fails", heat_table("channel", columns, rows), lead)
 
