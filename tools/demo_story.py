@@ -12,6 +12,7 @@ from jointscope.graphs.discovery_result import Discovery, DiscoveryStep
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.demo_truth import against_truth
+from jointscope.tools.named_recordings import discovery_of
 from jointscope.tools.progress import Progress, progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, write_discovery
 from jointscope.tools.whole_file import whole_file, write_json
@@ -89,9 +90,7 @@ class DemoStory:
                 return str(self.folder / Path(state.save(index, step)).name)
 
             result = discover(self.robot, [train], test, save=save, progress=progress)
-            result = replace(
-                result, robot_file=str(self.folder / "found.yaml"), recordings=(train,), heldout=test, held_out=True
-            )
+            result = discovery_of(replace(result, robot_file=str(self.folder / "found.yaml")), [train], test)
             names = ResultFiles(*(self.hidden / f"discovery.{end}" for end in ("html", "rrd", "json")))
             write_discovery(result, replace(names, robot=self.hidden / "found.yaml"), self.robot.path.name)
             self._draw(result)

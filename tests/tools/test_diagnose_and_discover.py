@@ -123,6 +123,7 @@ def test_discover_keeps_every_step_and_writes_every_file(discover, capsys):
     text = capsys.readouterr().out
     assert text.startswith("The model is adequate with bearing_flexibility@joint1.\n")
     assert "found.step1.yaml" in text
+    assert "runs/test.mcap" in Path("r.html").read_text()
     assert files() == KEPT | {"r.html", "f.rrd", "d.json"}
     content = json.loads(Path("d.json").read_text())
     assert content["robot_file"] == "found.yaml"

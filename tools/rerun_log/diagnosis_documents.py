@@ -24,6 +24,8 @@ from jointscope.tools.rerun_log.viewer_text import viewer_text
 if TYPE_CHECKING:
     import rerun as rr
 
+TOLD = 10  # candidates whose reasons are told although they are absent
+
 
 def send_document(stream: rr.RecordingStream, path: str, markdown: str) -> None:
     """A text with letters that the viewer has."""
@@ -53,7 +55,7 @@ def ranking_markdown(result: Diagnosis) -> str:
     """The ranking as a table and the reasons below it."""
     head = ["", "effect", "verdict", "score", "dof", "p", "explains", "left out [σ]", "held out [σ]", "size"]
     lines = ["# What may be missing", "", *_table(head, [_row(k + 1, c) for k, c in enumerate(result.candidates)])]
-    told = [c for c in result.candidates if c.reasons]
+    told = [c for c in result.candidates if c.reasons and (c.verdict != "absent" or c in result.candidates[:TOLD])]
     for candidate in told:
         lines += ["", f"**{candidate.label}**, {candidate.verdict}:"]
         lines += ["", *(f"- {sentence(text)}" for text in candidate.reasons)]

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from typing import Any
 
 from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.named_recordings import diagnosis_of
 from jointscope.tools.progress import progress_bar
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_diagnosis
 from jointscope.tools.user_effects import load_user_effects
@@ -46,8 +46,8 @@ def run(args: argparse.Namespace) -> int:
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
-        result = diagnose(robot, recordings, holdout, progress=progress)
-        result = replace(result, recordings=tuple(recordings), heldout=holdout)
+        found = diagnose(robot, recordings, holdout, progress=progress)
+        result = diagnosis_of(found, recordings, holdout)
         if files.report is not None or files.rrd is not None:
             progress("writing", 1.0)
         write_diagnosis(result, files)

@@ -12,6 +12,7 @@ from typing import Any
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.robot import Robot
 from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.named_recordings import discovery_of
 from jointscope.tools.progress import Progress, progress_bar
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_discovery
 from jointscope.tools.user_effects import load_user_effects
@@ -92,4 +93,4 @@ def _discover(
         if not state.count:
             raise
         raise JointscopeError(f"interrupted after step {state.count - 1}; the same command continues there") from None
-    return replace(result, robot_file=str(args.output), recordings=tuple(recordings), heldout=holdout)
+    return discovery_of(replace(result, robot_file=str(args.output)), recordings, holdout)

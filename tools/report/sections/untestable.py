@@ -8,7 +8,9 @@ from html import escape
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.tools.effect_cards import excitation_of, look_alike_reasons
 from jointscope.tools.report.model_answer import of_verdict
-from jointscope.tools.report.page import Section, sentence, table
+from jointscope.tools.report.page import Section, foldable, sentence, table
+
+SHOWN = 8
 
 
 def untestable(result: Diagnosis, id_: str = "untestable") -> Section:
@@ -34,7 +36,9 @@ def _weak(candidates: list[Candidate]) -> str:
         ]
         for c in candidates
     ]
-    return table(["effect", "why not", "motion that would show it"], rows)
+    head = ["effect", "why not", "motion that would show it"]
+    rest = foldable(f"{len(rows) - SHOWN} more", table(head, rows[SHOWN:])) if rows[SHOWN:] else ""
+    return table(head, rows[:SHOWN]) + rest
 
 
 def _alike(candidates: list[Candidate]) -> str:
