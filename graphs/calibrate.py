@@ -23,6 +23,7 @@ from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, in
 from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.windows import windows_of
+from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.recording import Notice, Recording
 from jointscope.robots.robot import ProcessNoise, Robot
@@ -55,6 +56,7 @@ def calibrate(
     recordings: Sequence[Recording],
     *,
     biases_only: bool = False,
+    near: Sequence[Calibration] | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrates a robot with one or more recordings.
@@ -63,6 +65,8 @@ def calibrate(
         robot: model with start values and priors.
         recordings: at least one; parameters and rotations are shared, states and biases are each recording's own.
         biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
+        near: values with the biases of each recording that are near the solution already, where the robot's own values
+            and noise are, too: nothing is guessed, no windows are cut.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -72,18 +76,31 @@ def calibrate(
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
-    noise = _loose(robot.noise) if robot.noise.estimate else robot.noise
+    noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = _History([])
     try:
-        noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
+        if near is None:
+            noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
+        else:
+            calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
+        problems = _anchored(problems, calibrations)
         solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
     except SolveError as err:
         raise SolveError(_with_suspicions(str(err), recordings, notices)) from err
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
+
+
+def _anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:
+    """The problems with samples placed where present values say, if stamps may be late."""
+    robot = problems[0].robot
+    if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
+        return list(problems)
+    values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
+    return [BagProblem.of(problem.robot.with_values(values), problem.recording) for problem in problems]
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -10,17 +10,17 @@ by the sum of squared scores of half-second blocks, which survives coloured ones
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
+from scipy.stats import f as fisher
 
 from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.shared_layout import SharedLayout
-from jointscope.graphs.trial_columns import columns_of
+from jointscope.graphs.trial_columns import Column, columns_of
 from jointscope.graphs.trial_system import Segment, TrialRows, rows_of, trial_system
 from jointscope.graphs.trials import Trial
 
@@ -39,14 +39,15 @@ class TrialScore:
         score: s' S^-1 s.
         estimate: of the sizes, shape (k,).
         sigma: their standard deviations, shape (k,).
-        alone: score that each size has for itself, shape (k,).
+        S, s: profiled Hessian and gradient of the sizes, shape (k, k) and (k,).
     """
 
     trial: Trial
     score: float
     estimate: Array
     sigma: Array
-    alone: Array
+    S: Array
+    s: Array
 
     @property
     def dof(self) -> int:
@@ -101,16 +102,13 @@ class ScoreTest:
 
     def together(self, trials: Sequence[Trial]) -> JointScores:
         """Scores with confusions and robust p-values."""
-        S, s, columns, blocks = self._profiled(trials, with_blocks=True)
+        S, s, columns, (blocks, information) = self._profiled(trials, with_blocks=True)
         scores = [_score(trial, S[c, c], s[c]) for trial, c in zip(trials, columns, strict=True)]
-        assert blocks is not None
-        p = [_robust_p(trial, blocks[:, c], score) for trial, c, score in zip(trials, columns, scores, strict=True)]
+        p = [_robust_p(score, blocks[:, c], own) for score, c, own in zip(scores, columns, information, strict=True)]
         return JointScores(scores, np.array(p), S, s, columns)
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""
-        from jointscope.graphs.trial_columns import Column
-
         k = columns[0].shape[2]
         parts = [
             rows_of(segment, [Column(at_ticks=c[:, :, i]) for i in range(k)])
@@ -122,7 +120,7 @@ class ScoreTest:
 
     def _profiled(
         self, trials: Sequence[Trial], with_blocks: bool = False
-    ) -> tuple[Array, Array, list[slice], Array | None]:
+    ) -> tuple[Array, Array, list[slice], tuple[Array, list[Array]]]:
         parts, columns, k = [], [], 0
         for trial in trials:
             columns.append(slice(k, k + len(trial.sizes)))
@@ -133,7 +131,7 @@ class ScoreTest:
         H, g, W = self._assembled(parts, k)
         S, s, response = self._profile(H, g, k)
         S = S + np.diag([1.0 / size.prior_sigma**2 for trial in trials for size in trial.sizes])
-        blocks = self._block_scores(parts, W, response, k) if with_blocks else None
+        blocks = self._blocks(parts, W, response, columns) if with_blocks else (np.zeros((0, k)), [])
         return S, s, columns, blocks
 
     def _assembled(self, parts: Sequence[Sequence[TrialRows]], k: int) -> tuple[Array, Array, list[Array]]:
@@ -163,49 +161,75 @@ class ScoreTest:
         S = H[n:, n:] + H[n:, :n] @ response
         return 0.5 * (S + S.T), g[n:] + response.T @ g[:n], response
 
-    def _block_scores(
-        self, parts: Sequence[Sequence[TrialRows]], Ws: Sequence[Array], response: Array, k: int
-    ) -> Array:
-        """Scores of blocks of time with states and base parameters following along, shape (blocks, k)."""
-        found = []
+    def _blocks(
+        self,
+        parts: Sequence[Sequence[TrialRows]],
+        Ws: Sequence[Array],
+        response: Array,
+        columns: Sequence[slice],
+    ) -> tuple[Array, list[Array]]:
+        """Scores, shape (blocks, k), and information of every trial, shape (blocks, k_trial, k_trial), block by block."""
+        k = response.shape[1]
+        scores, information = [], [[] for _ in columns]
         for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
             base, dp = segment.elimination, response[self._shared.indices(i)]
-            right = -(Ws[i] + base.W @ dp)
-            dx = base.solve_transposed(right).reshape(-1, base.d, k)
-            # residuals move with the step that the base model itself would still take
+            dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
             ticks = segment.problem.timeline.ticks
             block = ((ticks - ticks[0]) / BLOCK).astype(int)
-            total = np.zeros((int(block[-1]) + 1, k))
-            columns = self._shared.columns
+            count, blocks = int(block[-1]) + 1, self._shared.columns
+            total = np.zeros((count, k))
+            own = [np.zeros((count, c.stop - c.start, c.stop - c.start)) for c in columns]
             for part in rows:
-                moved = part.by_trial + sum(J @ dp[columns[b]] for b, J in part.by_block.items())
+                # residuals change with states and base parameters following along
+                moved = part.by_trial + sum(J @ dp[blocks[b]] for b, J in part.by_block.items())
                 for j, J in enumerate(part.by_state):
                     moved = moved + J @ dx[part.ticks + j]
-                score = np.einsum("srk,sr->sk", moved, part.residual)
-                np.add.at(total, block[part.ticks], score)
-            found.append(total)
-        return np.vstack(found)
+                sums = _sums_by(block[part.ticks])
+                sums(total, (part.residual[:, None] @ moved)[:, 0])
+                for c, target in zip(columns, own, strict=True):
+                    chosen = moved[:, :, c]
+                    sums(target, chosen.transpose(0, 2, 1) @ chosen)
+            scores.append(total)
+            for target, values in zip(information, own, strict=True):
+                target.append(values)
+        return np.vstack(scores), [np.vstack(values) for values in information]
+
+
+def _sums_by(block: NDArray[np.intp]) -> Callable[[Array, Array], None]:
+    """Adds samples to their blocks; samples are in the order of time."""
+    first = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
+
+    def add(target: Array, values: Array) -> None:
+        target[block[first]] += np.add.reduceat(values, first, axis=0)
+
+    return add
 
 
 def _score(trial: Trial, S: Array, s: Array) -> TrialScore:
     covariance = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
     estimate = -covariance @ s
-    alone = s**2 / np.maximum(np.diag(S), 1e-300)
-    return TrialScore(trial, float(s @ covariance @ s), estimate, np.sqrt(np.maximum(np.diag(covariance), 0.0)), alone)
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return TrialScore(trial, float(s @ covariance @ s), estimate, sigma, S, s)
 
 
-def _robust_p(trial: Trial, blocks: Array, score: TrialScore) -> float:
-    """P-value of the summed block scores against their own spread; half where the sign must be right, 1 where it is wrong."""
-    total = blocks.sum(axis=0)
-    centred = blocks - blocks.mean(axis=0)
-    spread = centred.T @ centred * len(blocks) / max(len(blocks) - 1, 1)
-    statistic = float(total @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ total)
-    k, b = len(total), len(blocks)
-    # Hotelling: the spread itself is estimated from b blocks
-    from scipy.stats import f as fisher
+def _robust_p(score: TrialScore, scores: Array, information: Array) -> float:
+    """P-value of the one-step estimate against the spread of what half-second blocks say about it.
 
-    p = float(fisher.sf(statistic * (b - k) / (k * (b - 1)), k, b - k)) if b > k + 1 else float(chi2.sf(statistic, k))
-    if k == 1 and trial.sizes[0].sign == "+":
+    A block's score at the estimate is its score at null plus information times estimate; where the effect is real these
+    scatter about zero however unevenly the evidence is spread over time. Hotelling's T^2 with as many degrees of
+    freedom as there are blocks that carry information. Half of it where the sign is known and right, 1 where it is wrong.
+    """
+    k, total = score.dof, information.sum(axis=0)
+    weight = np.einsum("bii->b", information)
+    b = float(weight.sum() ** 2 / np.sum(weight**2)) if np.any(weight) else 0.0
+    if b <= k + 1.5:
+        return 1.0
+    at_estimate = scores + information @ score.estimate
+    spread = at_estimate.T @ at_estimate * b / (b - 1.0)
+    pull = total @ score.estimate
+    statistic = float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull)
+    p = float(fisher.sf(statistic * (b - k) / (k * (b - 1.0)), k, b - k))
+    if k == 1 and score.trial.sizes[0].sign == "+":
         return 0.5 * p if score.estimate[0] > 0 else 1.0
     return p
 

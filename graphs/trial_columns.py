@@ -28,7 +28,13 @@ from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorqu
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.lateness import shifts
-from jointscope.robots.structured_tree import InertiaChange, bearing_names, inertia_about_joint, inertia_torque, with_bearings
+from jointscope.robots.structured_tree import (
+    InertiaChange,
+    bearing_names,
+    inertia_about_joint,
+    inertia_torque,
+    with_bearings,
+)
 
 Array = NDArray[np.float64]
 STEP = 1e-30
@@ -315,5 +321,3 @@ def _resonance(signal: Array, ticks: Array, omega: float, ratio: float) -> Array
     b, a = bilinear([omega**2], [1.0, 2.0 * ratio * omega, omega**2], fs=1.0 / h)
     start = signal[0]
     return np.asarray(lfilter(b, a, signal - start) + start, dtype=np.float64)
-
-

@@ -85,7 +85,8 @@ class TrialRows:
 def rows_of(segment: Segment, columns: Sequence[Column]) -> list[TrialRows]:
     """All rows that a trial may touch: dynamics and sensors."""
     at_ticks, in_steps, reading = (
-        [i for i, c in enumerate(columns) if getattr(c, kind) is not None] for kind in ("at_ticks", "in_steps", "reading")
+        [i for i, c in enumerate(columns) if getattr(c, kind) is not None]
+        for kind in ("at_ticks", "in_steps", "reading")
     )
     stacked = _stacked([columns[i].at_ticks for i in at_ticks]), _stacked([columns[i].in_steps for i in in_steps])
     found = []

@@ -14,8 +14,8 @@ from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.robot import Robot
 
-BEARING_FREQUENCIES = (4.0, 6.0, 9.0, 13.0, 19.0, 28.0)  # [Hz] resonance of a body on its soft bearing
-BEARING_DAMPING_RATIOS = (0.1, 0.35)
+BEARING_FREQUENCIES = (4.0, 6.0, 9.0, 14.0, 22.0)  # [Hz] resonance of a body on its soft bearing
+BEARING_DAMPING_RATIOS = (0.15,)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, log_cosh
 
@@ -13,9 +15,11 @@ WIDTH = 5e-4  # [rad] over which the corners of the dead zone are rounded
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
-    """K (dz(deflection, g) - deflection) [N m], the corners rounded; exactly zero at g = 0."""
+    """K (dz(deflection, g) - deflection) - D rate within the gap [N m], corners rounded; exactly zero at g = 0."""
     outer, inner = (s.deflection + p["half_gap"]) / WIDTH, (s.deflection - p["half_gap"]) / WIDTH
-    return -s.stiffness * 0.5 * WIDTH * (log_cosh(outer) - log_cosh(inner))
+    within = 0.5 * (np.tanh(outer) - np.tanh(inner))
+    damper = s.tau_spring - s.stiffness * s.deflection
+    return -s.stiffness * 0.5 * WIDTH * (log_cosh(outer) - log_cosh(inner)) - damper * within
 
 
 EFFECT = JointTorque(

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which physical effect is missing: calibrate, score the catalogue, refit the leaders, decide on validation blocks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.base_model import BaseModel, Span
+from jointscope.graphs.batch_solver import Progress
+from jointscope.graphs.compare import compare_model
+from jointscope.graphs.comparison_result import ModelComparison
+from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.diagnosis_words import paragraphs_of
+from jointscope.graphs.failure_analysis import analyse_failure
+from jointscope.graphs.refit import refit
+from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
+from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.validation import ValidationError, heldout_error, validation_error
+from jointscope.graphs.verdicts import SAME, Trialled, judge, worth_a_refit
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+LEADERS = 3  # candidates that are refitted
+ADEQUATE = 0.05  # share of the squared error that may stay unexplained
+
+
+@dataclass
+class _Clock:
+    """Wall seconds by stage."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    _last: float = field(default_factory=time.perf_counter)
+
+    def stage(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name] = self.seconds.get(name, 0.0) + now - self._last
+        self._last = now
+
+
+@in_solver_context
+def diagnose(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None = None,
+    *,
+    base: BaseModel | None = None,
+    leaders: int = LEADERS,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Ranks the effects that a model lacks.
+
+    Args:
+        robot: the model.
+        recordings: training recordings; they also give the validation blocks.
+        holdout: scored once per refit and reported; it never chooses.
+        base: the model calibrated with these recordings, if that was done.
+        leaders: number of candidates to refit.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    report, clock = progress or (lambda text, share: None), _Clock()
+    report("calibrating the base model", 0.0)
+    base = base or BaseModel.of(robot, recordings)
+    clock.stage("calibration")
+    report("scoring the catalogue", 0.3)
+    scored = score_candidates(base)
+    clock.stage("score")
+    report("where the model fails", 0.45)
+    comparison = compare_model("base", base.robot, holdout or base.recordings[0])
+    failure = analyse_failure(comparison, holdout or base.recordings[0])
+    clock.stage("comparison")
+    fit, spans = base.spans()
+    before = validation_error(base, base.robot, base.calibrations, spans)
+    trialled = _refit_leaders(base, scored, fit, spans, holdout, leaders, report)
+    clock.stage("refits")
+    seconds = sum(span.t1 - span.t0 for span in spans)
+    candidates = [judge(c, before, comparison.floor, trialled.get(c.label), seconds) for c in scored.candidates]
+    candidates = _ranked(candidates)
+    best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
+    after = comparison
+    if best is not None:
+        after = compare_model(best.label, trialled[best.label].refit.robot, holdout or base.recordings[0])
+    share = unexplained(after)
+    clock.stage("comparison")
+    result = Diagnosis(
+        robot=base.robot,
+        candidates=tuple(candidates),
+        adequate=best is None and share < ADEQUATE,
+        unexplained_share=share,
+        error=comparison.error,
+        floor=min(comparison.floor, after.floor),
+        validation_error=before.error,
+        failure=failure,
+        missing=None,
+        noise_levels=scored.noise_levels,
+        placebo_score=scored.placebo,
+        paragraphs=(),
+        refits={label: t.refit.robot for label, t in trialled.items()},
+        comparison=comparison,
+        wall_seconds=clock.seconds,
+        recordings=base.recordings,
+        heldout=holdout,
+    )
+    return replace(result, paragraphs=paragraphs_of(result))
+
+
+def unexplained(comparison: ModelComparison) -> float:
+    """(error^2 - floor^2) / error^2, at least 0."""
+    return float(max(1.0 - (comparison.floor / comparison.error) ** 2, 0.0)) if comparison.error > 0 else 0.0
+
+
+def _refit_leaders(
+    base: BaseModel,
+    scored: ScoredCandidates,
+    fit: Sequence[Span],
+    spans: Sequence[Span],
+    holdout: Recording | None,
+    leaders: int,
+    report: Progress,
+) -> dict[str, Trialled]:
+    """Refits of the best candidates; one whose fit runs away has no result."""
+    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
+    found = {}
+    for i, candidate in enumerate(worth[:leaders]):
+        report(f"refitting {candidate.label}", 0.5 + 0.5 * i / leaders)
+        trial = _trial(base, candidate, fit, spans, holdout)
+        if trial is not None:
+            found[candidate.label] = trial
+    return found
+
+
+def _trial(
+    base: BaseModel,
+    candidate: ScoredCandidate,
+    fit: Sequence[Span],
+    spans: Sequence[Span],
+    holdout: Recording | None,
+) -> Trialled | None:
+    try:
+        found = refit(base, fit, candidate.best)
+        errors: ValidationError = validation_error(base, found.robot, found.biases, spans)
+        heldout = heldout_error(found.robot, holdout) if holdout is not None else float("nan")
+    except (JointscopeError, np.linalg.LinAlgError):
+        return None
+    return Trialled(found, errors, heldout)
+
+
+def _yielding(candidate: Candidate, smallest: float, missing: Sequence[Candidate]) -> Candidate:
+    """A candidate that explains only part of what the best one explains is no more than possible."""
+    if candidate.verdict != "missing" or candidate.validation_error <= smallest * (1.0 + SAME):
+        return candidate
+    best = min(missing, key=lambda c: c.validation_error)
+    reason = f"but {best.label} explains more of it; look again once that is in the model"
+    return replace(candidate, verdict="possible", reasons=(*candidate.reasons, reason))
+
+
+def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
+    order = {"missing": 0, "possible": 1, "absent": 2, "untestable": 3}
+    missing = [c for c in candidates if c.verdict == "missing"]
+    smallest = min((c.validation_error for c in missing), default=0.0)
+    candidates = [_yielding(c, smallest, missing) for c in candidates]
+
+    def key(c: Candidate) -> tuple[float, ...]:
+        if c.verdict == "missing":
+            return (0.0, float(len(c.parameters)), -c.score)
+        return (float(order[c.verdict]), -c.score, 0.0)
+
+    return sorted(candidates, key=key)

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calibrate, diagnose, add, calibrate ... until the model is adequate or nothing helps: forward selection with removal.
+
+After every addition each effect that was added before is looked at again: one whose sizes fell back to null is taken
+out. The held-out recording is scored once per step and never chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from jointscope.graphs.base_model import BaseModel, with_full_gyros
+from jointscope.graphs.batch_solver import Progress
+from jointscope.graphs.compare import compare_model
+from jointscope.graphs.diagnose import ADEQUATE, diagnose, unexplained
+from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery_result import Discovery, DiscoveryStep, SavedStep
+from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.validation import validation_error
+from jointscope.graphs.verdicts import MATTERS, SURE
+from jointscope.robots.effect_editing import remove_effect
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+
+MAX_STEPS = 8
+Save = Callable[[int, DiscoveryStep], str]
+
+
+@in_solver_context
+def discover(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None = None,
+    *,
+    save: Save | None = None,
+    resume: Sequence[SavedStep] | None = None,
+    max_steps: int = MAX_STEPS,
+    progress: Progress | None = None,
+) -> Discovery:
+    """Finds the effects that a model lacks, one after the other.
+
+    Args:
+        robot: the base model.
+        recordings: training recordings.
+        holdout: scored once per step.
+        save: called with the number of each finished step and the step; returns the robot file it wrote.
+        resume: finished steps of an earlier run; the search goes on after the last.
+        max_steps: effects to add at the most.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps)
+    return search.run(robot, resume or ())
+
+
+class _Search:
+    """One discovery."""
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        holdout: Recording | None,
+        save: Save | None,
+        report: Progress,
+        max_steps: int,
+    ):
+        self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
+        self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
+
+    def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
+        """All steps."""
+        for saved in resume:
+            self._restore(saved)
+        self.report("calibrating the base model", 0.0)
+        start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
+        base = BaseModel.of(start, self.recordings)
+        if not self.steps:
+            self._add_step(None, None, base, "The base model.")
+        stop, diagnosis = self._loop(base)
+        last = self.steps[-1]
+        adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE
+        return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.holdout is not None)
+
+    def _loop(self, base: BaseModel) -> tuple[str, Diagnosis | None]:
+        added = sum(step.added is not None for step in self.steps)
+        refused: set[str] = set()
+        while True:
+            share = added / self.max_steps
+            diagnosis = diagnose(base.robot, self.recordings, self.holdout, base=base, progress=self._part(share))
+            self._attach(diagnosis)
+            chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
+            if not chosen:
+                return _why(diagnosis), diagnosis
+            if added >= self.max_steps:
+                return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
+            grown = next((g for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), None)
+            if grown is None:
+                return "what helped on validation blocks did not hold when calibrated with all data", diagnosis
+            base = self._without_idle(grown)
+            added += 1
+
+    def _try(self, base: BaseModel, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> BaseModel | None:
+        """The model with a candidate, calibrated with all training recordings; None if that makes it worse."""
+        self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
+        try:
+            grown = BaseModel.of(diagnosis.refits[candidate.label], self.recordings, start=base)
+            error = self._training_error(grown)
+        except JointscopeError:
+            error = float("inf")
+        if not error**2 < (1.0 - MATTERS) * self.steps[-1].train_error ** 2:
+            refused.add(candidate.label)
+            return None
+        self._add_step(candidate.label, None, grown, _added(candidate, self.steps[-1].train_error, error))
+        return grown
+
+    def _without_idle(self, base: BaseModel) -> BaseModel:
+        """Takes out effects whose sizes fell back to null after another one came in."""
+        for here in base.robot.effects[:-1]:
+            sizes = [p for p in here.effect.parameters_of(base.robot, here.owner) if not p.is_shape]
+            values = [base.robot.parameters[here.parameter(p.name)] for p in sizes]
+            idle = all(abs(v.value - p.null) < SURE * (v.sigma or np.inf) for p, v in zip(sizes, values, strict=True))
+            if not idle:
+                continue
+            smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
+            error = self._training_error(smaller)
+            if error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
+                self._add_step(None, here.label, smaller, f"{here.label} fell back to null and was taken out.")
+                base = smaller
+        return base
+
+    def _add_step(self, added: str | None, removed: str | None, base: BaseModel, paragraph: str) -> None:
+        comparison = compare_model(f"step {len(self.steps)}", base.robot, self.holdout or self.recordings[0])
+        step = DiscoveryStep(
+            added=added,
+            removed=removed,
+            robot=base.robot,
+            train_error=self._training_error(base),
+            heldout_error=comparison.error if self.holdout is not None else float("nan"),
+            floor=comparison.floor,
+            diagnosis=None,
+            comparison=comparison,
+            paragraph=paragraph,
+        )
+        if self.save is not None:
+            step = replace(step, robot_file=self.save(len(self.steps), step))
+        self.steps.append(step)
+
+    def _restore(self, saved: SavedStep) -> None:
+        comparison = compare_model(f"step {len(self.steps)}", saved.robot, self.holdout or self.recordings[0])
+        self.steps.append(
+            DiscoveryStep(
+                added=saved.added,
+                removed=saved.removed,
+                robot=saved.robot,
+                train_error=saved.train_error,
+                heldout_error=saved.heldout_error,
+                floor=saved.floor,
+                diagnosis=None,
+                comparison=comparison,
+                robot_file=saved.robot_file,
+                paragraph=saved.paragraph,
+            )
+        )
+
+    def _attach(self, diagnosis: Diagnosis) -> None:
+        """The last step learns what was found with it as the base."""
+        self.steps[-1] = replace(self.steps[-1], diagnosis=diagnosis)
+
+    def _training_error(self, base: BaseModel) -> float:
+        return validation_error(base, base.robot, base.calibrations, base.spans()[1]).error
+
+    def _part(self, start: float) -> Progress:
+        width = 1.0 / (self.max_steps + 1)
+        return lambda text, share: self.report(text, min(start + width * share, 1.0))
+
+
+def _why(diagnosis: Diagnosis) -> str:
+    if diagnosis.adequate:
+        return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
+    return (
+        f"nothing in the catalogue explains the rest: {100 * diagnosis.unexplained_share:.0f} % of the squared error "
+        "above what noise alone would leave"
+    )
+
+
+def _added(candidate: Candidate, before: float, after: float) -> str:
+    values = ", ".join(f"{name} {p.value:.4g} {p.unit}" for name, p in candidate.parameters.items())
+    return f"{candidate.label} added ({values}): the training error falls from {before:.3g} to {after:.3g} sigma."

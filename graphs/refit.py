@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A real calibration with one more effect, on the fitting pieces of the training recordings.
+
+It starts from the base model's states and values and from the sizes that the score test predicts, so a few iterations
+do. The process noise is estimated again: the base model's noise has swallowed part of the effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.base_model import BaseModel, Span
+from jointscope.graphs.batch_solver import Estimate, solve
+from jointscope.graphs.noise_estimation import estimate_noise
+from jointscope.graphs.posterior import posteriors
+from jointscope.graphs.score_test import TrialScore
+from jointscope.robots.effect_editing import add_effect
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+FIRST_ITERATIONS, LAST_ITERATIONS, NOISE_CYCLES = 8, 8, 6
+ENOUGH = 0.3  # [sigma] last step of a refit
+SMALLEST_START = 0.05  # of the start value: where a logarithmic size begins if the score test wants less
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A model with one more effect, fitted.
+
+    Attributes:
+        robot: with the values and noise found.
+        label: ID@OWNER of the effect; empty for the base model itself.
+        biases: shared values that hold the biases of each recording.
+        sigmas: standard deviation of each of the effect's parameters in its unit, by the last part of its name.
+        cost_fall: fall of the cost on the fitting pieces against the base model at the same noise is not comparable;
+            this is the number of effective samples instead.
+        converged: whether the last step was small.
+    """
+
+    robot: Robot
+    label: str
+    biases: tuple[Calibration, ...]
+    sigmas: dict[str, float]
+    converged: bool
+
+
+def refit(base: BaseModel, spans: Sequence[Span], score: TrialScore | None, label: str = "") -> Refit:
+    """Fits the base model plus one effect.
+
+    Args:
+        base: the base model.
+        spans: pieces to fit.
+        score: the effect, its shapes and where to start; None fits the robot of `base` itself.
+        label: another effect than that of the score, started at its own start values.
+
+    Raises:
+        SolveError: the fit ran away.
+    """
+    robot = base.robot
+    if score is not None:
+        robot = add_effect(robot, score.trial.label, start_of(score, robot))
+    elif label:
+        robot = add_effect(robot, label)
+    problems, estimate = _pieces(base, robot, spans)
+    solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
+    noise, estimate = robot.noise, solution.estimate
+    if noise.estimate:
+        noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
+    if any(isinstance(here.effect, TimeShift) for here in robot.effects):
+        moved = _with(robot, estimate.calibrations[0])
+        problems = [BagProblem.of(moved, problem.recording) for problem in problems]
+    problems = [problem.with_noise(noise) for problem in problems]
+    solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
+    found = solution.estimate.calibrations[0]
+    _, covariance = posteriors(problems, solution)
+    sigma = np.sqrt(np.diag(covariance))[: len(found.names)] * found.value_by_coordinate
+    name = score.trial.label if score is not None else label
+    own = {
+        full.rsplit(".", 1)[1]: float(value)
+        for full, value in zip(found.names, sigma, strict=True)
+        if name and full.startswith("{1}.{0}.".format(*name.split("@")))
+    }
+    robot = replace(_with(robot, found), noise=noise)
+    return Refit(robot, name, _biases(base, spans, solution.estimate.calibrations), own, solution.converged)
+
+
+def start_of(score: TrialScore, robot: Robot) -> dict[str, float]:
+    """Where the refit starts: the predicted sizes, kept positive where the law needs it, and the best shapes."""
+    here, start = score.trial.here, {}
+    for size, value in zip(score.trial.sizes, score.estimate, strict=True):
+        start[size.name] = max(float(value), SMALLEST_START * size.start) if size.logarithmic else float(value)
+    known = {p.name for p in here.effect.parameters_of(robot, here.owner)}
+    start |= {name: value for name, value in score.trial.shapes.items() if name in known}
+    if isinstance(here.effect, Structure) and here.effect.form == "bearing":
+        start |= _bearing_start(score, robot)
+    return start
+
+
+def _bearing_start(score: TrialScore, robot: Robot) -> dict[str, float]:
+    """Inertia and damping that give the best resonance with the predicted compliance."""
+    here, start = score.trial.here, {}
+    omega, ratio = 2.0 * np.pi * score.trial.shapes["frequency"], score.trial.shapes["damping_ratio"]
+    usual = {p.name: p.start for p in here.effect.parameters_of(robot, here.owner)}
+    for axis, size, value in zip("xy", score.trial.sizes, score.estimate, strict=True):
+        compliance = max(float(value), SMALLEST_START * size.start)
+        inertia = float(
+            np.clip(1.0 / (compliance * omega**2), 0.5 * usual[f"inertia_{axis}"], 2.0 * usual[f"inertia_{axis}"])
+        )
+        start[f"inertia_{axis}"] = inertia
+        start[f"damping_{axis}"] = 2.0 * ratio * float(np.sqrt(inertia / compliance))
+    return start
+
+
+def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[BagProblem], Estimate]:
+    """The pieces as problems of the new robot, with the base model's states."""
+    problems, states, calibrations = [], [], []
+    for span in spans:
+        piece: Recording = base.recordings[span.bag].between(span.t0, span.t1)
+        problem = BagProblem.of(robot, piece)
+        problems.append(problem)
+        states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
+        calibrations.append(replace(Calibration.of(robot), biases=base.calibrations[span.bag].biases))
+    return problems, Estimate(tuple(states), tuple(calibrations))
+
+
+def _with(robot: Robot, calibration: Calibration) -> Robot:
+    """The robot with the values of a calibration."""
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    gyros = {
+        gyro.name: replace(gyro, R_imu_body=calibration.rotations[gyro.name], bias=calibration.biases[gyro.name])
+        for gyro in robot.gyros
+    }
+    return robot.with_values(values).with_sensors(gyros)
+
+
+def _biases(base: BaseModel, spans: Sequence[Span], found: Sequence[Calibration]) -> tuple[Calibration, ...]:
+    """Biases of each recording: the mean over its pieces."""
+    result = []
+    for bag, calibration in enumerate(base.calibrations):
+        own = [c for span, c in zip(spans, found, strict=True) if span.bag == bag]
+        mean = {name: np.mean([c.biases[name] for c in own], axis=0) for name in calibration.biases} if own else {}
+        result.append(replace(calibration, biases={**calibration.biases, **mean}))
+    return tuple(result)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From scores and refits to verdicts: missing, possible, absent, untestable, each with its reasons.
+
+Scores rank, validation decides. An effect is missing if its refit lowers the error on validation blocks by a share that
+matters, on most of the blocks, with a possible sign, and pays for its parameters. A recording that was held out never
+enters here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from jointscope.graphs.diagnosis_result import Candidate, EffectEstimate
+from jointscope.graphs.refit import Refit
+from jointscope.graphs.scored_candidates import SIGNIFICANT, ScoredCandidate
+from jointscope.graphs.validation import ValidationError
+from jointscope.robots.effect_kinds.effect import EffectParameter
+
+MATTERS = 0.02  # share of the squared validation error that an effect must explain
+MOST = 0.6  # share of the validation blocks on which it must help
+SURE = 3.0  # [sigma] a refitted size must be away from null
+HORIZON = 0.1  # [s] predictions of this length that do not overlap count as independent
+SAME = 0.02  # relative difference of errors that decides nothing
+
+
+@dataclass(frozen=True)
+class Trialled:
+    """A candidate that was refitted.
+
+    Attributes:
+        refit: the fit.
+        validation: its errors on validation blocks.
+        heldout: its error on the held-out recording; NaN without one.
+    """
+
+    refit: Refit
+    validation: ValidationError
+    heldout: float = float("nan")
+
+
+def judge(
+    scored: ScoredCandidate, base: ValidationError, floor: float, trialled: Trialled | None, seconds: float
+) -> Candidate:
+    """The verdict on one candidate.
+
+    Args:
+        scored: its score.
+        base: errors of the base model on validation blocks.
+        floor: error that sensor noise alone would leave there.
+        trialled: its refit; None if it was not worth one.
+        seconds: of all validation blocks.
+    """
+    here, sizes = scored.best.trial.here, scored.best.trial.sizes
+    common = {
+        **{"effect": here.effect.id, "owner": here.owner, "score": scored.plausible, "dof": scored.best.dof},
+        **{"p_value": scored.p_value, "look_alikes": scored.look_alikes, "numerics": here.effect.card.numerics},
+    }
+    if trialled is None:
+        parameters = {
+            size.name: EffectEstimate(float(value), float(sigma), size.unit)
+            for size, value, sigma in zip(sizes, scored.best.estimate, scored.best.sigma, strict=True)
+        }
+        verdict, reasons = _without_refit(scored)
+        return Candidate(**common, parameters=parameters, verdict=verdict, reasons=reasons)
+    robot, refit = trialled.refit.robot, trialled.refit
+    parameters = {
+        p.name: EffectEstimate(robot.parameters[here.parameter(p.name)].value, refit.sigmas.get(p.name, np.nan), p.unit)
+        for p in here.effect.parameters_of(robot, here.owner)
+    }
+    share = excess_share(base.error, trialled.validation.error, floor)
+    bic = _bic(base.error, trialled.validation.error, len(parameters), seconds)
+    verdict, reasons = _after_refit(scored, base, trialled, parameters, bic, sizes)
+    return Candidate(
+        **common,
+        parameters=parameters,
+        verdict=verdict,
+        reasons=reasons,
+        share=share,
+        refitted=True,
+        validation_error=trialled.validation.error,
+        heldout_error=trialled.heldout,
+        bic=bic,
+    )
+
+
+def excess_share(before: float, after: float, floor: float) -> float:
+    """Part of the squared error above the floor that went, at most 1."""
+    excess = before**2 - min(floor, before) ** 2
+    return float(min((before**2 - after**2) / excess, 1.0)) if excess > 0 else 0.0
+
+
+def worth_a_refit(scored: ScoredCandidate, placebo: float) -> bool:
+    """Whether a score is beyond chance and beyond what meaningless regressors reach."""
+    return scored.chance < SIGNIFICANT and scored.plausible / scored.best.dof > placebo
+
+
+def _without_refit(scored: ScoredCandidate) -> tuple[str, tuple[str, ...]]:
+    effect = scored.best.trial.here.effect
+    weak = [
+        size.name
+        for size, sigma in zip(scored.best.trial.sizes, scored.best.sigma, strict=True)
+        if SURE * sigma > abs(effect.example.get(size.name, np.inf))
+    ]
+    if weak:
+        return "untestable", (
+            f"this motion cannot show it: {weak[0]} of {effect.example[weak[0]]:g} would stay within {SURE:g} sigma; "
+            f"needed: {effect.card.excitation}",
+        )
+    if not scored.right_sign:
+        return "absent", ("the data want the impossible sign",)
+    if scored.chance < SIGNIFICANT:
+        return "possible", ("its score is beyond chance, but others explain more; it was not refitted",)
+    return "absent", ("it would explain no more than chance",)
+
+
+def _after_refit(
+    scored: ScoredCandidate,
+    base: ValidationError,
+    trialled: Trialled,
+    parameters: Mapping[str, EffectEstimate],
+    bic: float,
+    sizes: tuple[EffectParameter, ...],
+) -> tuple[str, tuple[str, ...]]:
+    now, reasons = trialled.validation, []
+    fall = 1.0 - (now.error / base.error) ** 2
+    if not np.isfinite(now.error) or fall < MATTERS:
+        return "absent", (
+            f"with it the error on validation blocks goes from {base.error:.3g} to {now.error:.3g} sigma",
+        )
+    reasons.append(f"the error on validation blocks falls from {base.error:.3g} to {now.error:.3g} sigma")
+    seen = np.isfinite(now.by_span) & np.isfinite(base.by_span)
+    better = int(np.sum(now.by_span[seen] < base.by_span[seen]))
+    reasons.append(f"it helps on {better} of {int(seen.sum())} validation blocks")
+    wrong = [s.name for s in sizes if s.sign == "+" and parameters[s.name].value < s.null]
+    if wrong:
+        return "absent", (*reasons, f"but {wrong[0]} comes out with the impossible sign")
+    unsure = all(abs(parameters[s.name].value - s.null) < SURE * parameters[s.name].sigma for s in sizes)
+    if unsure:
+        return "possible", (*reasons, f"but no size is {SURE:g} sigma away from null")
+    if better < MOST * seen.sum() or bic >= 0.0:
+        return "possible", (*reasons, "but not on enough of them, or not enough for its parameters")
+    return "missing", tuple(reasons)
+
+
+def _bic(before: float, after: float, parameters: int, seconds: float) -> float:
+    """Change of the Bayesian information criterion; predictions that do not overlap are the samples."""
+    if not np.isfinite(after):
+        return float("nan")
+    samples = max(seconds / HORIZON, 2.0)
+    return float(samples * np.log(after**2 / before**2) + parameters * np.log(samples))
