@@ -42,8 +42,6 @@ class Refit:
         label: ID@OWNER of the effect; empty for the base model itself.
         biases: shared values that hold the biases of each recording.
         sigmas: standard deviation of each of the effect's parameters in its unit, by the last part of its name.
-        cost_fall: fall of the cost on the fitting pieces against the base model at the same noise is not comparable;
-            this is the number of effective samples instead.
         converged: whether the last step was small.
     """
 

@@ -168,9 +168,10 @@ class ScoreTest:
         response: Array,
         columns: Sequence[slice],
     ) -> tuple[Array, list[Array]]:
-        """Scores, shape (blocks, k), and information of every trial, shape (blocks, k_trial, k_trial), block by block."""
+        """Scores, shape (blocks, k), and information of every trial, shape (blocks, k_trial, k_trial)."""
         k = response.shape[1]
-        scores, information = [], [[] for _ in columns]
+        scores = list[Array]()
+        information: list[list[Array]] = [[] for _ in columns]
         for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
             base, dp = segment.elimination, response[self._shared.indices(i)]
             dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
@@ -190,8 +191,8 @@ class ScoreTest:
                     chosen = moved[:, :, c]
                     sums(target, chosen.transpose(0, 2, 1) @ chosen)
             scores.append(total)
-            for target, values in zip(information, own, strict=True):
-                target.append(values)
+            for found, values in zip(information, own, strict=True):
+                found.append(values)
         return np.vstack(scores), [np.vstack(values) for values in information]
 
 
@@ -215,9 +216,9 @@ def _score(trial: Trial, S: Array, s: Array) -> TrialScore:
 def _robust_p(score: TrialScore, scores: Array, information: Array) -> float:
     """P-value of the one-step estimate against the spread of what half-second blocks say about it.
 
-    A block's score at the estimate is its score at null plus information times estimate; where the effect is real these
-    scatter about zero however unevenly the evidence is spread over time. Hotelling's T^2 with as many degrees of
-    freedom as there are blocks that carry information. Half of it where the sign is known and right, 1 where it is wrong.
+    A block's score at the estimate is its score at null plus information times estimate; where the effect is real
+    these scatter about zero however unevenly the evidence is spread over time. Hotelling's T^2 with as many degrees of
+    freedom as there are blocks that carry information. Half of it where the sign is known and right, 1 where wrong.
     """
     k, total = score.dof, information.sum(axis=0)
     weight = np.einsum("bii->b", information)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,10 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel
 from jointscope.graphs.noise_estimation import scaled
 from jointscope.graphs.order_scan import scan_orders
-from jointscope.graphs.score_test import ScoreTest, TrialScore
+from jointscope.graphs.score_test import JointScores, ScoreTest, TrialScore
 from jointscope.graphs.trial_signals import TrialSignals
 from jointscope.graphs.trial_system import Segment
-from jointscope.graphs.trials import trials_of
+from jointscope.graphs.trials import Trial, trials_of
 
 Array = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def segments_of(base: BaseModel, bag: int, noise: float = 1.0) -> list[Segment]:
     count = int(np.ceil((ticks[-1] - ticks[0]) / LONGEST))
     edges = np.linspace(ticks[0], ticks[-1] + 1e-9, count + 1)
     found = []
-    for t0, t1 in zip(edges[:-1], edges[1:], strict=True):
+    for t0, t1 in pairwise(edges):
         part = recording if count == 1 else recording.between(float(t0), float(t1))
         problem = BagProblem.of(base.robot, part)
         x = base.states_at(bag, problem.timeline.ticks, base.layout)
@@ -135,7 +135,7 @@ def plausible_score(score: TrialScore) -> tuple[float, int]:
     return best
 
 
-def _best_at(level: float, segments: Sequence[Segment], trials: list) -> tuple[str, ...]:  # type: ignore[type-arg]
+def _best_at(level: float, segments: Sequence[Segment], trials: list[Trial]) -> tuple[str, ...]:
     """The five best labels with the process noise multiplied."""
     quieter = []
     for segment in segments:
@@ -161,6 +161,15 @@ def _placebos(s: TrialSignals) -> Array:
                     tau[:, row] = signal
                     found.append(s.accelerations(tau))
     return np.stack(found[:: max(len(found) // 18, 1)], axis=2)
+
+
+def _confusions(joint: JointScores) -> Array:
+    """Correlation of every pair of trials, zero with itself, shape (trials, trials)."""
+    count = len(joint.scores)
+    alike = np.zeros((count, count))
+    for i, j in combinations(range(count), 2):
+        alike[i, j] = alike[j, i] = joint.correlation(i, j)
+    return alike
 
 
 def _holm(p: Array) -> Array:

@@ -18,7 +18,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
 from jointscope.graphs.causal_filter import filter_states
-from jointscope.graphs.compare import HORIZON, predict_ahead, smooth
+from jointscope.graphs.compare import HORIZON, Ahead, predict_ahead, smooth
 from jointscope.graphs.prediction import Predictor
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -76,7 +76,7 @@ def validation_error(
     return ValidationError(_root_mean(long), _root_mean(short), by_span, by_channel)
 
 
-def _squares(problem: BagProblem, ahead, span: Span, horizon: float) -> Array:  # type: ignore[no-untyped-def]
+def _squares(problem: BagProblem, ahead: dict[str, Ahead], span: Span, horizon: float) -> Array:
     """Sum and count of squared errors per channel, shape (2, c)."""
     columns = []
     for name, sensor in problem.robot.sensors.items():

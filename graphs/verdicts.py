@@ -9,7 +9,7 @@ enters here.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,17 +54,13 @@ def judge(
         seconds: of all validation blocks.
     """
     here, sizes = scored.best.trial.here, scored.best.trial.sizes
-    common = {
-        **{"effect": here.effect.id, "owner": here.owner, "score": scored.plausible, "dof": scored.best.dof},
-        **{"p_value": scored.p_value, "look_alikes": scored.look_alikes, "numerics": here.effect.card.numerics},
-    }
     if trialled is None:
         parameters = {
             size.name: EffectEstimate(float(value), float(sigma), size.unit)
             for size, value, sigma in zip(sizes, scored.best.estimate, scored.best.sigma, strict=True)
         }
         verdict, reasons = _without_refit(scored)
-        return Candidate(**common, parameters=parameters, verdict=verdict, reasons=reasons)
+        return _candidate(scored, parameters, verdict, reasons)
     robot, refit = trialled.refit.robot, trialled.refit
     parameters = {
         p.name: EffectEstimate(robot.parameters[here.parameter(p.name)].value, refit.sigmas.get(p.name, np.nan), p.unit)
@@ -73,16 +69,31 @@ def judge(
     share = excess_share(base.error, trialled.validation.error, floor)
     bic = _bic(base.error, trialled.validation.error, len(parameters), seconds)
     verdict, reasons = _after_refit(scored, base, trialled, parameters, bic, sizes)
-    return Candidate(
-        **common,
-        parameters=parameters,
-        verdict=verdict,
-        reasons=reasons,
+    return replace(
+        _candidate(scored, parameters, verdict, reasons),
         share=share,
         refitted=True,
         validation_error=trialled.validation.error,
         heldout_error=trialled.heldout,
         bic=bic,
+    )
+
+
+def _candidate(
+    scored: ScoredCandidate, parameters: Mapping[str, EffectEstimate], verdict: str, reasons: tuple[str, ...]
+) -> Candidate:
+    here = scored.best.trial.here
+    return Candidate(
+        effect=here.effect.id,
+        owner=here.owner,
+        score=scored.plausible,
+        dof=scored.best.dof,
+        p_value=scored.p_value,
+        parameters=parameters,
+        verdict=verdict,
+        look_alikes=scored.look_alikes,
+        reasons=reasons,
+        numerics=here.effect.card.numerics,
     )
 
 
