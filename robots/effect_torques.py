@@ -8,7 +8,7 @@ depend on is found once, when the robot is built, and costs nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,32 +17,13 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
+from jointscope.robots.joint_springs import Springs
 from jointscope.robots.state_layout import StateLayout
 from jointscope.robots.torque_terms import TorqueTerms
 
 Array = NDArray[np.float64]
 STEP = 1e-30
 SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "stiffness", "memory")
-
-
-@dataclass(frozen=True)
-class Springs:
-    """Springs of all joints at m samples; zero for rigid joints.
-
-    Attributes:
-        stiffness, damping: shape (n,) [N m/rad], [N m s/rad].
-        deflection, rate: shape (m, n) [rad], [rad/s].
-        torque: shape (m, n) [N m].
-        stiffness_by, damping_by: index among the free parameters and derivative by it, for each joint; -1 for none.
-    """
-
-    stiffness: Array
-    damping: Array
-    deflection: Array
-    rate: Array
-    torque: Array
-    stiffness_by: Sequence[tuple[int, float]]
-    damping_by: Sequence[tuple[int, float]]
 
 
 class EffectTorques:
@@ -87,49 +68,62 @@ class EffectTorques:
     def _add_global(
         self, terms: TorqueTerms, here: EffectAt, x: Array, springs: Springs, values: Mapping[str, float]
     ) -> None:
-        layout, effect = self._layout, here.effect
+        effect = here.effect
         assert isinstance(effect, RobotTorque)
-        columns = {
-            "q_link": layout.joint_q,
-            "v_link": layout.joint_v,
-            "q_motor": layout.motor_q,
-            "v_motor": layout.motor_v,
-        }
-        signals = RobotSignals(
-            **{name: x[:, c] for name, c in columns.items()},
-            **{"stiffness": springs.stiffness, "damping": springs.damping, "joints": self._joints},
-            **{
-                "owner": self._joints.index(here.owner) if here.owner in self._joints else 0,
-                "sharpness": self._sharpness,
-            },
-        )
-        p = _own(here, values)
-        rows = (layout.joint_link, _motor_rows(layout))
-
-        def put(target: Array, torques: tuple[Any, Any]) -> None:
-            for side, torque in zip(rows, torques, strict=True):
-                np.add.at(target, (slice(None), side), torque)
-
-        put(terms.value, effect.law(signals, p))
+        signals, p = self._signals(here, x, springs), _own(here, values)
+        self._put(terms.value, effect.law(signals, p))
         if terms.by_state is None or terms.by_parameter is None:
             return
-        for name, c in columns.items():
-            for j in range(len(self._joints)):
+        for name, columns in self._columns.items():
+            for j, column in enumerate(columns):
                 moved = getattr(signals, name).astype(complex)
                 moved[:, j] += 1j * STEP
-                put(terms.by_state[:, :, c[j]], _imaginary(effect.law(replace(signals, **{name: moved}), p)))
+                change = _imaginary(effect.law(replace(signals, **{name: moved}), p))
+                self._put(terms.by_state[:, :, column], change)
         for name, by in (("stiffness", springs.stiffness_by), ("damping", springs.damping_by)):
             for j, (index, slope) in enumerate(by):
                 if index >= 0:
                     moved = getattr(signals, name).astype(complex)
                     moved[j] += 1j * STEP
                     change = _imaginary(effect.law(replace(signals, **{name: moved}), p))
-                    put(terms.by_parameter[:, :, index], (slope * change[0], slope * change[1]))
+                    self._put(terms.by_parameter[:, :, index], (slope * change[0], slope * change[1]))
         for name, value in p.items():
             full = here.parameter(name)
             if full in self._names:
                 change = _imaginary(effect.law(signals, {**p, name: value + 1j * STEP}))
-                put(terms.by_parameter[:, :, self._names.index(full)], change)
+                self._put(terms.by_parameter[:, :, self._names.index(full)], change)
+
+    @property
+    def _columns(self) -> dict[str, list[int]]:
+        """Columns of every signal of the joints."""
+        layout = self._layout
+        places = {
+            "q_link": layout.joint_q,
+            "v_link": layout.joint_v,
+            "q_motor": layout.motor_q,
+            "v_motor": layout.motor_v,
+        }
+        return {name: columns.tolist() for name, columns in places.items()}
+
+    def _signals(self, here: EffectAt, x: Array, springs: Springs) -> RobotSignals:
+        layout = self._layout
+        return RobotSignals(
+            q_link=x[:, layout.joint_q],
+            v_link=x[:, layout.joint_v],
+            q_motor=x[:, layout.motor_q],
+            v_motor=x[:, layout.motor_v],
+            stiffness=springs.stiffness,
+            damping=springs.damping,
+            joints=self._joints,
+            owner=self._joints.index(here.owner) if here.owner in self._joints else 0,
+            sharpness=self._sharpness,
+        )
+
+    def _put(self, target: Array, torques: tuple[Any, Any]) -> None:
+        """Adds torques of the links and of the motors, shape (m, n) each, to their equations, shape (m, r)."""
+        for rows, torque in zip((self._layout.joint_link, self._layout.motor_row), torques, strict=True):
+            for j, row in enumerate(rows.tolist()):
+                target[:, row] += torque[:, j]
 
 
 class _LocalLaw:
@@ -143,7 +137,7 @@ class _LocalLaw:
             **{"q_link": int(layout.joint_q[j]), "v_link": int(layout.joint_v[j])},
             **{"q_motor": int(layout.motor_q[j]), "v_motor": int(layout.motor_v[j])},
         }
-        link, motor = int(layout.joint_link[j]), int(_motor_rows(layout)[j])
+        link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         self._rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}[
             here.effect.side
         ]
@@ -159,10 +153,9 @@ class _LocalLaw:
     ) -> None:
         """Adds the torque, and the rate of the memory."""
         j = self.joint
-        signals = JointSignals(
-            **{name: x[:, column] for name, column in self._columns.items()},
-            **{"tau_spring": springs.torque[:, j], "stiffness": springs.stiffness[j], "sharpness": sharpness},
-        )
+        motion: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
+        motion |= {"tau_spring": springs.torque[:, j], "stiffness": springs.stiffness[j]}
+        signals = JointSignals(**motion, sharpness=sharpness)
         p = _own(self.here, values)
         self._add_law(terms, self.effect.law, self._rows, signals, p, springs)
         if self.effect.memory is not None:
@@ -221,14 +214,6 @@ def _own(here: EffectAt, values: Mapping[str, float]) -> dict[str, float]:
     """The effect's own parameters by the last part of their name."""
     start = here.parameter("")
     return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
-
-
-def _motor_rows(layout: StateLayout) -> NDArray[np.intp]:
-    """Equation in which each motor's torque stands: its own, or that of the link where the joint is rigid."""
-    own = [
-        layout.n_link + layout.motors.index(j) if j in layout.motors else layout.links.index(j) for j in layout.joints
-    ]
-    return np.array(own, dtype=np.intp)
 
 
 def _imaginary(torques: tuple[Any, Any]) -> tuple[Any, Any]:

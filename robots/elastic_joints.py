@@ -15,49 +15,21 @@ Frese (2016).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.effect_torques import EffectTorques, Springs
+from jointscope.robots.accelerations import Accelerations, RigidDerivatives
+from jointscope.robots.bearing_springs import BearingSprings
+from jointscope.robots.effect_torques import EffectTorques
+from jointscope.robots.joint_parameters import JointParameters
+from jointscope.robots.joint_springs import JointSprings, Springs
+from jointscope.robots.motor_torques import MotorTorques
 from jointscope.robots.robot import Robot
 from jointscope.robots.structured_tree import StructuredTree
 from jointscope.robots.torque_terms import TorqueTerms
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class RigidDerivatives:
-    """Derivatives of the rigid bodies' accelerations by q, v and tau (M^-1), shape (m, n_link, n_link) each."""
-
-    by_position: Array
-    by_velocity: Array
-    by_torque: Array
-
-    def between(self) -> RigidDerivatives:
-        """Means of neighbouring samples, shape (m - 1, ...): off by h^2/8 of their second time derivative."""
-        parts = (self.by_position, self.by_velocity, self.by_torque)
-        return RigidDerivatives(*(0.5 * (part[1:] + part[:-1]) for part in parts))
-
-
-@dataclass(frozen=True)
-class Accelerations:
-    """Accelerations of m samples and their derivatives.
-
-    Attributes:
-        value: link accelerations, motor accelerations, rates of memories, shape (m, r) [rad/s^2].
-        by_state: derivative by x, shape (m, r, d).
-        by_parameter: derivative by the free parameters, each in its own unit, shape (m, r, p).
-        rigid: the part of the derivatives that comes from the rigid bodies.
-    """
-
-    value: Array
-    by_state: Array
-    by_parameter: Array
-    rigid: RigidDerivatives
 
 
 class ElasticJoints:
@@ -74,20 +46,14 @@ class ElasticJoints:
     def __init__(self, robot: Robot):
         self.layout = layout = robot.layout
         self._tree = StructuredTree(robot)
-        self._volts = robot.command_volts
-        self._torque_command = robot.command.unit == "N m"
-        self._friction_on_link = robot.choices.friction_velocity == "link"
-        self._sharpness = robot.choices.friction_sharpness
-        self.names = tuple(name for name, parameter in robot.parameters.items() if not parameter.fixed)
-        self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        self._find_laws(robot)
-        self._elastic = np.flatnonzero([joint in layout.motors for joint in robot.joints])
-        self._own_motor = np.array([layout.n_link + layout.motors.index(robot.joints[i]) for i in self._elastic], int)
-        # equation in which each motor's torque stands
-        self._motor_row = layout.joint_link.copy()
-        self._motor_row[self._elastic] = self._own_motor
-        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, self._sharpness)
-        self._bearings = [h for h in robot.effects if isinstance(h.effect, Structure) and h.effect.form == "bearing"]
+        self._parameters = parameters = JointParameters(robot)
+        self.names = parameters.names
+        self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
+        self._bearings = BearingSprings(robot.effects, layout, self.names)
+        sharpness = robot.choices.friction_sharpness
+        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, sharpness)
+        self._elastic = list(layout.elastic_joints)
+        self._own_motor = layout.motor_row[self._elastic].tolist()
 
     @property
     def tree(self) -> StructuredTree:
@@ -107,7 +73,7 @@ class ElasticJoints:
         """
         values = self.named(parameters)
         terms = self._terms(x, values, derivatives=False)
-        terms.value[:, self._motor_row] += self._drive(u, values)
+        terms.value[:, self.layout.motor_row] += self._motors.of_command(u, values)
         return self._solve(x, terms, values)[0]
 
     def with_derivatives(
@@ -135,7 +101,8 @@ class ElasticJoints:
             first, last = (self._differentiate(part, parameters, None, u) for part in (x[:-1], x[1:]))
             return first, last, None
         free = self.without_command(x, parameters)
-        first, last = (self.with_command(_part(free, part), u, parameters) for part in (slice(None, -1), slice(1, None)))
+        ends = free.part(slice(None, -1)), free.part(slice(1, None))
+        first, last = (self.with_command(end, u, parameters) for end in ends)
         return first, last, free.rigid.between()
 
     def without_command(self, x: Array, parameters: Array, rigid: RigidDerivatives | None = None) -> Accelerations:
@@ -158,29 +125,36 @@ class ElasticJoints:
             parameters: values of the free parameters, shape (p,).
         """
         values = self.named(parameters)
-        b, rows, torque = self._law(values, "inertia"), self._motor_row, self._drive(u, values)
+        b, rows, torque = self.motor_inertia(values), self.layout.motor_row, self._motors.of_command(u, values)
         value, by_parameter = free.value.copy(), free.by_parameter.copy()
         value[:, rows] += torque / b
-        for i, row in enumerate(rows):
-            self._add(by_parameter, "inertia", i, row, -torque[:, i] / b[i] ** 2)
-            if not self._torque_command:
-                self._add(by_parameter, "k_pwm", i, row, self._volts * u[:, i] / b[i])
+        for i, row in enumerate(rows.tolist()):
+            self._parameters.add(by_parameter, "inertia", i, row, -torque[:, i] / b[i] ** 2)
+        self._motors.add_command_slopes(by_parameter, u, b)
         return Accelerations(value, free.by_state, by_parameter, free.rigid)
 
     def drive_gain(self, parameters: Array) -> Array:
         """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
-        return self._drive(np.ones((1, len(self._motor_row))), self.named(parameters))[0]
+        return self._motors.of_command(np.ones((1, len(self.layout.joints))), self.named(parameters))[0]
 
     def motor_inertia(self, values: Mapping[str, float]) -> Array:
         """Inertia of each motor, shape (n,) [kg m2]."""
-        return self._law(values, "inertia")
+        return self._parameters.of(values, "inertia")
+
+    def springs(self, x: Array, values: Mapping[str, float]) -> Springs:
+        """Springs of all joints at states of shape (m, d)."""
+        return self._springs.at(x, values)
+
+    def named(self, parameters: Array) -> dict[str, float]:
+        """All parameters by name: the free ones as given, shape (p,), the fixed ones of the robot."""
+        return self._parameters.named(parameters)
 
     def command_response(self, accelerations: Accelerations, parameters: Array) -> Array:
         """Derivative of the accelerations by the command of each joint, shape (m, r, n)."""
         layout, gain = self.layout, self.drive_gain(parameters)
         response = np.zeros((len(accelerations.value), layout.n_rates, len(gain)))
-        b = self._law(self.named(parameters), "inertia")
-        for i, row in enumerate(self._motor_row):
+        b = self.motor_inertia(self.named(parameters))
+        for i, row in enumerate(layout.motor_row.tolist()):
             if row >= layout.n_link:
                 response[:, row, i] = gain[i] / b[i]
             else:
@@ -190,20 +164,19 @@ class ElasticJoints:
     @property
     def _commands_move_links(self) -> bool:
         """Whether a command accelerates a link at once, as the motor of a rigid joint does."""
-        return len(self._elastic) < len(self._motor_row)
+        return len(self._elastic) < len(self.layout.joints)
 
     def _differentiate(
         self, x: Array, parameters: Array, rigid: RigidDerivatives | None, u: Array | None
     ) -> Accelerations:
         layout, values = self.layout, self.named(parameters)
         terms = self._terms(x, values, derivatives=True)
+        assert terms.by_state is not None and terms.by_parameter is not None
         if u is not None:
-            terms.value[:, self._motor_row] += self._drive(u, values)
-            for i, row in enumerate(self._motor_row):
-                if not self._torque_command and terms.by_parameter is not None:
-                    self._add(terms.by_parameter, "k_pwm", i, row, self._volts * u[:, i])
+            terms.value[:, layout.motor_row] += self._motors.of_command(u, values)
+            self._motors.add_command_slopes(terms.by_parameter, u)
         value, found = self._solve(x, terms, values, rigid, derivatives=True)
-        assert found is not None and terms.by_state is not None and terms.by_parameter is not None
+        assert found is not None
         by_state, by_parameter, n = terms.by_state, terms.by_parameter, layout.n_link
         a_link, M_inverse = value[:, :n], found.by_torque
         by_state[:, :n] = M_inverse @ by_state[:, :n]
@@ -215,11 +188,11 @@ class ElasticJoints:
             for name, slope in self._tree.by_parameter(q, v, tau, a_link, M_inverse, values).items():
                 if name in self.names:
                     by_parameter[:, :n, self.names.index(name)] += slope
-        b = self._law(values, "inertia")
+        b = self.motor_inertia(values)
         for i, row in zip(self._elastic, self._own_motor, strict=True):
             by_state[:, row] /= b[i]
             by_parameter[:, row] /= b[i]
-            self._add(by_parameter, "inertia", i, row, -value[:, row] / b[i])
+            self._parameters.add(by_parameter, "inertia", i, row, -value[:, row] / b[i])
         return Accelerations(value, by_state, by_parameter, found)
 
     def _solve(
@@ -240,122 +213,15 @@ class ElasticJoints:
             a_link = self._tree.acceleration(*motion, values)
         value = terms.value.copy()
         value[:, :n] = a_link
-        value[:, self._own_motor] /= self._law(values, "inertia")[self._elastic]
+        value[:, self._own_motor] /= self.motor_inertia(values)[self._elastic]
         return value, rigid
 
     def _terms(self, x: Array, values: Mapping[str, float], derivatives: bool) -> TorqueTerms:
         """All torques but the command's."""
         terms = TorqueTerms.zeros(len(x), self.layout, len(self.names), derivatives)
         springs = self.springs(x, values)
-        self._add_springs(terms, springs)
-        self._add_motors(terms, x, values)
-        self._add_bearings(terms, x, values)
+        self._springs.add(terms, springs)
+        self._motors.add(terms, x, values)
+        self._bearings.add(terms, x, values)
         self._effects.add(terms, x, springs, values)
         return terms
-
-    def springs(self, x: Array, values: Mapping[str, float]) -> Springs:
-        """Springs of all joints at states of shape (m, d)."""
-        layout = self.layout
-        K, D = self._law(values, "stiffness"), self._law(values, "damping")
-        deflection = x[:, layout.joint_q] - x[:, layout.motor_q]
-        rate = x[:, layout.joint_v] - x[:, layout.motor_v]
-        slopes = [1.0 if kind == "value" else -(k**2) for k, kind in zip(K, self._stiffness_kind, strict=True)]
-        stiffness_by = list(zip(self._index["stiffness"].tolist(), slopes, strict=True))
-        damping_by = [(int(index), 1.0) for index in self._index["damping"]]
-        return Springs(K, D, deflection, rate, K * deflection + D * rate, stiffness_by, damping_by)
-
-    def _add_springs(self, terms: TorqueTerms, springs: Springs) -> None:
-        layout, K, D = self.layout, springs.stiffness, springs.damping
-        for i, motor in zip(self._elastic, self._own_motor, strict=True):
-            for row, sign in ((int(layout.joint_link[i]), -1.0), (int(motor), 1.0)):
-                terms.value[:, row] += sign * springs.torque[:, i]
-                if terms.by_state is None or terms.by_parameter is None:
-                    continue
-                terms.by_state[:, row, layout.joint_q[i]] += sign * K[i]
-                terms.by_state[:, row, layout.motor_q[i]] -= sign * K[i]
-                terms.by_state[:, row, layout.joint_v[i]] += sign * D[i]
-                terms.by_state[:, row, layout.motor_v[i]] -= sign * D[i]
-                slope = springs.stiffness_by[i][1]
-                self._add(terms.by_parameter, "stiffness", i, row, sign * slope * springs.deflection[:, i])
-                self._add(terms.by_parameter, "damping", i, row, sign * springs.rate[:, i])
-
-    def _add_motors(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
-        """Friction, and the back-EMF where the command is a voltage."""
-        layout, mu = self.layout, self._law(values, "coulomb_torque")
-        friction_v = layout.joint_v if self._friction_on_link else layout.motor_v
-        smooth_sign = np.tanh(self._sharpness * x[:, friction_v])
-        k_mi = np.zeros(len(mu)) if self._torque_command else self._law(values, "k_mi")
-        v_motor = x[:, layout.motor_v]
-        torque = -mu * smooth_sign - k_mi * v_motor
-        for i, row in enumerate(self._motor_row):
-            terms.value[:, row] += torque[:, i]
-            if terms.by_state is None or terms.by_parameter is None:
-                continue
-            terms.by_state[:, row, friction_v[i]] -= mu[i] * self._sharpness * (1.0 - smooth_sign[:, i] ** 2)
-            terms.by_state[:, row, layout.motor_v[i]] -= k_mi[i]
-            self._add(terms.by_parameter, "coulomb_torque", i, row, -smooth_sign[:, i])
-            if not self._torque_command:
-                self._add(terms.by_parameter, "k_mi", i, row, -v_motor[:, i])
-
-    def _add_bearings(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
-        layout = self.layout
-        for here in self._bearings:
-            for axis in "xy":
-                link = layout.links.index(f"{here.owner}.bearing_{axis}")
-                names = here.parameter(f"compliance_{axis}"), here.parameter(f"damping_{axis}")
-                compliance, damping = values[names[0]], values[names[1]]
-                q, v = x[:, link], x[:, layout.n_link + link]
-                terms.value[:, link] -= q / compliance + damping * v
-                if terms.by_state is None or terms.by_parameter is None:
-                    continue
-                terms.by_state[:, link, link] -= 1.0 / compliance
-                terms.by_state[:, link, layout.n_link + link] -= damping
-                for name, slope in zip(names, (q / compliance**2, -v), strict=True):
-                    if name in self.names:
-                        terms.by_parameter[:, link, self.names.index(name)] += slope
-
-    def _drive(self, u: Array, values: Mapping[str, float]) -> Array:
-        """Torque of the command, shape (m, n) [N m]."""
-        return u if self._torque_command else self._law(values, "k_pwm") * self._volts * u
-
-    def _find_laws(self, robot: Robot) -> None:
-        """For every law and joint the parameter that holds its value."""
-        laws = ("coulomb_torque", "inertia") if self._torque_command else ("coulomb_torque", "inertia", "k_pwm", "k_mi")
-        self._sources = {law: [robot.drive_parameter(joint, law).name for joint in robot.joints] for law in laws}
-        self._sources |= {"stiffness": [], "damping": []}
-        self._stiffness_kind = []
-        for joint in robot.joints:
-            elasticity = f"{joint}.joint_elasticity."
-            added = f"{elasticity}compliance" in robot.parameters
-            base = f"{joint}.stiffness" in robot.parameters and joint in robot.layout.motors
-            self._stiffness_kind.append("compliance" if added else "value" if base else "none")
-            self._sources["stiffness"].append(
-                f"{elasticity}compliance" if added else f"{joint}.stiffness" if base else ""
-            )
-            self._sources["damping"].append(f"{elasticity}damping" if added else f"{joint}.damping" if base else "")
-        self._index = {
-            law: np.array([self.names.index(name) if name in self.names else -1 for name in names])
-            for law, names in self._sources.items()
-        }
-
-    def _law(self, values: Mapping[str, float], law: str) -> Array:
-        """A law's parameter for every joint, shape (n,)."""
-        found = np.array([values[name] if name else 0.0 for name in self._sources[law]])
-        if law == "stiffness":
-            return np.array(
-                [1.0 / v if k == "compliance" else v for v, k in zip(found, self._stiffness_kind, strict=True)]
-            )
-        return found
-
-    def named(self, parameters: Array) -> dict[str, float]:
-        """All parameters by name: the free ones as given, the fixed ones of the robot."""
-        return {**self._values, **dict(zip(self.names, parameters.tolist(), strict=True))}
-
-    def _add(self, by_parameter: Array, law: str, joint: int, row: int, column: Array) -> None:
-        index = self._index[law][joint]
-        if index >= 0:
-            by_parameter[:, row, index] += column
-
-
-def _part(a: Accelerations, samples: slice) -> Accelerations:
-    return Accelerations(a.value[samples], a.by_state[samples], a.by_parameter[samples], a.rigid)

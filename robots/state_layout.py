@@ -132,6 +132,17 @@ class StateLayout:
         ]
         return np.array(own, dtype=np.intp)
 
+    @cached_property
+    def motor_row(self) -> Columns:
+        """Equation in which each motor's torque stands, shape (n,); that of the link where the joint is rigid."""
+        own = [self.n_link + self.motors.index(j) if j in self.motors else self.links.index(j) for j in self.joints]
+        return np.array(own, dtype=np.intp)
+
+    @property
+    def elastic_joints(self) -> tuple[int, ...]:
+        """Indices of the joints with motor coordinates of their own."""
+        return tuple(i for i, joint in enumerate(self.joints) if joint in self.motors)
+
     @property
     def rate_names(self) -> tuple[str, ...]:
         """Names of the equations: "joint1.link", ..., "joint1.motor", ..., memories."""
