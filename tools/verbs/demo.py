@@ -22,7 +22,7 @@ def add_parser(subparsers: Any) -> None:
         "demo",
         help="the whole story on a simulated Doggy with a soft bearing, from bag to report",
         description="Simulates recordings of a robot with a soft bearing, lets `discover` find what the model lacks, "
-        "checks the result against the truth, and writes everything into a folder. Takes about two minutes.",
+        "checks the result against the truth, and writes everything into a folder. Takes several minutes.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -57,15 +57,15 @@ def waterfall_picture(result: Discovery) -> str:
 def _row(step: DiscoveryStep, k: int, at: object) -> str:
     assert callable(at)
     top = ROW * k + 7
+    floor = LEFT + float(at(step.floor))
     parts = [f'<text class="end name" x="{LEFT - 12}" y="{top + 18}">{escape(f"{k}: {step.label}")}</text>']
     for i, (error, colour) in enumerate(((step.train_error, TRAINING), (step.heldout_error, HELD_OUT))):
         if math.isfinite(error):
             y, length = top + 19 * i, float(at(error))
             parts.append(
                 f'<rect class="fill {colour}" x="{LEFT}" y="{y}" width="{length:.1f}" height="15"/>'
-                f'<text class="name" x="{LEFT + length + 7:.1f}" y="{y + 8}">{significant(error)} σ</text>'
+                f'<text class="name" x="{max(LEFT + length, floor) + 7:.1f}" y="{y + 8}">{significant(error)} σ</text>'
             )
-    floor = LEFT + float(at(step.floor))
     parts.append(f'<path class="mark ink" stroke-width="2.6" d="M{floor:.1f} {top - 4}v42"/>')
     return "".join(parts)
 
