@@ -99,7 +99,7 @@ class BagProblem:
         )
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
-        spreads = tuple(here.effect.memory.spread for here in robot.memories)
+        spreads = tuple(memory.spread for memory in robot.memories.values())
         initial = InitialStateFactor(robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads)
         placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
         for name in robot.sensors:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_at import EffectAt
-from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.command_effect import CommandEffect, CommandLaw
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class CommandPath:
         return u, slopes
 
 
-def law_of(here: EffectAt):  # type: ignore[no-untyped-def]
+def law_of(here: EffectAt) -> CommandLaw:
     """The law of a command effect."""
     assert isinstance(here.effect, CommandEffect)
     return here.effect.law

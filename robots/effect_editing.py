@@ -12,11 +12,13 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_catalogue import parse_effect
 from jointscope.robots.effect_kinds.effect import EffectParameter
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
+from jointscope.robots.noise_section import HINGE_DENSITY
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.robot_file import HINGE_DENSITY
 
 
 def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) -> Robot:
@@ -80,14 +82,10 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
     why_not = effect.may_act_on(robot, owner)
     if why_not:
         return why_not
-    if isinstance(effect, Structure):
-        if effect.form == "integration":
-            return "it is the error of the integrator; choose `model: integrator: simpson` instead"
-        if effect.form == "coriolis" and robot.choices.coriolis:
-            return "the model contains the Coriolis terms (`model: coriolis: true`)"
-        if effect.form == "elasticity" and owner in robot.layout.motors:
-            return f"{owner} is elastic already; list it under `model: rigid_joints` to make it rigid"
-    if getattr(effect, "side", "") == "spring" and owner not in robot.layout.motors:
+    if isinstance(effect, Structure) and effect.form == "integration":
+        return "it is the error of the integrator; choose `model: integrator: simpson` instead"
+    of_spring = isinstance(effect, RobotTorque) or (isinstance(effect, JointTorque) and effect.side == "spring")
+    if of_spring and owner in robot.joints and owner not in robot.layout.motors:
         return f"{owner} is rigid and has no spring; add joint_elasticity@{owner} first"
     return ""
 
@@ -117,7 +115,7 @@ def carried_noise(old: Robot, new: Robot) -> ProcessNoise:
         noise,
         link_velocity=np.array([link.get(name, HINGE_DENSITY) for name in after.links]),
         motor_velocity=np.array([motor.get(name, link.get(name, HINGE_DENSITY)) for name in after.motors]),
-        memory=np.array([memory.get(h.label, h.effect.memory.noise) for h in new.memories]),
+        memory=np.array([memory.get(label, m.noise) for label, m in new.memories.items()]),
     )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_kinds.effect import Effect
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.parameter import Parameter
@@ -136,19 +136,20 @@ class Robot:
         elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
         links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
         motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
-        memories = [here.label for here in self.effects if getattr(here.effect, "memory", None) is not None]
-        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(memories))
+        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(self.memories))
 
     @cached_property
     def kinematic_tree(self) -> RigidTree:
-        """The rigid bodies with the hinges of soft bearings."""
+        """The rigid bodies with the hinges of soft bearings, and with Coriolis terms where an effect scales them."""
         soft = tuple(here.owner for here in self.effects if _is(here.effect, "bearing"))
-        return self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
+        tree = self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
+        return tree.with_coriolis(True) if any(_is(here.effect, "coriolis") for here in self.effects) else tree
 
     @property
-    def memories(self) -> tuple[EffectAt, ...]:
-        """Effects with a state of their own, in the order of the layout."""
-        return tuple(h for h in self.effects if isinstance(h.effect, JointTorque) and h.effect.memory is not None)
+    def memories(self) -> dict[str, Memory]:
+        """States that effects bring along, by the label of the effect, in the order of the layout."""
+        laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
+        return {label: law.memory for label, law in laws if law.memory is not None}
 
     def has_effect(self, effect_id: str, owner: str) -> bool:
         """Whether an effect is part of the robot."""

@@ -19,12 +19,12 @@ from ruamel.yaml import YAML, YAMLError
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_catalogue import parse_effect
 from jointscope.robots.errors import EffectError, RobotError
+from jointscope.robots.noise_section import process_noise
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
 from jointscope.robots.robot_consistency import check_robot
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
-from jointscope.robots.units import UNITS, si_unit
+from jointscope.robots.sensor_sections import sensor, topic
 from jointscope.robots.yaml_section import Section, did_you_mean
 
 FORMAT = 1
@@ -32,9 +32,7 @@ READY_ROOT = Path(__file__).parent
 READY_PREFIX = "ready:"
 
 INTEGRATORS = ("euler", "midpoint", "simpson")
-GYRO_FORMS = ("full", "vertical", "relative")
 COMMAND_UNITS = ("duty", "V", "N m")
-HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
 CONSTANTS = ("motor.supply_voltage", "motor.gear")
 
 
@@ -68,8 +66,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
     gravity = top.array("gravity", (3,))
     tree = RigidTree(_urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis)
     constants = top.section("constants", {}).build(_constants)
-    command = top.section("command").build(lambda s: _topic(s, joints, COMMAND_UNITS))
-    sensors = {name: section.build(_sensor(name, joints)) for name, section in top.section("sensors").sections()}
+    command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS))
+    sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
     noise_section = top.section("noise")
     robot = Robot(
@@ -87,7 +85,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         document=document,
     )
     robot = with_effects(robot, top.texts("effects", ()))
-    robot = replace(robot, noise=noise_section.build(lambda s: _noise(s, robot)))
+    robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
     top.finish()
     check_robot(robot)
@@ -203,67 +201,6 @@ def _constants(section: Section) -> dict[str, float]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = ()) -> Topic:
-    unit = section.text("unit", choices=units or tuple(UNITS))
-    names = section.texts("names", joints)
-    if joints and len(names) != len(joints):
-        raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
-    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names)
-
-
-def _sensor(name: str, joints: tuple[str, ...]) -> Any:
-    def make(section: Section) -> Sensor:
-        kind = section.text("kind", choices=("motor_encoder", "gyro"))
-        return _motor_encoder(name, section, joints) if kind == "motor_encoder" else _gyro(name, section)
-
-    return make
-
-
-def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
-    topic = _topic(section, joints)
-    if si_unit(topic.unit) != "rad":
-        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {topic.unit!r}")
-    zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
-    return MotorEncoder(name, topic, section.number("sigma", positive=True), zero, joints)
-
-
-def _gyro(name: str, section: Section) -> Gyro:
-    topic = _topic(section)
-    if si_unit(topic.unit) != "rad/s":
-        raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {topic.unit!r}")
-    form = section.text("form", "full", GYRO_FORMS)
-    bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
-    rotation = section.section("R_imu_body")
-    R = _rotation(rotation.array("value", (3, 3)), rotation.place)
-    gyro = Gyro(
-        name=name,
-        source=topic,
-        body=section.text("body"),
-        form=form,
-        sigma=section.number("sigma", positive=True),
-        bias=bias.array("value", (3,)),
-        bias_prior_sigma=bias.number("prior_sigma", 0.1, positive=True),
-        R_imu_body=R,
-        R_prior=_rotation(rotation.array("prior", (3, 3), R), rotation.place),
-        R_prior_sigma=rotation.number("prior_sigma", 0.1, positive=True),
-        reference=section.text("reference") if form == "relative" else None,
-        bias_sigma=bias.array("sigma", (3,), None),
-        R_sigma=rotation.array("sigma", (3,), None),
-    )
-    bias.finish()
-    rotation.finish()
-    return gyro
-
-
-def _rotation(R: np.ndarray, place: str) -> np.ndarray:
-    """The rotation nearest to a printed matrix, which has few digits."""
-    U, _, Vt = np.linalg.svd(R)
-    nearest = U @ Vt
-    if np.linalg.det(nearest) < 0 or np.abs(nearest - R).max() > 0.02:
-        raise RobotError(f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1")
-    return nearest
-
-
 def _parameter(name: str) -> Any:
     def make(section: Section) -> Parameter:
         fixed = section.flag("fixed", False)
@@ -283,27 +220,3 @@ def _parameter(name: str) -> Any:
         )
 
     return make
-
-
-def _noise(section: Section, robot: Robot) -> ProcessNoise:
-    """Process noise in the order of the robot's layout; the file lists joints, and what effects bring by name."""
-    model = section.text("model", "integrated", ("integrated", "independent"))
-    layout, n = robot.layout, robot.n
-    own = section.section("effects", {})
-    hinges = {name: own.number(name, HINGE_DENSITY, positive=True) for name in layout.links if name not in layout.joints}
-    joints = {key: section.array(key, (n,)) for key in ("link_velocity", "motor_velocity")}
-    for key, values in joints.items():
-        if np.any(values <= 0):
-            raise RobotError(f"{section.place}.{key}: expected numbers above zero")
-    link = dict(zip(layout.joints, joints["link_velocity"], strict=True)) | hinges
-    motor = dict(zip(layout.joints, joints["motor_velocity"], strict=True))
-    memory = [own.number(h.label, h.effect.memory.noise, positive=True) for h in robot.memories]
-    own.finish()
-    return ProcessNoise(
-        estimate=section.flag("estimate", True),
-        model=model,
-        link_velocity=np.array([link[name] for name in layout.links]),
-        motor_velocity=np.array([motor[name] for name in layout.motors]),
-        position=section.number("position", positive=True) if model == "independent" else 0.0,
-        memory=np.array(memory),
-    )

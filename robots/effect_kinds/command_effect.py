@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_kinds.effect import Effect
 
 Array = NDArray[np.float64]
+CommandLaw = Callable[[Array, Array, Mapping[str, float]], tuple[Array, dict[str, Array]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,4 +26,4 @@ class CommandEffect(Effect):
             derivatives are those from above.
     """
 
-    law: Callable[[Array, Array, Mapping[str, float]], tuple[Array, dict[str, Array]]] = field(repr=False)
+    law: CommandLaw = field(repr=False)

@@ -36,7 +36,7 @@ class RobotSignals:
 
 @dataclass(frozen=True, kw_only=True)
 class RobotTorque(Effect):
-    """Torques on the link and the motor side of all joints.
+    """Torques on the link and the motor side of all joints; an owner that is a joint must have a spring.
 
     Attributes:
         law: (tau_link, tau_motor) added to the right-hand sides, shape (m, n) each [N m]; zero at the null values,

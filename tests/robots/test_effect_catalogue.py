@@ -10,6 +10,7 @@ import pytest
 
 from jointscope.robots.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.effect_check import check_effect
+from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.effect_kinds.groups import GROUPS, group_of
 from jointscope.robots.errors import EffectError
 from jointscope.robots.robot_file import load_robot
@@ -108,6 +109,16 @@ def test_structures_that_the_model_has_already_are_refused_with_the_reason():
     rigid = replace(DOGGY, choices=replace(DOGGY.choices, rigid_joints=("joint1",)))
     effect, owner = parse_effect("joint_elasticity@joint1", rigid)
     assert all(p.start > 0 for p in effect.parameters_of(rigid, owner))
+
+
+@pytest.mark.parametrize("effect", ["kinematic_coupling", "spring_cubic", "backlash"])
+def test_a_rigid_joint_gets_nothing_that_acts_on_its_spring(effect):
+    rigid = replace(DOGGY, choices=replace(DOGGY.choices, rigid_joints=("joint1",)))
+    with pytest.raises(EffectError) as err:
+        add_effect(rigid, f"{effect}@joint1")
+    assert str(err.value) == (
+        f"{effect}@joint1 cannot be added to doggy: joint1 is rigid and has no spring; add joint_elasticity@joint1 first"
+    )
 
 
 # names on the command line

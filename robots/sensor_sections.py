@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sections of a robot file that say where a signal is recorded and what a sensor is like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+from jointscope.robots.units import UNITS, si_unit
+from jointscope.robots.yaml_section import Section
+
+Array = NDArray[np.float64]
+
+GYRO_FORMS = ("full", "vertical", "relative")
+
+
+def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = ()) -> Topic:
+    """Where a signal is in a recording.
+
+    Args:
+        section: with topic, type, field, unit and names.
+        joints: names to expect where the signal has one channel per joint.
+        units: units to choose from; all known ones if empty.
+
+    Raises:
+        RobotError: another number of names than of joints.
+    """
+    unit = section.text("unit", choices=units or tuple(UNITS))
+    names = section.texts("names", joints)
+    if joints and len(names) != len(joints):
+        raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
+    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names)
+
+
+def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
+    """What makes a sensor of its section.
+
+    Args:
+        name: of the sensor.
+        joints: names of the robot's joints.
+    """
+
+    def make(section: Section) -> Sensor:
+        kind = section.text("kind", choices=("motor_encoder", "gyro"))
+        return _motor_encoder(name, section, joints) if kind == "motor_encoder" else _gyro(name, section)
+
+    return make
+
+
+def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
+    source = topic(section, joints)
+    if si_unit(source.unit) != "rad":
+        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
+    zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
+    return MotorEncoder(name, source, section.number("sigma", positive=True), zero, joints)
+
+
+def _gyro(name: str, section: Section) -> Gyro:
+    source = topic(section)
+    if si_unit(source.unit) != "rad/s":
+        raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {source.unit!r}")
+    form = section.text("form", "full", GYRO_FORMS)
+    bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
+    rotation = section.section("R_imu_body")
+    R = _rotation(rotation.array("value", (3, 3)), rotation.place)
+    gyro = Gyro(
+        name=name,
+        source=source,
+        body=section.text("body"),
+        form=form,
+        sigma=section.number("sigma", positive=True),
+        bias=bias.array("value", (3,)),
+        bias_prior_sigma=bias.number("prior_sigma", 0.1, positive=True),
+        R_imu_body=R,
+        R_prior=_rotation(rotation.array("prior", (3, 3), R), rotation.place),
+        R_prior_sigma=rotation.number("prior_sigma", 0.1, positive=True),
+        reference=section.text("reference") if form == "relative" else None,
+        bias_sigma=bias.array("sigma", (3,), None),
+        R_sigma=rotation.array("sigma", (3,), None),
+    )
+    bias.finish()
+    rotation.finish()
+    return gyro
+
+
+def _rotation(R: Array, place: str) -> Array:
+    """The rotation nearest to a printed matrix, which has few digits."""
+    U, _, Vt = np.linalg.svd(R)
+    nearest = U @ Vt
+    if np.linalg.det(nearest) < 0 or np.abs(nearest - R).max() > 0.02:
+        raise RobotError(f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1")
+    return nearest
