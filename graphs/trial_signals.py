@@ -70,7 +70,7 @@ class TrialSignals:
             values=values,
             ticks=ticks,
             x=x,
-            rate=np.gradient(x, ticks, axis=0),
+            rate=np.gradient(x, ticks, axis=0, edge_order=2),
             a_link=here.value[:, : layout.n_link],
             M_inverse=here.rigid.by_torque,
             u=u,

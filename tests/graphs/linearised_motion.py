@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots along a smooth made-up motion, linearised: what the tests of the regressors share.
+
+The motion is made of slow sines and friction changes its sign over some 50 mrad/s, so that the trapezoid over a step,
+which the regressors use, and Simpson's rule, which the model uses, agree to 3 % in every equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.normal_equations import states_of
+from jointscope.graphs.trial_columns import columns_of
+from jointscope.graphs.trial_system import Segment, rows_of
+from jointscope.graphs.trials import trials_of
+from jointscope.robots.effect_editing import add_effect, carried_noise
+from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.robot_file import load_robot
+
+READY = load_robot("doggy")
+DOGGY = replace(READY, choices=replace(READY.choices, friction_sharpness=20.0))
+SECONDS, START = 0.8, 1.0  # [s]
+
+
+def without_coriolis():
+    robot = replace(DOGGY, choices=replace(DOGGY.choices, coriolis=False))
+    return replace(robot, tree=robot.tree.with_coriolis(False))
+
+
+def with_a_rigid_joint():
+    robot = replace(DOGGY, choices=replace(DOGGY.choices, rigid_joints=("joint2",)))
+    return replace(robot, noise=carried_noise(DOGGY, robot))
+
+
+def with_a_soft_bearing():
+    """Two hinges before joint 1 shift every equation that comes after them."""
+    return add_effect(DOGGY, "bearing_flexibility@joint1")
+
+
+ROBOTS = {
+    "doggy": DOGGY,
+    "without Coriolis terms": without_coriolis(),
+    "joint 2 rigid": with_a_rigid_joint(),
+    "soft bearing": with_a_soft_bearing(),
+}
+
+
+def motion(robot, times, amplitude=0.4, posture=0.0):
+    """Smooth states: positions are sines, velocities their exact derivatives, springs deflect by 10 mrad."""
+    layout, rng = robot.layout, np.random.default_rng(7)
+    x = np.zeros((len(times), layout.size))
+
+    def sines(amplitude, frequency):
+        phase = rng.uniform(0.0, 2.0 * np.pi)
+        angle = 2.0 * np.pi * frequency * times + phase
+        return amplitude * np.sin(angle), amplitude * 2.0 * np.pi * frequency * np.cos(angle)
+
+    for i, name in enumerate(layout.links):
+        joint = name in robot.joints
+        x[:, i], x[:, layout.n_link + i] = sines(*((amplitude, 1.1 + 0.3 * i) if joint else (0.003, 2.0 + 0.5 * i)))
+        x[:, i] += posture * joint
+    for i, name in enumerate(layout.motors):
+        link, deflection = layout.links.index(name), sines(0.01, 3.1 - 0.4 * i)
+        for side, part in ((layout.q_motor, 0), (layout.v_motor, 1)):
+            x[:, side.start + i] = x[:, part * layout.n_link + link] + deflection[part]
+    return x
+
+
+@cache
+def base(name, **options):
+    """A linearised recording of one of the robots; one gyro is sampled between the ticks."""
+    robot, rng = ROBOTS[name], np.random.default_rng(3)
+    ticks = START + np.arange(round(SECONDS * 1e3)) * 1e-3
+    angle = 2.0 * np.pi * ticks[:, None] * np.array([1.3, 1.7, 2.3]) + np.array([0.3, 1.0, 2.0])
+    u = 0.5 * np.sin(angle)
+    streams = {"command": Stream("command", ticks, u, tuple(f"{j}.command" for j in robot.joints), "1")}
+    for name_of, sensor in robot.sensors.items():
+        stamps = ticks + (4e-4 if name_of == "imu2" else 0.0)
+        values = rng.normal(size=(len(ticks), len(sensor.channels)))
+        if sensor is robot.motor_encoder:
+            values = motion(robot, ticks, **options)[:, robot.layout.motor_q]
+        streams[name_of] = Stream(name_of, stamps, values, sensor.channels, "")
+    problem = BagProblem.of(robot, Recording("", "", 0, streams))
+    x = motion(robot, problem.timeline.ticks, **options)
+    return Segment.of(problem, x, Calibration.of(robot)), x
+
+
+def residuals(problem, x, calibration):
+    """Whitened residuals by equation or channel, over steps or samples; NaN where a sample is left out."""
+    dynamics = problem.dynamics.residual((x[:-1], x[1:]), calibration) / problem.dynamics.sigmas
+    found = dict(zip(problem.dynamics.rows, dynamics.T, strict=True))
+    for placed in problem.sensors:
+        factor, times = placed.factor, problem.recording.streams[placed.factor.name].times
+        values = factor.residual(states_of(factor, placed.ticks, x), calibration) / factor.sigmas
+        for row, value in zip(factor.rows, values.T, strict=True):
+            signal = found.setdefault(f"{factor.name} {row}", np.full(len(times), np.nan))
+            signal[np.searchsorted(times, placed.times)] = value
+    return found
+
+
+def regressors(segment, trial):
+    """Columns of a trial by equation or channel, in the order of `residuals`, one for each size."""
+    found = {}
+    rows = rows_of(segment, columns_of(trial, segment.signals))
+    touched = [(f, s) for (f, _, _), s in zip(segment.linearized, segment.stamps, strict=True) if f.states]
+    touched = [(f, s) for f, s in touched if f.name != "initial_state"]
+    touched = touched if len(rows) == len(touched) else [(f, s) for f, s in touched if f.name == "dynamics"]
+    for (factor, stamps), part in zip(touched, rows, strict=True):
+        for i, row in enumerate(factor.rows):
+            if factor.name == "dynamics":
+                signal, where = found.setdefault(row, np.zeros((len(segment.problem.dynamics), dof(trial)))), part.ticks
+            else:
+                times = segment.problem.recording.streams[factor.name].times
+                signal = found.setdefault(f"{factor.name} {row}", np.zeros((len(times), dof(trial))))
+                where = np.searchsorted(times, stamps)
+            signal[where] = part.by_trial[:, i]
+    return found
+
+
+def dof(trial):
+    return len(trial.sizes)
+
+
+def one_trial_each(name, kinds=None):
+    """One trial per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
+    found = {}
+    for trial in trials_of(ROBOTS[name]):
+        if kinds is None or trial.here.effect.id in kinds:
+            found.setdefault(trial.label, []).append(trial)
+    middle = {label: trials[-1 if "stribeck" in label else len(trials) // 2] for label, trials in found.items()}
+    return [(name, trial) for trial in middle.values()]
