@@ -15,29 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.bias_at_rest import BiasAtRestFactor
-from jointscope.factors.distorted import DistortedFactor
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.factor import Factor
-from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.initial_state import InitialStateFactor
-from jointscope.factors.interpolated import InterpolatedFactor
 from jointscope.factors.midpoint_dynamics import MidpointDynamics
-from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.priors import BiasPrior
-from jointscope.factors.relative_gyro import RelativeGyroFactor
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
-from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
-from jointscope.factors.vertical_gyro import VerticalGyroFactor
+from jointscope.graphs.sensor_placement import Placed, place_sensor
+from jointscope.graphs.sensor_placement import factor_on_state as factor_on_state
 from jointscope.graphs.timeline import Timeline
 from jointscope.robots.command_path import CommandPath
-from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.elastic_joints import ElasticJoints
-from jointscope.robots.lateness import Lateness, late_channels
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 
@@ -46,25 +38,9 @@ INTEGRATORS: dict[str, type[DynamicsFactor]] = {
     "midpoint": MidpointDynamics,
     "simpson": SimpsonDynamics,
 }
-ALIGNED = 1.0 / 3.0  # [sigma] a sample may be taken at a tick if the signal moves less than this in between
 DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A factor and where its samples sit.
-
-    Attributes:
-        factor: samples in the order of time.
-        ticks: first state that each sample touches, shape (m,); empty for factors without states.
-        times: time of each sample, shape (m,) [s].
-    """
-
-    factor: Factor
-    ticks: NDArray[np.intp]
-    times: Array
 
 
 @dataclass(frozen=True)
@@ -94,16 +70,14 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        steps = Steps(
-            timeline.h, timeline.u, robot.noise, robot.layout, weights, path if path.changes else None, index
-        )
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, path if path.changes else None, index)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory.spread for memory in robot.memories.values())
         initial = InitialStateFactor(robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads)
         placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
         for name in robot.sensors:
-            placed += _place_sensor(robot, recording, timeline, name)
+            placed += place_sensor(robot, recording, timeline, name)
         for gyro in robot.gyros:
             placed.append(_without_states(BiasPrior(gyro), 1))
             if robot.choices.bias_at_rest and rests:
@@ -169,104 +143,3 @@ def _drift(part: Stream) -> Array:
 
 def _without_states(factor: Factor, m: int) -> Placed:
     return Placed(factor, np.zeros(0, np.intp), np.zeros(m))
-
-
-def _place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: str) -> list[Placed]:
-    """The samples of one sensor: those at a tick, those between two, and channels whose stamps are late apart."""
-    placed = []
-    for channels, late in late_channels(robot, name):
-        if not late:
-            placed += _place_on_time(robot, recording, timeline, name, channels)
-            continue
-        stream = recording.streams[name]
-        lateness = Lateness.of(robot, late, stream.times)
-        taken = stream.times - lateness.anchor
-        inside = (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
-        step, fraction = timeline.locate(taken[inside])
-        inner = _some(_sensor_factor(robot, recording, name, stream, inside), channels, robot.sensors[name])
-        here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
-        factor = InterpolatedFactor(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
-        placed.append(Placed(factor, step, stream.times[inside]))
-    return placed
-
-
-def _place_on_time(
-    robot: Robot, recording: Recording, timeline: Timeline, name: str, channels: NDArray[np.intp]
-) -> list[Placed]:
-    """Channels with right stamps."""
-    sensor = robot.sensors[name]
-    stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
-    step, fraction = timeline.locate(stream.times)
-    h = timeline.h[step]
-    nearest = step + (fraction > 0.5)
-    distance = np.abs(stream.times - timeline.ticks[nearest])
-    aligned = distance * _rate_of_change(stream) < ALIGNED * sensor.sigma
-    placed = []
-    if np.any(aligned):
-        factor = _some(_sensor_factor(robot, recording, name, stream, aligned), channels, sensor)
-        placed.append(Placed(factor, nearest[aligned], stream.times[aligned]))
-    if not np.all(aligned):
-        between = ~aligned
-        inner = _some(_sensor_factor(robot, recording, name, stream, between), channels, sensor)
-        factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
-        placed.append(Placed(factor, step[between], stream.times[between]))
-    return placed
-
-
-def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:
-    """The factor for some of a sensor's channels; the paper's forms of a gyro are never divided."""
-    return factor if len(channels) == len(sensor.channels) else SomeChannels(factor, channels)
-
-
-def _values(robot: Robot) -> dict[str, float]:
-    """Present values of all parameters."""
-    return {name: parameter.value for name, parameter in robot.parameters.items()}
-
-
-def _rate_of_change(stream: Stream) -> Array:
-    """How fast the fastest channel changes around each sample, shape (m,) [unit/s]."""
-    if len(stream) < 3:
-        return np.full(len(stream), np.inf)
-    return np.abs(np.gradient(stream.values, stream.times, axis=0)).max(axis=1)
-
-
-def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
-    sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
-    if isinstance(sensor, MotorEncoder) or sensor.form == "full":
-        return factor_on_state(robot, name, values, times)
-    if sensor.form == "vertical":
-        return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)
-    reference = robot.sensors[str(sensor.reference)]
-    assert isinstance(reference, Gyro)
-    other = recording.streams[reference.name]
-    nearest = _nearest(other.times, times)
-    return RelativeGyroFactor(sensor, values, robot.tree, robot.layout, reference, other.values[nearest])
-
-
-def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Factor:
-    """A sensor with all its channels predicted from the state, whatever form its file chooses.
-
-    Args:
-        robot: the model.
-        name: name of the sensor.
-        values: measured, shape (m, c).
-        times: stamps since the start of the recording, shape (m,) [s].
-    """
-    sensor = robot.sensors[name]
-    inner: GyroFactor | MotorEncoderFactor
-    if isinstance(sensor, MotorEncoder):
-        inner = MotorEncoderFactor(sensor, values, robot.layout)
-        seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
-    else:
-        inner = GyroFactor(sensor, values, robot.kinematic_tree, robot.layout)
-        seats = {name: np.arange(len(sensor.channels))}
-    effects = [here for here in robot.effects if isinstance(here.effect, ReadingEffect) and here.owner in seats]
-    if not effects:
-        return inner
-    return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, _values(robot))
-
-
-def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:
-    """Index of the sample nearest to each wanted time."""
-    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    return np.where(wanted - times[right - 1] < times[right] - wanted, right - 1, right)

@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
-from jointscope.graphs.bag_problem import BagProblem, Placed
+from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import eliminate
 from jointscope.graphs.normal_equations import build, whitened
 from jointscope.graphs.prediction import Predictor
+from jointscope.graphs.sensor_placement import Placed
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
-from jointscope.graphs.bag_problem import factor_on_state
+from jointscope.graphs.sensor_placement import factor_on_state
 from jointscope.robots.command_path import CommandPath
 from jointscope.robots.effect_catalogue import catalogue
 from jointscope.robots.effect_editing import add_effect, carried_noise
@@ -46,7 +46,10 @@ def _factors():
     fraction, h = rng.uniform(size=M), rng.uniform(5e-4, 2e-3, size=M)
     weight = ROBOT.tree.mass_matrix(rng.normal(size=(M, 3)))
     u = rng.uniform(-1, 1, (M, 3))
-    steps = {"doggy": Steps(h, u, ROBOT.noise, ROBOT.layout, weight), "doggy_paper": Steps(h, u, PAPER.noise, PAPER.layout)}
+    steps = {
+        "doggy": Steps(h, u, ROBOT.noise, ROBOT.layout, weight),
+        "doggy_paper": Steps(h, u, PAPER.noise, PAPER.layout),
+    }
     encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)), layout)
     gyro = GyroFactor(imu2, rates, tree, layout)
     yield "encoder", encoder
@@ -115,7 +118,9 @@ def _point(factor, robot):
     layout = robot.layout
     x0 = rng.normal(size=(len(factor), layout.size)) * 0.5
     x0[:, layout.v_link] *= 0.8
-    x0[:, layout.q_motor] = x0[:, layout.joint_q[: layout.n_motor]] + 0.02 * rng.normal(size=(len(factor), layout.n_motor))
+    x0[:, layout.q_motor] = x0[:, layout.joint_q[: layout.n_motor]] + 0.02 * rng.normal(
+        size=(len(factor), layout.n_motor)
+    )
     x0[:, layout.v_motor] *= 0.008
     x1 = x0 + rng.normal(size=x0.shape) * 1e-3
     calibration = Calibration.of(robot)
