@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turns a solved problem into a CalibrationResult: residual series, parameter table, robot, findings."""
+"""Turns a solved problem into a CalibrationResult: fits, parameter table, robot, findings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Solution
 from jointscope.graphs.calibration_result import (
@@ -20,14 +19,13 @@ from jointscope.graphs.calibration_result import (
     ChannelFit,
     IterationRecord,
     ParameterEstimate,
-    ResidualSeries,
 )
 from jointscope.graphs.findings import findings
 from jointscope.graphs.identifiability import weak_directions
 from jointscope.graphs.noise_estimation import NoiseEvidence
-from jointscope.graphs.normal_equations import linearize_all
-from jointscope.graphs.posterior import ResidualPart, StatePosterior, posteriors, residual_parts
-from jointscope.graphs.robust_sigma import BlockScores, inflation
+from jointscope.graphs.posterior import StatePosterior, posteriors
+from jointscope.graphs.residual_collection import BagResiduals, collect, series_of
+from jointscope.graphs.robust_sigma import inflation
 from jointscope.robots.recording import Notice
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import AXES, Gyro, MotorEncoder, Sensor
@@ -36,21 +34,6 @@ Array = NDArray[np.float64]
 
 HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
 NEAR_ZERO = 0.5  # relative sigma from which a small positive value is called compatible with zero
-
-
-@dataclass
-class BagResiduals:
-    """Sums and series of one recording's residuals.
-
-    Attributes:
-        series: by sensor: residuals [unit], their expected deviation, and sums for chi2 of every chunk.
-        process: velocity defects [rad/s] and their expected deviation of every chunk.
-        scores: gradient of the shared values in blocks of time.
-    """
-
-    series: dict[str, list[tuple[Array, Array, Array]]]
-    process: list[tuple[Array, Array]]
-    scores: BlockScores
 
 
 @dataclass(frozen=True)
@@ -79,7 +62,7 @@ class Solved:
         found, covariance = posteriors(problems, solution, hold)
         evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
         residuals = [
-            _collect(problem, solution, i, posterior, evidence)
+            collect(problem, solution, i, posterior, evidence)
             for i, (problem, posterior) in enumerate(zip(problems, found, strict=True))
         ]
         return Solved(problems, solution, found, covariance, residuals, evidence)
@@ -133,44 +116,6 @@ def summarize(
     return replace(result, findings=findings(result, notices))
 
 
-def _collect(
-    problem: BagProblem, solution: Solution, i: int, posterior: StatePosterior, evidence: NoiseEvidence
-) -> BagResiduals:
-    """One pass over all residuals of a recording."""
-    ticks = problem.timeline.ticks
-    scores = BlockScores(float(ticks[0]), float(ticks[-1]), solution.shared.indices(i), solution.shared.size)
-    collected = BagResiduals({name: [] for name in problem.robot.sensors}, [], scores)
-    x, calibration = solution.estimate.states[i], solution.estimate.calibrations[i]
-    for part in residual_parts(linearize_all(problem, x, calibration), calibration, posterior):
-        evidence.add(part)
-        if part.factor.states:
-            scores.add(ticks[part.ticks], part)
-        sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
-        expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
-        if isinstance(part.factor, DynamicsFactor):
-            rates = problem.robot.layout.n_rates
-            collected.process.append(((part.residual * sigmas)[:, :rates], expected[:, :rates]))
-        elif part.factor.name in collected.series:
-            collected.series[part.factor.name].append(_Samples.of(part, part.residual * sigmas, expected))
-    return collected
-
-
-@dataclass(frozen=True)
-class _Samples:
-    """Some samples of a sensor: residuals, their expected sigma, and sums for chi2, one column per row of the factor."""
-
-    rows: tuple[str, ...]
-    residual: Array
-    expected: Array
-    squares: Array
-    freedom: Array
-
-    @staticmethod
-    def of(part: ResidualPart, residual: Array, expected: Array) -> _Samples:
-        squares, freedom = np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)
-        return _Samples(part.factor.rows, residual, expected, squares, freedom)
-
-
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
     problem, solution = solved.problems[i], solved.solution
     widening = factor[solution.shared.indices(i)]
@@ -179,7 +124,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
     residuals = {}
     for name, sensor in problem.robot.sensors.items():
         if collector.series[name]:
-            residuals[name] = _series(problem, sensor, collector.series[name])
+            residuals[name] = series_of(problem, sensor, collector.series[name])
     process = np.concatenate([r for r, _ in collector.process])
     process_sigma = np.concatenate([s for _, s in collector.process])
     u = problem.timeline.u
@@ -193,35 +138,6 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,
-    )
-
-
-def _series(problem: BagProblem, sensor: Sensor, parts: list[_Samples]) -> ResidualSeries:
-    """Residuals of one sensor in the order of time."""
-    rows = parts[0].rows
-    channels = sensor.channels if set(rows) <= set(sensor.channels) else rows
-    stream = problem.recording.streams[sensor.name]
-    times = np.concatenate([p.times for p in problem.sensors if p.factor.name == sensor.name])
-    table = np.full((3, len(stream), len(channels)), np.nan)
-    sums, start = np.zeros((2, len(channels))), 0
-    for part in parts:
-        index = np.searchsorted(stream.times, times[start : start + len(part.residual)])
-        columns = [channels.index(row) for row in part.rows]
-        table[0][np.ix_(index, columns)], table[1][np.ix_(index, columns)] = part.residual, part.expected
-        sums[0, columns] += part.squares
-        sums[1, columns] += part.freedom
-        start += len(part.residual)
-    table[2] = stream.values if len(channels) == stream.values.shape[1] else 0.0
-    seen = np.all(np.isfinite(table), axis=(0, 2))
-    residual, expected, measured = table[:, seen]
-    return ResidualSeries(
-        channels=channels,
-        unit=sensor.unit,
-        times=stream.times[seen],
-        measured=measured,
-        predicted=measured + residual,
-        sigma=expected,
-        chi2=sums[0] / sums[1],
     )
 
 
