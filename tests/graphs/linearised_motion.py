@@ -72,10 +72,10 @@ def motion(robot, times, amplitude=0.4, posture=0.0):
 
 
 @cache
-def base(name, **options):
+def base(name, seconds=SECONDS, **options):
     """A linearised recording of one of the robots; one gyro is sampled between the ticks."""
     robot, rng = ROBOTS[name], np.random.default_rng(3)
-    ticks = START + np.arange(round(SECONDS * 1e3)) * 1e-3
+    ticks = START + np.arange(round(seconds * 1e3)) * 1e-3
     angle = 2.0 * np.pi * ticks[:, None] * np.array([1.3, 1.7, 2.3]) + np.array([0.3, 1.0, 2.0])
     u = 0.5 * np.sin(angle)
     streams = {"command": Stream("command", ticks, u, tuple(f"{j}.command" for j in robot.joints), "1")}
