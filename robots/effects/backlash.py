@@ -30,8 +30,8 @@ EFFECT = JointTorque(
     example={"half_gap": 0.01},
     card=Card(
         title="play of the transmission",
-        law="tau_c = K dz(q_link - q_motor, g) + D (v_link - v_motor), dz(x, g) = x - g above g, 0 within, x + g below "
-        "-g; g = half_gap",
+        law="tau_c = K dz(q_link - q_motor, g) + D (v_link - v_motor) beyond the gap, 0 within it; dz(x, g) = x - g "
+        "above g, x + g below -g; g = half_gap",
         explanation="Teeth do not fill each other's gaps: after a reversal the motor turns through the gap before the "
         "link feels it.",
         source="Nordin, Gutman (2002), Controlling mechanical systems with backlash - a survey, Automatica 38(10); "

@@ -85,10 +85,13 @@ def test_friction_takes_energy(effect):
     assert np.all(effect.law(s, example(effect)) * speed <= 0.0)
 
 
-def test_backlash_leaves_the_gap_free_and_the_stiffness_beyond_it():
-    s = replace(motion(), q_motor=np.zeros(4), q_link=np.array([-0.05, -0.004, 0.004, 0.05]))
-    total = s.stiffness * s.q_link + catalogue()["backlash"].law(s, {"half_gap": 0.01})
-    np.testing.assert_allclose(total, 150.0 * np.array([-0.04, 0.0, 0.0, 0.04]), atol=1e-6)
+def test_backlash_leaves_the_gap_free_and_spring_and_damper_beyond_it():
+    q, rate = np.array([-0.05, -0.004, 0.004, 0.05]), np.array([0.3, -0.4, 0.5, -0.6])
+    base = 150.0 * q + 2.0 * rate
+    s = JointSignals(q_link=q, v_link=rate, q_motor=np.zeros(4), v_motor=np.zeros(4), tau_spring=base, stiffness=150.0)
+    total = base + catalogue()["backlash"].law(s, {"half_gap": 0.01})
+    beyond = 150.0 * np.array([-0.04, 0.0, 0.0, 0.04]) + 2.0 * np.array([0.3, 0.0, 0.0, -0.6])
+    np.testing.assert_allclose(total, beyond, atol=1e-6)
 
 
 def test_hysteresis_takes_another_way_back():

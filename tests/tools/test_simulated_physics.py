@@ -61,9 +61,9 @@ LAWS = {
     "cogging": (None, lambda q, v, p, w: 0.48 * np.cos(42.092 * p[1]) + 0.64 * np.sin(42.092 * p[1])),
     "torque_offset": (None, lambda q, v, p, w: 1.0),
 }
-SPRING_LAWS = {  # torque that joins the spring's: minus on the link, plus on the rotor
-    "spring_cubic": lambda d: 20000.0 * d**3,
-    "backlash": lambda d: -K[1] * np.clip(d, -0.012, 0.012),
+SPRING_LAWS = {  # torque that joins the spring's: minus on the link, plus on the rotor; of deflection and its rate
+    "spring_cubic": lambda d, rate: 20000.0 * d**3,
+    "backlash": lambda d, rate: -K[1] * np.clip(d, -0.012, 0.012) - D[1] * rate * (abs(d) < 0.012),
 }
 
 
@@ -81,7 +81,7 @@ def test_torques_are_those_of_the_catalogue(effect_id, seed):
     if effect_id in LAWS:
         on_link, on_rotor = (law(*state) if law else 0.0 for law in LAWS[effect_id])
     else:
-        spring = SPRING_LAWS[effect_id](state[0, 1] - state[2, 1])
+        spring = SPRING_LAWS[effect_id](state[0, 1] - state[2, 1], state[1, 1] - state[3, 1])
         on_link, on_rotor = -spring, spring
     link, rotor = added_torques(f"{effect_id}@joint2", state)
     np.testing.assert_allclose(link, [0.0, on_link, 0.0], atol=1e-9)
@@ -177,6 +177,31 @@ def test_a_link_crosses_the_free_play_at_constant_speed_and_turns_at_its_edge():
     inside = np.abs(q) < 0.0199
     np.testing.assert_allclose(np.abs(v[inside]), 0.1, rtol=1e-6)
     assert q.max() == pytest.approx(0.02 + 0.1 / np.sqrt(103.056 / 0.5142253), rel=1e-4)
+
+
+def test_the_damper_rests_within_the_free_play_and_takes_energy_beyond_it():
+    robot = true_robot(DOGGY, {"motor.inertia": 1e7})
+    engine = Engine(robot, [make_effect("backlash@joint3:half_gap=0.02", robot)], "smooth")
+    engine.place(np.zeros(3))
+    engine.data.qvel[engine.link[2]] = 0.1
+    run = coast(engine, 600)
+    q, v = run.q[:, engine.link[2]], run.v[:, engine.link[2]]
+    leaves, returns = np.flatnonzero(np.diff(np.abs(q) < 0.02)) + 1
+    np.testing.assert_allclose(v[:leaves], 0.1, rtol=1e-6)
+    assert -0.05 < v[-1] < -0.01
+    np.testing.assert_allclose(v[returns + 1 :], v[-1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_friction_of_a_loaded_gear_knows_the_damper_of_a_gear_with_play(order):
+    texts = ["backlash@joint2:half_gap=0", "load_dependent_friction@joint2"]
+    state, found = random_state(0), []
+    for chosen in ([texts[i] for i in order], texts[1:]):
+        engine = Engine(TRUTH, [make_effect(text, TRUTH) for text in chosen], "smooth")
+        x = np.zeros((2, 6))
+        x[:, engine.link], x[:, engine.motor] = state[:2], state[2:]
+        found.append(engine.accelerations(*x, np.zeros(3)))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
 
 
 def test_hysteresis_takes_from_each_swing_what_its_loop_encloses():

@@ -21,6 +21,7 @@ from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import Address, SimulatedEffect
 from jointscope.tools.simulator.hooks import acting, age
 from jointscope.tools.simulator.mujoco_module import load_mujoco
+from jointscope.tools.simulator.rotor_friction import RotorFriction
 from jointscope.tools.simulator.specification import build_specification, drive, motor_joint
 from jointscope.tools.simulator.trajectory import Trajectory
 
@@ -78,7 +79,9 @@ class Engine:
         self._encoder_age = age(self.effects, robot.motor_encoder)
         for effect in self.effects:
             effect.bind(self.model, self.data, self.address)
-        self._torques: list[Callable[[], None]] = [e.torque for e in self.effects if e.uses("torque")]
+        # friction of a loaded gear comes after what loads it
+        ordered = sorted(self.effects, key=lambda effect: isinstance(effect, RotorFriction))
+        self._torques: list[Callable[[], None]] = [e.torque for e in ordered if e.uses("torque")]
         if friction == "smooth":
             self._torques.append(self._smooth_friction(robot))
 

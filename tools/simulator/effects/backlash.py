@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Free play between motor and link: a range of lengths in which the engine's spring is slack."""
+"""Free play between motor and link: a range of lengths in which the engine's spring is slack and nothing is damped."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.specification import spring_tendon
+import numpy as np
+
+from jointscope.tools.simulator.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.specification import set_linear, spring_tendon
 
 
 class Backlash(SimulatedEffect):
-    """The spring pulls only where the deflection exceeds half_gap, and there by the rest; damping stays."""
+    """Spring and damper act only where the deflection exceeds half_gap; the spring there by the rest.
+
+    The slack spring is the engine's. The engine damps a tendon at all lengths, so that the damper of this one is taken
+    away and comes back as a torque wherever the teeth touch.
+    """
 
     id = "backlash"
     acts_on = ("joint",)
@@ -19,6 +25,26 @@ class Backlash(SimulatedEffect):
     never_negative = ("half_gap",)
 
     def edit(self, spec: Any) -> None:
-        """Widens the range in which the spring is slack."""
-        half_gap = self.parameters["half_gap"]
-        spec.tendon(spring_tendon(self.owner)).springlength = [-half_gap, half_gap]
+        """Widens the range in which the spring is slack, and takes the damper away."""
+        half_gap, tendon = self.parameters["half_gap"], spec.tendon(spring_tendon(self.owner))
+        tendon.springlength = [-half_gap, half_gap]
+        self._damping = float(np.ravel(tendon.damping)[0])
+        set_linear(tendon, "damping", 0.0)
+
+    def bind(self, model: Any, data: Any, address: Address) -> None:
+        """Remembers which coordinates make the length of the tendon, and how much each does."""
+        tendon = model.tendon(spring_tendon(self.owner)).id
+        wraps = range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
+        self._terms = [(int(model.jnt_dofadr[model.wrap_objid[i]]), float(model.wrap_prm[i])) for i in wraps]
+        self._qpos, self._qvel = data.qpos, data.qvel
+        self._receivers = data.qfrc_passive, data.qfrc_damper  # the second is what the gear's load is read from
+
+    def torque(self) -> None:
+        """Adds the damper where the teeth touch."""
+        length = sum(share * self._qpos[dof] for dof, share in self._terms)
+        if abs(length) < self.parameters["half_gap"]:
+            return
+        pull = self._damping * sum(share * self._qvel[dof] for dof, share in self._terms)
+        for dof, share in self._terms:
+            for receiver in self._receivers:
+                receiver[dof] -= share * pull
