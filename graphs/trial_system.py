@@ -23,9 +23,10 @@ from jointscope.factors.factor import Factor, Linearization
 from jointscope.factors.step import Steps
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
+from jointscope.graphs.columns.column import Column, SensorPart
 from jointscope.graphs.normal_equations import Linearized, accumulate, add_at, linearize_all, whitened
-from jointscope.graphs.trial_columns import Column, SensorPart
 from jointscope.graphs.trial_signals import TrialSignals
+from jointscope.robots.sensors import Gyro
 
 Array = NDArray[np.float64]
 
@@ -183,7 +184,7 @@ def _sensor_part(
     channels = np.array([sensor.channels.index(row) for row in factor.rows], dtype=np.intp)
     stream = segment.problem.recording.streams[factor.name]
     measured = stream.values[np.searchsorted(stream.times, stamps)][:, channels]
-    offset = segment.calibration.biases[factor.name] if factor.name in segment.calibration.biases else sensor.zero
+    offset = segment.calibration.biases[factor.name] if isinstance(sensor, Gyro) else sensor.zero
     motion = sum((J @ rate[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
     reading = linear.residual + measured - np.asarray(offset)[channels]
     return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion))
