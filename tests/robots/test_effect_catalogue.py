@@ -117,7 +117,8 @@ def test_a_rigid_joint_gets_nothing_that_acts_on_its_spring(effect):
     with pytest.raises(EffectError) as err:
         add_effect(rigid, f"{effect}@joint1")
     assert str(err.value) == (
-        f"{effect}@joint1 cannot be added to doggy: joint1 is rigid and has no spring; add joint_elasticity@joint1 first"
+        f"{effect}@joint1 cannot be added to doggy: joint1 is rigid and has no spring; add joint_elasticity@joint1 "
+        "first"
     )
 
 
