@@ -25,6 +25,7 @@ from jointscope.graphs.verdicts import SAME, Trialled, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.robots.screening import screen
 
 Array = NDArray[np.float64]
 
@@ -112,7 +113,14 @@ def diagnose(
         recordings=base.recordings,
         heldout=holdout,
     )
-    return replace(result, paragraphs=paragraphs_of(result))
+    return replace(result, paragraphs=(*_suspicions(base), *paragraphs_of(result)))
+
+
+def _suspicions(base: BaseModel) -> list[str]:
+    """Plain mistakes that the screening saw: they look like effects, so they come first."""
+    notices = [notice for recording in base.recordings for notice in screen(recording, base.robot)]
+    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
+    return [f"Look at this before any effect: {text}." for text in texts]
 
 
 def unexplained(comparison: ModelComparison) -> float:

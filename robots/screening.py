@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.encoder_gyro_scale import check_scales
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.gyro_plausibility import check_gyros
 from jointscope.robots.joint_motion import JointMotion, joint_motion
@@ -55,7 +56,8 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
         _check_frozen(recording.streams[gyro.name])
     notices += _check_limits(motion, robot)
     notices += _check_motion(recording, robot, every_joint)
-    return notices + check_gyros(recording, robot, motion)
+    odd = check_gyros(recording, robot, motion)
+    return notices + odd + check_scales(recording, robot, suspected={notice.stream for notice in odd})
 
 
 def joints_without_motion(recording: Recording, robot: Robot) -> tuple[str, ...]:
