@@ -18,7 +18,6 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Progress, solve
 from jointscope.graphs.calibrate import approach, calibrate, check_recordings
 from jointscope.graphs.causal_filter import filter_states
-from jointscope.graphs.channel_floor import channel_floors
 from jointscope.graphs.comparison_result import (
     OPEN_LOOP,
     ChannelComparison,
@@ -29,6 +28,7 @@ from jointscope.graphs.comparison_result import (
 )
 from jointscope.graphs.initial_guess import initial_biases
 from jointscope.graphs.joint_states import JointStates
+from jointscope.graphs.noise_floor import channel_floors
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.solver_context import in_solver_context

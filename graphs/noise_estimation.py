@@ -12,7 +12,7 @@ extrapolated (Aitken) in the logarithm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,10 +38,10 @@ LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at
 
 @dataclass
 class NoiseEvidence:
-    """Sums over dynamics residuals.
+    """Sums over residuals of the dynamics or of a sensor.
 
     Attributes:
-        squares: whitened squared defects of velocities and memories, shape (r,).
+        squares: whitened squared defects of velocities and memories, or of the channels of a sensor, shape (r,).
         freedom: samples minus leverages, shape (r,).
     """
 
@@ -53,6 +53,11 @@ class NoiseEvidence:
         """No residuals yet, for a number of equations."""
         return NoiseEvidence(np.zeros(rates), np.zeros(rates))
 
+    @staticmethod
+    def of_rows(part: ResidualPart) -> NoiseEvidence:
+        """Of all rows of some residuals."""
+        return NoiseEvidence(np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0))
+
     def add(self, part: ResidualPart) -> None:
         """Takes in some residuals; those of other factors are ignored."""
         if isinstance(part.factor, DynamicsFactor):
@@ -60,25 +65,65 @@ class NoiseEvidence:
             self.squares += np.sum(part.residual[:, :half] ** 2, axis=0)
             self.freedom += np.sum(1.0 - part.leverage[:, :half], axis=0)
 
+    def __add__(self, other: NoiseEvidence) -> NoiseEvidence:
+        """Both together."""
+        return NoiseEvidence(self.squares + other.squares, self.freedom + other.freedom)
+
     @property
     def factors(self) -> Array:
         """Factor by which each density should change, shape (r,)."""
         return np.sqrt(self.squares / np.maximum(self.freedom, 1.0))
 
 
-def scaled(noise: ProcessNoise, factors: Array) -> ProcessNoise:
-    """Noise with each density multiplied, not below the smallest; densities of memories stay."""
-    link, motor, _ = np.split(factors, [len(noise.link_velocity), len(noise.link_velocity) + len(noise.motor_velocity)])
+def scaled(noise: ProcessNoise, factors: Array, memories: int = 0) -> ProcessNoise:
+    """Noise with each density multiplied, not below the smallest.
+
+    Args:
+        noise: densities.
+        factors: by density, shape (r,).
+        memories: how many of the last memories are scaled, too; the others keep their density.
+    """
+    link, motor, memory = np.split(
+        factors, [len(noise.link_velocity), len(noise.link_velocity) + len(noise.motor_velocity)]
+    )
+    kept = len(noise.memory) - memories
+    free = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_DENSITY)
     return replace(
         noise,
         link_velocity=np.maximum(noise.link_velocity * link, SMALLEST_DENSITY),
         motor_velocity=np.maximum(noise.motor_velocity * motor, SMALLEST_DENSITY),
+        memory=np.concatenate([noise.memory[:kept], free]),
     )
 
 
 def densities(noise: ProcessNoise) -> Array:
     """All densities, link before motor before memories, shape (r,)."""
     return np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
+
+
+@dataclass
+class FixedPoint:
+    """Updates of all densities, each extrapolated from the last two.
+
+    Attributes:
+        memories: how many of the last memories are estimated, too.
+        before: logarithms of the densities at the last update, and the change that it asked for.
+    """
+
+    memories: int = 0
+    before: tuple[Array, Array] | None = None
+
+    def update(self, noise: ProcessNoise, factors: Array) -> ProcessNoise:
+        """Noise one update further; factors as the evidence at this noise asks for, shape (r,)."""
+        now = np.log(densities(noise)), np.log(factors)
+        boost = np.ones_like(now[1]) if self.before is None else _aitken(self.before, now)
+        self.before = now
+        return scaled(noise, np.exp(np.clip(now[1] * boost, -LARGEST_UPDATE, LARGEST_UPDATE)), self.memories)
+
+
+def settled(before: ProcessNoise, now: ProcessNoise) -> bool:
+    """Whether no density changed by an amount that matters."""
+    return bool(np.all(np.abs(np.log(densities(now) / densities(before))) < CHANGE_TOLERANCE))
 
 
 def estimate_noise(
@@ -102,19 +147,13 @@ def estimate_noise(
         The noise, and the estimate that belongs to it.
     """
     noise = problems[0].dynamics.steps.noise
-    before: tuple[Array, Array] | None = None
+    iteration = FixedPoint()
     for cycle in range(cycles):
         if progress:
             progress("process noise", cycle / cycles)
         evidence, estimate = _cycle([p.with_noise(noise) for p in problems], estimate, hold)
-        log_now, log_change = np.log(densities(noise)), np.log(evidence.factors)
-        boost = np.ones_like(log_change) if before is None else _aitken(before, (log_now, log_change))
-        step = np.clip(log_change * boost, -LARGEST_UPDATE, LARGEST_UPDATE)
-        before = (log_now, log_change)
-        new = scaled(noise, np.exp(step))
-        settled = np.abs(np.log(densities(new) / densities(noise))) < CHANGE_TOLERANCE
-        noise = new
-        if np.all(settled):
+        before, noise = noise, iteration.update(noise, evidence.factors)
+        if settled(before, noise):
             break
     return noise, estimate
 
@@ -137,16 +176,27 @@ def _cycle(
     for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
         dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]
         dx = step.dx[i]
-        local = shared.step(step.dp, i)[DYNAMICS]
-        moved = [(factor, ticks, _after(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
+        local = {DYNAMICS: shared.step(step.dp, i)[DYNAMICS]}
+        moved = [(factor, ticks, after_step(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
         for part in residual_parts(moved, estimate.calibrations[i], posterior):
             evidence.add(part)
     return evidence, step.estimate
 
 
-def _after(linear: Linearization, ticks: NDArray[np.intp], dx: Array, dp: Array) -> Linearization:
-    """A linearization with the residual that it predicts after a step."""
-    residual = linear.residual + linear.by_block[DYNAMICS] @ dp
+def after_step(
+    linear: Linearization, ticks: NDArray[np.intp], dx: Array, dp: Mapping[str, Array] | None = None
+) -> Linearization:
+    """A linearization with the residual that it predicts after a step.
+
+    Args:
+        linear: of some samples.
+        ticks: first state of each sample, shape (m,).
+        dx: change of all states, shape (k, d).
+        dp: change of the shared values by block; those that are not there stay.
+    """
+    residual = linear.residual
+    for block, change in (dp or {}).items():
+        residual = residual + linear.by_block[block] @ change
     for i, J in enumerate(linear.by_state):
         residual = residual + np.einsum("kri,ki->kr", J, dx[ticks + i])
     return replace(linear, residual=residual)

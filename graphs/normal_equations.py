@@ -95,10 +95,14 @@ def accumulate(
     x: Array,
     calibration: Calibration,
     split: bool = False,
+    with_shared: bool = True,
 ) -> NormalEquations:
-    """Sums linearised factors; arguments as in `build`."""
+    """Sums linearised factors; arguments as in `build`.
+
+    Without shared values, which are known then, the linearizations must hold no derivatives by them.
+    """
     columns = layout(calibration)
-    p = max(c.stop for c in columns.values())
+    p = max(c.stop for c in columns.values()) if with_shared else 0
     system = NormalEquations.zeros(len(x), x.shape[1], p, split)
     for factor, ticks, linear in linearized:
         _accumulate(system, factor, ticks, linear, columns)

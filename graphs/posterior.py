@@ -61,7 +61,7 @@ class StatePosterior:
             neighbours[k] = across
             P[k] += across @ C[k]
         np.negative(neighbours, out=neighbours)
-        X = elimination.solve_transposed(elimination.W).reshape(len(P), d, -1)
+        X = elimination.solve_transposed(elimination.W).reshape(len(P), d, elimination.W.shape[1])
         return StatePosterior(P, neighbours, X, shared)
 
     @property
