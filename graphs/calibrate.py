@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, Solution, first_step, solve
+from jointscope.graphs.batch_solver import Estimate, Progress, Solution, first_step, solve, total_cost
 from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
@@ -203,10 +203,17 @@ def _whole_stage(
 def approach(
     problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration], hold: tuple[str, ...]
 ) -> Estimate:
-    """One step over all samples with noise that is loose enough for states straight from the measurements."""
+    """One step over all samples with noise that is loose enough for states straight from the measurements.
+
+    Where that one step leads away, as it may under a model that lacks much, several checked ones are taken.
+    """
     states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
     loose = scaled(noise, np.maximum(APPROACH * LOOSE / densities(noise), 1.0))
-    return first_step([p.with_noise(loose) for p in problems], Estimate(tuple(states), tuple(calibrations)), hold)
+    now, start = [p.with_noise(loose) for p in problems], Estimate(tuple(states), tuple(calibrations))
+    estimate = first_step(now, start, hold)
+    if total_cost(now, estimate) < total_cost(now, start):
+        return estimate
+    return solve(now, start, max_iterations=WINDOW_ITERATIONS, hold=hold).estimate
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

@@ -21,7 +21,7 @@ from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.validation import ValidationError, heldout_error, validation_error
-from jointscope.graphs.verdicts import SAME, Trialled, judge, worth_a_refit
+from jointscope.graphs.verdicts import SAME, Trialled, excess_share, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 
 LEADERS = 3  # candidates that are refitted
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
+SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
+NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
 @dataclass
@@ -81,9 +83,9 @@ def diagnose(
     comparison = compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
-    fit, spans = base.spans()
+    spans = base.spans()[1]
     before = validation_error(base, base.robot, base.calibrations, spans)
-    trialled = _refit_leaders(base, scored, fit, spans, holdout, leaders, report)
+    trialled = _refit_leaders(base, scored, before.error, holdout, leaders, report)
     clock.stage("refits")
     seconds = sum(span.t1 - span.t0 for span in spans)
     candidates = [judge(c, before, comparison.floor, trialled.get(c.label), seconds) for c in scored.candidates]
@@ -131,20 +133,27 @@ def unexplained(comparison: ModelComparison) -> float:
 def _refit_leaders(
     base: BaseModel,
     scored: ScoredCandidates,
-    fit: Sequence[Span],
-    spans: Sequence[Span],
+    error: float,
     holdout: Recording | None,
     leaders: int,
     report: Progress,
 ) -> dict[str, Trialled]:
-    """Refits of the best candidates; one whose fit runs away has no result."""
+    """Refits of the best candidates; one whose fit runs away has no result.
+
+    Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too.
+    """
     worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
-    found = {}
+    found, enough = dict[str, Trialled](), 0.0
     for i, candidate in enumerate(worth[:leaders]):
+        if candidate.plausible < enough:
+            break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * i / leaders)
-        trial = _trial(base, candidate, fit, spans, holdout)
-        if trial is not None:
-            found[candidate.label] = trial
+        trial = _trial(base, candidate, *base.spans(), holdout)
+        if trial is None:
+            continue
+        found[candidate.label] = trial
+        if excess_share(error, trial.validation.error, SENSOR_FLOOR) > NEARLY_ALL:
+            enough = max(enough, NEAR * candidate.plausible)
     return found
 
 

@@ -26,6 +26,8 @@ LONGEST = 30.0  # [s] of one segment: bounds the memory
 NOISE_LEVELS = (1.0, 0.3, 0.1)  # factors on the calibrated process noise
 ALIKE = 0.95  # correlation of regressors from which two effects cannot be told apart
 MOST_ALIKE = 3
+MOST_TOGETHER = 60  # candidates whose confusions and robust p-values are worth computing; the rest explain nothing
+MOST_AT_LEVELS = 25  # candidates that are scored at other levels of noise
 SHIFTS = (0.31, 0.57)  # of the recording by which placebo regressors are moved in time
 SIGNIFICANT = 0.01  # probability, over all candidates together, of a score this large by chance
 
@@ -37,7 +39,7 @@ class ScoredCandidate:
     Attributes:
         best: its score with all sizes.
         plausible: score of the sizes whose sign is possible.
-        p_value: block-robust, corrected for the number of candidates (Holm).
+        p_value: block-robust, corrected for the number of candidates (Holm); chi-square for those at the end.
         chance: p-value of the plausible score on the chi-square scale, corrected alike.
         look_alikes: labels of at most three candidates whose regressors correlate above 0.95.
     """
@@ -83,24 +85,29 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
         known = best.get(score.trial.label)
         if known is None or plausible_score(score)[0] > plausible_score(known)[0]:
             best[score.trial.label] = score
-    trials = [score.trial for score in best.values()]
+    ordered = sorted(best.values(), key=lambda score: -plausible_score(score)[0])
+    trials = [score.trial for score in ordered[:MOST_TOGETHER]]
     if not trials:
         return ScoredCandidates([], {}, 0.0)
     joint = test.together(trials)
-    p_values = _holm(joint.p_values)
-    chances = _holm(np.array([chi2.sf(*plausible_score(score)) for score in joint.scores]))
+    rest = ordered[MOST_TOGETHER:]
+    everyone = [*joint.scores, *rest]
+    chances = np.array([chi2.sf(*plausible_score(score)) for score in everyone])
+    p_values = _holm(np.concatenate([joint.p_values, chances[len(trials) :]]))
+    chances = _holm(chances)
     alike = np.array(
         [[joint.correlation(i, j) if i != j else 0.0 for j in range(len(trials))] for i in range(len(trials))]
     )
     found = []
-    for i, score in enumerate(joint.scores):
-        others = [trials[j].label for j in np.argsort(-alike[i]) if alike[i, j] > ALIKE][:MOST_ALIKE]
+    for i, score in enumerate(everyone):
+        order = np.argsort(-alike[i]) if i < len(trials) else []
+        others = [trials[j].label for j in order if alike[i, j] > ALIKE][:MOST_ALIKE]
         value = plausible_score(score)[0]
         found.append(ScoredCandidate(score, value, float(p_values[i]), float(chances[i]), tuple(others)))
     found.sort(key=lambda c: -c.plausible)
     levels = {1.0: tuple(c.label for c in found[:5])}
     for level in NOISE_LEVELS[1:]:
-        levels[level] = _best_at(level, segments, [c.best.trial for c in found])
+        levels[level] = _best_at(level, segments, [c.best.trial for c in found[:MOST_AT_LEVELS]])
     placebo = test.placebo([_placebos(segment.signals) for segment in segments])
     return ScoredCandidates(found, levels, float(np.max(placebo)))
 

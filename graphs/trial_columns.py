@@ -47,6 +47,8 @@ def columns_of(trial: Trial, s: TrialSignals) -> list[Column]:
     assert isinstance(effect, Structure)
     if effect.form == "bearing":
         return bearing_columns(trial, s)
+    if effect.form == "integration":
+        return [Column(better_integrator=True)]
     if effect.form == "coriolis":
         return coriolis_columns(s)
     return [Column(reading=elasticity_column(trial.here, s))] if effect.form == "elasticity" else []

@@ -20,6 +20,7 @@ from scipy.linalg import lapack
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Factor, Linearization
+from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
@@ -99,6 +100,9 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[TrialRows]:
             by_trial = np.zeros((*r.shape, len(columns)))
             if at_ticks:
                 by_trial[:, :, at_ticks] = _defects(factor.steps, stacked[0][ticks], stacked[0][ticks + 1])
+            for i, column in enumerate(columns):
+                if column.better_integrator:
+                    by_trial[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
             if in_steps:
                 by_trial[:, :, in_steps] = _defects(factor.steps, stacked[1][ticks], stacked[1][ticks])
         elif reading:
@@ -170,6 +174,15 @@ def _defects(steps: Steps, first: Array, last: Array) -> Array:
     positions = len(steps.layout.positions)
     d_q = -(h**2) / 12.0 * (first - last)[:, :positions]
     return steps.combine(-0.5 * h * (first + last), d_q)
+
+
+def _what_simpson_adds(
+    segment: Segment, factor: DynamicsFactor, ticks: NDArray[np.intp], linear: Linearization
+) -> Array:
+    """Defects by Simpson's rule minus those of the model's own, shape (s, rows)."""
+    simpson = SimpsonDynamics(factor.model, factor.steps, factor.joints)
+    x = segment.signals.x
+    return simpson.residual((x[ticks], x[ticks + 1]), segment.calibration) - linear.residual
 
 
 def _stacked(parts: list[Array | None]) -> Array:

@@ -17,6 +17,9 @@ from jointscope.robots.robot import Robot
 BEARING_FREQUENCIES = (4.0, 6.0, 9.0, 14.0, 22.0)  # [Hz] resonance of a body on its soft bearing
 BEARING_DAMPING_RATIOS = (0.15,)
 
+# how much of a better integrator's correction the data want: 0 none, 1 all of it
+WHOLE_DEFECT = EffectParameter("share", "1", start=1.0, prior_sigma=10.0, sign="+")
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -51,6 +54,9 @@ def trials_of(robot: Robot, scanned_orders: Mapping[str, Sequence[float]] | None
         for owner in effect.owners_of(robot):
             here = EffectAt(effect, owner)
             if robot.has_effect(effect.id, owner) or cannot_be_added(robot, here):
+                continue
+            if isinstance(effect, Structure) and effect.form == "integration":
+                found.append(Trial(here, (WHOLE_DEFECT,)))
                 continue
             parameters = effect.parameters_of(robot, owner)
             sizes = tuple(p for p in parameters if not p.is_shape)

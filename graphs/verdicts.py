@@ -145,10 +145,13 @@ def _after_refit(
     seen = np.isfinite(now.by_span) & np.isfinite(base.by_span)
     better = int(np.sum(now.by_span[seen] < base.by_span[seen]))
     reasons.append(f"it helps on {better} of {int(seen.sum())} validation blocks")
+    sizes = tuple(s for s in sizes if s.name in parameters)
     wrong = [s.name for s in sizes if s.sign == "+" and parameters[s.name].value < s.null]
     if wrong:
         return "absent", (*reasons, f"but {wrong[0]} comes out with the impossible sign")
-    unsure = all(abs(parameters[s.name].value - s.null) < SURE * parameters[s.name].sigma for s in sizes)
+    unsure = bool(sizes) and all(
+        abs(parameters[s.name].value - s.null) < SURE * parameters[s.name].sigma for s in sizes
+    )
     if unsure:
         return "possible", (*reasons, f"but no size is {SURE:g} sigma away from null")
     if better < MOST * seen.sum() or bic >= 0.0:

@@ -20,6 +20,8 @@ from jointscope.robots.noise_section import HINGE_DENSITY
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.robot import ProcessNoise, Robot
 
+BEST_INTEGRATOR = "simpson"
+
 
 def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) -> Robot:
     """A robot with one more effect, at its start values.
@@ -39,6 +41,8 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
     why_not = cannot_be_added(robot, here)
     if why_not:
         raise EffectError(f"{label} cannot be added to {robot.name}: {why_not}")
+    if isinstance(effect, Structure) and effect.form == "integration":
+        return _better_integrated(robot)
     parameters = dict(robot.parameters)
     document = copy.deepcopy(robot.document)
     document.setdefault("effects", CommentedSeq()).append(label)
@@ -48,6 +52,13 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
         document["parameters"][parameter.name] = _entry(parameter)
     new = replace(robot, parameters=parameters, effects=(*robot.effects, here), document=document)
     return replace(new, noise=carried_noise(robot, new))
+
+
+def _better_integrated(robot: Robot) -> Robot:
+    """The robot with the best integrator: what integration_error adds."""
+    document = copy.deepcopy(robot.document)
+    document.setdefault("model", CommentedMap())["integrator"] = BEST_INTEGRATOR
+    return replace(robot, choices=replace(robot.choices, integrator=BEST_INTEGRATOR), document=document)
 
 
 def remove_effect(robot: Robot, label: str) -> Robot:
@@ -82,8 +93,8 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
     why_not = effect.may_act_on(robot, owner)
     if why_not:
         return why_not
-    if isinstance(effect, Structure) and effect.form == "integration":
-        return "it is the error of the integrator; choose `model: integrator: simpson` instead"
+    if isinstance(effect, Structure) and effect.form == "integration" and robot.choices.integrator == BEST_INTEGRATOR:
+        return f"the model has the best integrator, {BEST_INTEGRATOR}, already"
     of_spring = isinstance(effect, RobotTorque) or (isinstance(effect, JointTorque) and effect.side == "spring")
     if of_spring and owner in robot.joints and owner not in robot.layout.motors:
         return f"{owner} is rigid and has no spring; add joint_elasticity@{owner} first"
