@@ -47,6 +47,7 @@ ROBOTS = {
     "without Coriolis terms": without_coriolis(),
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
+    "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 
 

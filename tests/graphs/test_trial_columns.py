@@ -31,7 +31,7 @@ CASES += one_trial_each("soft bearing", (*OTHERS, "spring_cubic", "payload", "lo
 
 def test_every_effect_has_a_case():
     tested = {trial.here.effect.id for _, trial in CASES} | set(QUASI_STATIC)
-    assert set(catalogue()) - tested == {"integration_error"}
+    assert set(catalogue()) - tested == {"integration_error"}, "that one has no parameter; its test is below"
 
 
 @pytest.mark.parametrize("name, trial", CASES, ids=[f"{trial.label} ({name})" for name, trial in CASES])
@@ -62,6 +62,17 @@ def test_a_regressor_is_the_derivative_of_the_residuals(name, trial):
             off = np.linalg.norm(derivative - column)
             assert off <= allowed, f"{size.name} in {row}: off by {off / max(np.linalg.norm(derivative), 1e-300):.3g}"
     assert any(seen), "no size changes any residual"
+
+
+def test_the_regressor_of_the_integration_error_is_what_the_better_rule_changes():
+    segment, x = base("Euler")
+    ((_, trial),) = one_trial_each("Euler", ("integration_error",))
+    columns, without = regressors(segment, trial), residuals(segment.problem, x, segment.calibration)
+    better = BagProblem.of(add_effect(segment.problem.robot, trial.label), segment.problem.recording)
+    changed = residuals(better, x, segment.calibration)
+    for row, before in without.items():
+        column = columns[row][:, 0] if row in columns else np.zeros(len(before))
+        np.testing.assert_allclose(column, changed[row] - before, rtol=1e-9, atol=1e-9, err_msg=row)
 
 
 def with_memory(problem, x, calibration):
