@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from jointscope.graphs.comparison_result import ModelComparison
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.diagnosis_words import paragraphs_of
 from jointscope.graphs.failure_analysis import analyse_failure
+from jointscope.graphs.missing_torque import MissingTorque, estimate_missing_torque
 from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
@@ -30,6 +31,7 @@ from jointscope.robots.screening import screen
 Array = NDArray[np.float64]
 
 LEADERS = 3  # candidates that are refitted
+LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
@@ -55,6 +57,7 @@ def diagnose(
     holdout: Recording | None = None,
     *,
     base: BaseModel | None = None,
+    comparison: ModelComparison | None = None,
     leaders: int = LEADERS,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -65,6 +68,7 @@ def diagnose(
         recordings: training recordings; they also give the validation blocks.
         holdout: scored once per refit and reported; it never chooses.
         base: the model calibrated with these recordings, if that was done.
+        comparison: of that model with the held-out recording, else with the first training recording, if it was made.
         leaders: number of candidates to refit.
         progress: called with a text and the share done, from 0 to 1.
 
@@ -80,7 +84,7 @@ def diagnose(
     scored = score_candidates(base)
     clock.stage("score")
     report("where the model fails", 0.45)
-    comparison = compare_model("base", base.robot, holdout or base.recordings[0])
+    comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
     spans = base.spans()[1]
@@ -91,25 +95,28 @@ def diagnose(
     candidates = [judge(c, before, comparison.floor, trialled.get(c.label), seconds) for c in scored.candidates]
     candidates = _ranked(candidates)
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
-    after = comparison
+    share = unexplained(comparison)
     if best is not None:
-        after = compare_model(best.label, trialled[best.label].refit.robot, holdout or base.recordings[0])
-    share = unexplained(after)
-    clock.stage("comparison")
+        after = best.heldout_error if holdout is not None else best.validation_error
+        share = unexplained_share(after, comparison.floor)
+    report("the missing torque", 0.95)
+    refits = {label: t.refit.robot for label, t in trialled.items()}
+    missing = _missing_torque(base, refits)
+    clock.stage("missing torque")
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
         adequate=best is None and share < ADEQUATE,
         unexplained_share=share,
         error=comparison.error,
-        floor=min(comparison.floor, after.floor),
+        floor=comparison.floor,
         validation_error=before.error,
         failure=failure,
-        missing=None,
+        missing=missing,
         noise_levels=scored.noise_levels,
         placebo_score=scored.placebo,
         paragraphs=(),
-        refits={label: t.refit.robot for label, t in trialled.items()},
+        refits=refits,
         comparison=comparison,
         wall_seconds=clock.seconds,
         recordings=base.recordings,
@@ -125,9 +132,29 @@ def _suspicions(base: BaseModel) -> list[str]:
     return [f"Look at this before any effect: {text}." for text in texts]
 
 
+def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
+    """Of the first training recording, at most its first half minute; None where its states cannot be estimated."""
+    recording, ticks = base.recordings[0], base.problem_ticks(0)
+    end = float(min(ticks[-1], ticks[0] + LONGEST))
+    part = recording if end == ticks[-1] else recording.between(float(ticks[0]), end)
+    kept = ticks <= end
+    try:
+        whole = bool(np.all(kept))
+        states = base.states[0] if whole else None
+        calibration = base.calibrations[0] if whole else None
+        return estimate_missing_torque(base.robot, part, states, calibration, explained_by=refits)
+    except JointscopeError:
+        return None
+
+
 def unexplained(comparison: ModelComparison) -> float:
+    """Share of a comparison's squared error that its floor does not explain."""
+    return unexplained_share(comparison.error, comparison.floor)
+
+
+def unexplained_share(error: float, floor: float) -> float:
     """(error^2 - floor^2) / error^2, at least 0."""
-    return float(max(1.0 - (comparison.floor / comparison.error) ** 2, 0.0)) if comparison.error > 0 else 0.0
+    return float(max(1.0 - (floor / error) ** 2, 0.0)) if error > 0 else 0.0
 
 
 def _refit_leaders(
@@ -191,7 +218,7 @@ def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
 
     def key(c: Candidate) -> tuple[float, ...]:
         if c.verdict == "missing":
-            return (0.0, float(len(c.parameters)), -c.score)
+            return (0.0, float(c.dof), -c.score)
         return (float(order[c.verdict]), -c.score, 0.0)
 
     return sorted(candidates, key=key)

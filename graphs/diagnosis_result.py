@@ -82,8 +82,8 @@ class Diagnosis:
         robot: the base model, calibrated with the training recordings.
         candidates: best first.
         adequate: whether no physical effect is missing and less than 5 % of the squared error is unexplained.
-        unexplained_share: (error^2 - floor^2) / error^2 of the base model, on the held-out recording if there is one,
-            else on validation blocks.
+        unexplained_share: (error^2 - floor^2) / error^2 of the best accepted model, on the held-out recording if there
+            is one, else on validation blocks; of the base model where nothing was accepted.
         error, floor: of the base model there.
         validation_error: of the base model on validation blocks.
         failure: where the base model fails.

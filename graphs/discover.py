@@ -93,7 +93,10 @@ class _Search:
         refused: set[str] = set()
         while True:
             share = added / self.max_steps
-            diagnosis = diagnose(base.robot, self.recordings, self.holdout, base=base, progress=self._part(share))
+            known = self.steps[-1].comparison
+            diagnosis = diagnose(
+                base.robot, self.recordings, self.holdout, base=base, comparison=known, progress=self._part(share)
+            )
             self._attach(diagnosis)
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
             if not chosen:

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 BATCH = 64  # columns at once: bounds the memory
 BLOCK = 0.5  # [s] of the robust variance
+DETERMINED = 0.5  # [prior sigma] a size known better than this is determined by the recordings
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,9 @@ class TrialScore:
 
     @property
     def dof(self) -> int:
-        """Number of sizes."""
-        return len(self.estimate)
+        """Number of sizes that the recordings determine; gauges are held by their prior alone."""
+        prior = np.array([size.prior_sigma for size in self.trial.sizes])
+        return max(int(np.sum(self.sigma < DETERMINED * prior)), 1)
 
 
 @dataclass(frozen=True)
@@ -230,7 +232,7 @@ def _robust_p(score: TrialScore, scores: Array, information: Array) -> float:
     pull = total @ score.estimate
     statistic = float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull)
     p = float(fisher.sf(statistic * (b - k) / (k * (b - 1.0)), k, b - k))
-    if k == 1 and score.trial.sizes[0].sign == "+":
+    if len(score.estimate) == 1 and score.trial.sizes[0].sign == "+":
         return 0.5 * p if score.estimate[0] > 0 else 1.0
     return p
 

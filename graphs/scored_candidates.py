@@ -29,6 +29,7 @@ MOST_ALIKE = 3
 MOST_TOGETHER = 60  # candidates whose confusions and robust p-values are worth computing; the rest explain nothing
 MOST_AT_LEVELS = 25  # candidates that are scored at other levels of noise
 SHIFTS = (0.31, 0.57)  # of the recording by which placebo regressors are moved in time
+INDEPENDENT = 0.1  # [s] stretches of this length count as samples where parameters are paid for
 SIGNIFICANT = 0.01  # probability, over all candidates together, of a score this large by chance
 
 
@@ -63,7 +64,7 @@ class ScoredCandidate:
 
 @dataclass(frozen=True)
 class ScoredCandidates:
-    """All candidates, best plausible score first.
+    """All candidates, best first: by plausible score less what their parameters cost (dof log samples).
 
     Attributes:
         candidates: sorted.
@@ -85,7 +86,8 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
         known = best.get(score.trial.label)
         if known is None or plausible_score(score)[0] > plausible_score(known)[0]:
             best[score.trial.label] = score
-    ordered = sorted(best.values(), key=lambda score: -plausible_score(score)[0])
+    samples = sum(float(np.ptp(segment.signals.ticks)) for segment in segments) / INDEPENDENT
+    ordered = sorted(best.values(), key=lambda score: -plausible_score(score)[0] + score.dof * np.log(samples))
     trials = [score.trial for score in ordered[:MOST_TOGETHER]]
     if not trials:
         return ScoredCandidates([], {}, 0.0)
@@ -104,7 +106,7 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
         others = [trials[j].label for j in order if alike[i, j] > ALIKE][:MOST_ALIKE]
         value = plausible_score(score)[0]
         found.append(ScoredCandidate(score, value, float(p_values[i]), float(chances[i]), tuple(others)))
-    found.sort(key=lambda c: -c.plausible)
+    found.sort(key=lambda c: -c.plausible + c.best.dof * np.log(samples))
     levels = {1.0: tuple(c.label for c in found[:5])}
     for level in NOISE_LEVELS[1:]:
         levels[level] = _best_at(level, segments, [c.best.trial for c in found[:MOST_AT_LEVELS]])
@@ -132,8 +134,8 @@ def plausible_score(score: TrialScore) -> tuple[float, int]:
     if all(score.estimate[i] > 0 for i in signed):
         return score.score, score.dof
     best = (0.0, 1)
-    everything = range(score.dof)
-    for count in range(score.dof - 1, 0, -1):
+    everything = range(len(score.estimate))
+    for count in range(len(score.estimate) - 1, 0, -1):
         for kept in map(list, combinations(everything, count)):
             S, s = score.S[np.ix_(kept, kept)], score.s[kept]
             estimate = -np.linalg.pinv(S, rcond=1e-12, hermitian=True) @ s
