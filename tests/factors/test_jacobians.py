@@ -155,7 +155,7 @@ def _steps(block, calibration, robot):
     if block == "dynamics":
         for i, name in enumerate(calibration.names):
             if robot.parameters[name].effect is not None and not calibration.positive[i]:
-                steps[i] = min(1e-6, 1e-3 * abs(calibration.values[i]))
+                steps[i] = min(1e-6, 1e-5 * abs(calibration.values[i]))
     return steps
 
 
