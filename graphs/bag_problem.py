@@ -9,6 +9,7 @@ initial  enc,  gyro                          ...          gyro: full, vertical o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,6 +55,7 @@ class BagProblem:
         dynamics: one factor with all steps.
         placed: sensors, initial state, priors that belong to this bag.
         rests: whether the recording starts at rest.
+        owner: number of the recording that this is a piece of; pieces share its biases. None for a whole recording.
     """
 
     robot: Robot
@@ -62,6 +64,7 @@ class BagProblem:
     dynamics: DynamicsFactor
     placed: tuple[Placed, ...]
     rests: bool
+    owner: int | None = None
 
     @staticmethod
     def of(robot: Robot, recording: Recording) -> BagProblem:
@@ -89,6 +92,11 @@ class BagProblem:
     def with_noise(self, noise: ProcessNoise) -> BagProblem:
         """The same problem with another process noise."""
         return replace(self, dynamics=self.dynamics.with_noise(noise))
+
+    @staticmethod
+    def owners(problems: Sequence[BagProblem]) -> tuple[int, ...]:
+        """Recording of each problem: all of them whole, or all of them pieces."""
+        return tuple(i if problem.owner is None else problem.owner for i, problem in enumerate(problems))
 
     @property
     def sensors(self) -> tuple[Placed, ...]:

@@ -114,7 +114,7 @@ def solve(
     Raises:
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
-    shared = SharedLayout.of(start.calibrations[0], len(problems))
+    shared = SharedLayout.of(start.calibrations[0], BagProblem.owners(problems))
     systems = _build(problems, start)
     solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
     if not np.isfinite(solution.cost):
@@ -190,7 +190,7 @@ def newton_step(
 
 def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
     """Where one hardly damped step leads; for starts from which every step is an improvement."""
-    shared = SharedLayout.of(estimate.calibrations[0], len(problems))
+    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
     here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, _build(problems, estimate))
     return newton_step(problems, here, hold, LAMBDA_START).estimate
 
@@ -271,7 +271,7 @@ def reduced_system(
 def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
     """Indices of the shared values that may change."""
     held = np.zeros(shared.size, dtype=bool)
-    for bag in range(shared.bags):
+    for bag in range(len(shared.owners)):
         for block in hold:
             held[shared.indices(bag)[shared.columns[block]]] = True
     return np.flatnonzero(~held)

@@ -22,7 +22,7 @@ from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.validation import ValidationError, heldout_error, validation_error
-from jointscope.graphs.verdicts import SAME, Trialled, excess_share, judge, worth_a_refit
+from jointscope.graphs.verdicts import SAME, SENSOR_FLOOR, Trialled, excess_share, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -33,7 +33,6 @@ Array = NDArray[np.float64]
 LEADERS = 3  # candidates that are refitted
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
-SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -89,24 +88,25 @@ def diagnose(
     clock.stage("comparison")
     spans = base.spans()[1]
     before = validation_error(base, base.robot, base.calibrations, spans)
-    trialled = _refit_leaders(base, scored, before.error, holdout, leaders, report)
+    trialled, failed = _refit_leaders(base, scored, before.error, holdout, leaders, report)
     clock.stage("refits")
     seconds = sum(span.t1 - span.t0 for span in spans)
-    candidates = [judge(c, before, comparison.floor, trialled.get(c.label), seconds) for c in scored.candidates]
-    candidates = _ranked(candidates)
+    candidates = _ranked(
+        [judge(c, before, trialled.get(c.label), seconds, c.label in failed) for c in scored.candidates]
+    )
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
     share = unexplained(comparison)
     if best is not None:
-        after = best.heldout_error if holdout is not None else best.validation_error
+        after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.floor)
     report("the missing torque", 0.95)
     refits = {label: t.refit.robot for label, t in trialled.items()}
-    missing = _missing_torque(base, refits)
+    missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
     clock.stage("missing torque")
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
-        adequate=best is None and share < ADEQUATE,
+        adequate=best is None and max(share, *_elsewhere(base, holdout)) < ADEQUATE,
         unexplained_share=share,
         error=comparison.error,
         floor=comparison.floor,
@@ -133,7 +133,7 @@ def _suspicions(base: BaseModel) -> list[str]:
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
-    """Of the first training recording, at most its first half minute; None where its states cannot be estimated."""
+    """Of the beginning of the first training recording; None where its states cannot be estimated."""
     recording, ticks = base.recordings[0], base.problem_ticks(0)
     end = float(min(ticks[-1], ticks[0] + LONGEST))
     part = recording if end == ticks[-1] else recording.between(float(ticks[0]), end)
@@ -145,6 +145,12 @@ def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorq
         return estimate_missing_torque(base.robot, part, states, calibration, explained_by=refits)
     except JointscopeError:
         return None
+
+
+def _elsewhere(base: BaseModel, holdout: Recording | None) -> list[float]:
+    """Unexplained shares of the further training recordings, where no recording was held out; at least one number."""
+    others = base.recordings[1:] if holdout is None else ()
+    return [0.0, *(unexplained(compare_model("base", base.robot, recording)) for recording in others)]
 
 
 def unexplained(comparison: ModelComparison) -> float:
@@ -164,24 +170,25 @@ def _refit_leaders(
     holdout: Recording | None,
     leaders: int,
     report: Progress,
-) -> dict[str, Trialled]:
-    """Refits of the best candidates; one whose fit runs away has no result.
+) -> tuple[dict[str, Trialled], set[str]]:
+    """Refits of the best candidates, and the labels of those whose fit ran away.
 
     Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too.
     """
     worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
-    found, enough = dict[str, Trialled](), 0.0
+    found, failed, enough = dict[str, Trialled](), set[str](), 0.0
     for i, candidate in enumerate(worth[:leaders]):
         if candidate.plausible < enough:
             break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * i / leaders)
         trial = _trial(base, candidate, *base.spans(), holdout)
         if trial is None:
+            failed.add(candidate.label)
             continue
         found[candidate.label] = trial
         if excess_share(error, trial.validation.error, SENSOR_FLOOR) > NEARLY_ALL:
             enough = max(enough, NEAR * candidate.plausible)
-    return found
+    return found, failed
 
 
 def _trial(
@@ -194,10 +201,19 @@ def _trial(
     try:
         found = refit(base, fit, candidate.best)
         errors: ValidationError = validation_error(base, found.robot, found.biases, spans)
-        heldout = heldout_error(found.robot, holdout) if holdout is not None else float("nan")
     except (JointscopeError, np.linalg.LinAlgError):
         return None
-    return Trialled(found, errors, heldout)
+    return Trialled(found, errors, _heldout(found.robot, holdout))
+
+
+def _heldout(robot: Robot, holdout: Recording | None) -> float:
+    """Only reported: a model that cannot follow the held-out recording has no figure there, and keeps its verdict."""
+    if holdout is None:
+        return float("nan")
+    try:
+        return heldout_error(robot, holdout)
+    except (JointscopeError, np.linalg.LinAlgError):
+        return float("nan")
 
 
 def _yielding(candidate: Candidate, smallest: float, missing: Sequence[Candidate]) -> Candidate:

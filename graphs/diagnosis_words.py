@@ -29,6 +29,13 @@ def _verdict(d: Diagnosis) -> str:
             f"The model lacks {title(missing[0])}: predictions 0.1 s ahead miss by {d.error:.3g} sigma where noise "
             f"and state uncertainty allow {d.floor:.3g}."
         )
+    numerics = [c for c in d.candidates if c.verdict == "missing" and c.numerics]
+    if numerics:
+        return (
+            f"Before any physics: {title(numerics[0])}. It spoils predictions 0.1 s ahead ({d.error:.3g} sigma) and "
+            "hides what else may be missing; take the better integrator (`model: integrator: simpson`) and diagnose "
+            "again."
+        )
     if d.adequate:
         return (
             f"The model is adequate: it predicts 0.1 s ahead to {d.error:.3g} sigma, noise and state uncertainty alone "
@@ -44,7 +51,7 @@ def _explains(c: Candidate, d: Diagnosis) -> str:
     values = ", ".join(f"{name} {p.value:.4g} +- {p.sigma:.2g} {p.unit}" for name, p in c.parameters.items())
     text = (
         f"{title(c)} explains {100 * c.share:.0f} % of the squared error above the floor on validation blocks "
-        f"({d.validation_error:.3g} to {c.validation_error:.3g} sigma): {values}."
+        f"({d.validation_error:.3g} to {c.validation_error:.3g} sigma){': ' if values else ''}{values}."
     )
     if c.heldout_error == c.heldout_error:
         text += f" On the held-out recording the error goes from {d.error:.3g} to {c.heldout_error:.3g} sigma."

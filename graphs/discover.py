@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from jointscope.graphs.base_model import BaseModel, with_full_gyros
 from jointscope.graphs.batch_solver import Progress
 from jointscope.graphs.compare import compare_model
@@ -21,6 +19,7 @@ from jointscope.graphs.discovery_result import Discovery, DiscoveryStep, SavedSt
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.validation import validation_error
 from jointscope.graphs.verdicts import MATTERS, SURE
+from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_editing import remove_effect
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
@@ -107,6 +106,7 @@ class _Search:
             if grown is None:
                 return "what helped on validation blocks did not hold when calibrated with all data", diagnosis
             base = self._without_idle(grown)
+            refused.clear()
             added += 1
 
     def _try(self, base: BaseModel, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> BaseModel | None:
@@ -120,19 +120,20 @@ class _Search:
         if not error**2 < (1.0 - MATTERS) * self.steps[-1].train_error ** 2:
             refused.add(candidate.label)
             return None
-        self._add_step(candidate.label, None, grown, _added(candidate, self.steps[-1].train_error, error))
+        self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, self.steps[-1].train_error, error))
         return grown
 
     def _without_idle(self, base: BaseModel) -> BaseModel:
         """Takes out effects whose sizes fell back to null after another one came in."""
-        for here in base.robot.effects[:-1]:
-            sizes = [p for p in here.effect.parameters_of(base.robot, here.owner) if not p.is_shape]
-            values = [base.robot.parameters[here.parameter(p.name)] for p in sizes]
-            idle = all(abs(v.value - p.null) < SURE * (v.sigma or np.inf) for p, v in zip(sizes, values, strict=True))
-            if not idle:
+        found_before = {step.added for step in self.steps[:-1]}
+        for here in base.robot.effects:
+            if here.label not in found_before or not _is_idle(base.robot, here):
                 continue
-            smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
-            error = self._training_error(smaller)
+            try:
+                smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
+                error = self._training_error(smaller)
+            except JointscopeError:
+                continue
             if error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
                 self._add_step(None, here.label, smaller, f"{here.label} fell back to null and was taken out.")
                 base = smaller
@@ -184,6 +185,16 @@ class _Search:
         return lambda text, share: self.report(text, min(start + width * share, 1.0))
 
 
+def _is_idle(robot: Robot, here: EffectAt) -> bool:
+    """Whether every size of an effect is free and compatible with its null value."""
+    sizes = [p for p in here.effect.parameters_of(robot, here.owner) if not p.is_shape]
+    values = [robot.parameters[here.parameter(p.name)] for p in sizes]
+    return bool(sizes) and all(
+        not v.fixed and v.sigma is not None and abs(v.value - p.null) < SURE * v.sigma
+        for p, v in zip(sizes, values, strict=True)
+    )
+
+
 def _why(diagnosis: Diagnosis) -> str:
     if diagnosis.adequate:
         return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
@@ -193,6 +204,9 @@ def _why(diagnosis: Diagnosis) -> str:
     )
 
 
-def _added(candidate: Candidate, before: float, after: float) -> str:
-    values = ", ".join(f"{name} {p.value:.4g} {p.unit}" for name, p in candidate.parameters.items())
-    return f"{candidate.label} added ({values}): the training error falls from {before:.3g} to {after:.3g} sigma."
+def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> str:
+    start = f"{candidate.owner}.{candidate.effect}."
+    own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
+    values = ", ".join(f"{name} {p.value:.4g} {p.unit}" for name, p in own)
+    what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
+    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma."

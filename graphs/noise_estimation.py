@@ -165,7 +165,7 @@ def _cycle(
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
-    shared = SharedLayout.of(estimate.calibrations[0], len(problems))
+    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
     here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, systems)
     step = newton_step(problems, here, hold)
     if step.in_sigmas > FAR and not damped:

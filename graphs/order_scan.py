@@ -7,6 +7,8 @@ Fourier transform over the motor's position has peaks where a ripple is missing.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,20 +19,38 @@ Array = NDArray[np.float64]
 
 LARGEST_ORDER = 250.0
 PEAKS = 3
+OVERSAMPLING = 4  # points of the periodogram per independent order
 
 
-def scan_orders(segments: list[Segment]) -> dict[str, tuple[float, ...]]:
-    """The strongest orders of every joint with a motor of its own, by joint."""
+@dataclass(frozen=True)
+class OrderScan:
+    """Result of the search.
+
+    Attributes:
+        orders: the strongest orders of every joint with a motor of its own.
+        searched: number of independent orders behind each of them, by "cogging@joint".
+    """
+
+    orders: dict[str, tuple[float, ...]]
+    searched: dict[str, int]
+
+
+def scan_orders(segments: list[Segment]) -> OrderScan:
+    """Searches every joint with a motor of its own."""
     robot = segments[0].problem.robot
-    layout, found = robot.layout, {}
+    layout, found, searched = robot.layout, {}, {}
+    known = (robot.constants["motor.gear"],) if "motor.gear" in robot.constants else ()
     for joint in layout.motors:
         row = layout.n_link + layout.motors.index(joint)
         column = layout.motor_q[layout.joints.index(joint)]
         q = np.concatenate([s.signals.x[:-1, column] for s in segments])
         pull = np.concatenate([_gradient(s, row) for s in segments])
-        known = () if "motor.gear" not in robot.constants else (robot.constants["motor.gear"],)
-        found[joint] = tuple(sorted({*_peaks(q, pull), *known}))
-    return found
+        peaks = _peaks(q, pull)
+        if peaks or known:
+            found[joint] = tuple(sorted({*peaks, *known}))
+            independent = LARGEST_ORDER * float(np.ptp(q)) / (2.0 * np.pi)
+            searched[f"cogging@{joint}"] = max(int(independent / max(len(found[joint]), 1)), 1)
+    return OrderScan(found, searched)
 
 
 def _gradient(segment: Segment, row: int) -> Array:
@@ -48,14 +68,18 @@ def _peaks(q: Array, pull: Array) -> list[float]:
     reach = float(np.ptp(q))
     if reach < 1e-3:
         return []
-    # a histogram over the position turns the sum over samples into one over bins
+    # a histogram over the position turns the sum over samples into one over bins, and that into an FFT
     bins = int(np.ceil(reach * LARGEST_ORDER * 8.0 / (2.0 * np.pi))) + 1
     index = np.minimum(((q - q.min()) / reach * bins).astype(int), bins - 1)
     summed = np.bincount(index, weights=pull, minlength=bins)
-    spread = np.sqrt(np.bincount(index, weights=pull**2, minlength=bins).sum())
-    orders = np.arange(1.0, LARGEST_ORDER, 0.5 * np.pi / max(reach, 0.5 * np.pi))
-    centres = (np.arange(bins) + 0.5) / bins * reach + q.min()
-    power = np.abs(np.exp(1j * np.outer(orders, centres)) @ summed) / max(spread, 1e-300)
+    spread = np.sqrt(np.sum(pull**2))
+    size = OVERSAMPLING * max(bins, int(np.ceil(2.0 * np.pi / reach * bins)))
+    power = np.abs(np.fft.rfft(summed, size)) / max(float(spread), 1e-300)
+    orders = 2.0 * np.pi * np.arange(len(power)) * bins / (size * reach)
+    wanted = (orders >= 1.0) & (orders <= LARGEST_ORDER)
+    orders, power = orders[wanted], power[wanted]
+    if not len(power):
+        return []
     inner = np.r_[True, power[1:] >= power[:-1]] & np.r_[power[:-1] >= power[1:], True]
     best = np.flatnonzero(inner)
     return [float(orders[i]) for i in best[np.argsort(-power[best])][:PEAKS]]

@@ -76,7 +76,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: TrialScore | None, labe
         noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
     if any(isinstance(here.effect, TimeShift) for here in robot.effects):
         moved = _with(robot, estimate.calibrations[0])
-        problems = [BagProblem.of(moved, problem.recording) for problem in problems]
+        problems = [replace(BagProblem.of(moved, p.recording), owner=p.owner) for p in problems]
     problems = [problem.with_noise(noise) for problem in problems]
     solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
     found = solution.estimate.calibrations[0]
@@ -124,7 +124,7 @@ def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[
     problems, states, calibrations = [], [], []
     for span in spans:
         piece: Recording = base.recordings[span.bag].between(span.t0, span.t1)
-        problem = BagProblem.of(robot, piece)
+        problem = replace(BagProblem.of(robot, piece), owner=span.bag)
         problems.append(problem)
         states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
         calibrations.append(replace(Calibration.of(robot), biases=base.calibrations[span.bag].biases))

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import f as fisher
 
+from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.graphs.trial_columns import Column, columns_of
@@ -52,9 +55,25 @@ class TrialScore:
 
     @property
     def dof(self) -> int:
-        """Number of sizes that the recordings determine; gauges are held by their prior alone."""
+        """Number of plausible sizes that the recordings determine; gauges are held by their prior alone."""
         prior = np.array([size.prior_sigma for size in self.trial.sizes])
-        return max(int(np.sum(self.sigma < DETERMINED * prior)), 1)
+        determined = self.sigma < DETERMINED * prior
+        return max(int(np.sum(determined[list(self.plausible[1])])), 1)
+
+    @cached_property
+    def plausible(self) -> tuple[float, tuple[int, ...]]:
+        """Largest score of sizes that all have a possible sign, and which those are; (0, ()) if there are none."""
+        signed = [i for i, size in enumerate(self.trial.sizes) if size.sign == "+"]
+        count = len(self.estimate)
+        if all(self.estimate[i] > 0 for i in signed):
+            return self.score, tuple(range(count))
+        best: tuple[float, tuple[int, ...]] = (0.0, ())
+        for size in range(count - 1, 0, -1):
+            for kept in combinations(range(count), size):
+                estimate, value = _fit(self.S[np.ix_(kept, kept)], self.s[list(kept)])
+                if all(estimate[kept.index(i)] > 0 for i in signed if i in kept):
+                    best = max(best, (value, kept))
+        return best
 
 
 @dataclass(frozen=True)
@@ -92,7 +111,7 @@ class ScoreTest:
 
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
-        self._shared = SharedLayout.of(segments[0].calibration, len(segments))
+        self._shared = SharedLayout.of(segments[0].calibration, BagProblem.owners([s.problem for s in segments]))
 
     def each(self, trials: Sequence[Trial]) -> list[TrialScore]:
         """Scores one by one, in batches."""
@@ -208,6 +227,12 @@ def _sums_by(block: NDArray[np.intp]) -> Callable[[Array, Array], None]:
     return add
 
 
+def _fit(S: Array, s: Array) -> tuple[Array, float]:
+    """Estimate and score of some sizes."""
+    estimate = -np.linalg.pinv(S, rcond=1e-12, hermitian=True) @ s
+    return estimate, float(-estimate @ s)
+
+
 def _score(trial: Trial, S: Array, s: Array) -> TrialScore:
     covariance = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
     estimate = -covariance @ s
@@ -220,21 +245,25 @@ def _robust_p(score: TrialScore, scores: Array, information: Array) -> float:
 
     A block's score at the estimate is its score at null plus information times estimate; where the effect is real
     these scatter about zero however unevenly the evidence is spread over time. Hotelling's T^2 with as many degrees of
-    freedom as there are blocks that carry information. Half of it where the sign is known and right, 1 where wrong.
+    freedom as there are blocks that carry information. Only sizes with a possible sign count, 1 where there are none;
+    half where there is one size whose sign is known. NaN where too few blocks carry information.
     """
+    kept = list(score.plausible[1])
+    if not kept:
+        return 1.0
+    estimate, _ = _fit(score.S[np.ix_(kept, kept)], score.s[kept])
+    scores, information = scores[:, kept], information[:, kept][:, :, kept]
     k, total = score.dof, information.sum(axis=0)
     weight = np.einsum("bii->b", information)
     b = float(weight.sum() ** 2 / np.sum(weight**2)) if np.any(weight) else 0.0
     if b <= k + 1.5:
-        return 1.0
-    at_estimate = scores + information @ score.estimate
+        return float("nan")
+    at_estimate = scores + information @ estimate
     spread = at_estimate.T @ at_estimate * b / (b - 1.0)
-    pull = total @ score.estimate
+    pull = total @ estimate
     statistic = float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull)
     p = float(fisher.sf(statistic * (b - k) / (k * (b - 1.0)), k, b - k))
-    if len(score.estimate) == 1 and score.trial.sizes[0].sign == "+":
-        return 0.5 * p if score.estimate[0] > 0 else 1.0
-    return p
+    return 0.5 * p if len(kept) == 1 and score.trial.sizes[kept[0]].sign == "+" else p
 
 
 def _batches(trials: Sequence[Trial]) -> list[list[Trial]]:

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import combinations, pairwise
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ ALIKE = 0.95  # correlation of regressors from which two effects cannot be told 
 MOST_ALIKE = 3
 MOST_TOGETHER = 60  # candidates whose confusions and robust p-values are worth computing; the rest explain nothing
 MOST_AT_LEVELS = 25  # candidates that are scored at other levels of noise
+BEST = 5  # candidates named at each level of noise
+PLACEBOS = 18
 SHIFTS = (0.31, 0.57)  # of the recording by which placebo regressors are moved in time
 INDEPENDENT = 0.1  # [s] stretches of this length count as samples where parameters are paid for
 SIGNIFICANT = 0.01  # probability, over all candidates together, of a score this large by chance
@@ -40,7 +43,8 @@ class ScoredCandidate:
     Attributes:
         best: its score with all sizes.
         plausible: score of the sizes whose sign is possible.
-        p_value: block-robust, corrected for the number of candidates (Holm); chi-square for those at the end.
+        p_value: block-robust, corrected for the shapes tried and the number of candidates (Holm); on the chi-square
+            scale where too few blocks carry information, and for those at the end.
         chance: p-value of the plausible score on the chi-square scale, corrected alike.
         look_alikes: labels of at most three candidates whose regressors correlate above 0.95.
     """
@@ -80,41 +84,46 @@ class ScoredCandidates:
 def score_candidates(base: BaseModel) -> ScoredCandidates:
     """Scores the whole catalogue on the training recordings."""
     segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
-    test = ScoreTest(segments)
-    best: dict[str, TrialScore] = {}
-    for score in test.each(trials_of(base.robot, scan_orders(segments))):
-        known = best.get(score.trial.label)
-        if known is None or plausible_score(score)[0] > plausible_score(known)[0]:
-            best[score.trial.label] = score
+    test, scan = ScoreTest(segments), scan_orders(segments)
+    best, tried = dict[str, TrialScore](), Counter[str]()
+    for score in test.each(trials_of(base.robot, scan.orders)):
+        label = score.trial.label
+        tried[label] += scan.searched.get(label, 1)
+        if label not in best or score.plausible[0] > best[label].plausible[0]:
+            best[label] = score
     samples = sum(float(np.ptp(segment.signals.ticks)) for segment in segments) / INDEPENDENT
-    ordered = sorted(best.values(), key=lambda score: -plausible_score(score)[0] + score.dof * np.log(samples))
+
+    def worth(score: TrialScore) -> float:
+        """Plausible score less what its sizes cost, with the other sign."""
+        return float(score.dof * np.log(samples) - score.plausible[0])
+
+    ordered = sorted(best.values(), key=worth)
     trials = [score.trial for score in ordered[:MOST_TOGETHER]]
     if not trials:
         return ScoredCandidates([], {}, 0.0)
     joint = test.together(trials)
-    rest = ordered[MOST_TOGETHER:]
-    everyone = [*joint.scores, *rest]
-    chances = np.array([chi2.sf(*plausible_score(score)) for score in everyone])
-    p_values = _holm(np.concatenate([joint.p_values, chances[len(trials) :]]))
-    chances = _holm(chances)
-    alike = np.array(
-        [[joint.correlation(i, j) if i != j else 0.0 for j in range(len(trials))] for i in range(len(trials))]
-    )
+    everyone = [*joint.scores, *ordered[MOST_TOGETHER:]]
+    # the best of several shapes is the best of as many draws
+    draws = np.array([tried[score.trial.label] for score in everyone])
+    chances = np.minimum(np.array([chi2.sf(score.plausible[0], score.dof) for score in everyone]) * draws, 1.0)
+    robust = np.minimum(np.concatenate([joint.p_values, np.full(len(everyone) - len(trials), np.nan)]) * draws, 1.0)
+    p_values, chances = _holm(np.where(np.isfinite(robust), robust, chances)), _holm(chances)
+    alike = _confusions(joint)
     found = []
     for i, score in enumerate(everyone):
-        order = np.argsort(-alike[i]) if i < len(trials) else []
+        order = np.argsort(-alike[i]) if i < len(trials) else np.zeros(0, np.intp)
         others = [trials[j].label for j in order if alike[i, j] > ALIKE][:MOST_ALIKE]
-        value = plausible_score(score)[0]
-        found.append(ScoredCandidate(score, value, float(p_values[i]), float(chances[i]), tuple(others)))
-    found.sort(key=lambda c: -c.plausible + c.best.dof * np.log(samples))
-    levels = {1.0: tuple(c.label for c in found[:5])}
+        found.append(ScoredCandidate(score, score.plausible[0], float(p_values[i]), float(chances[i]), tuple(others)))
+    found.sort(key=lambda candidate: worth(candidate.best))
+    levels = {1.0: tuple(c.label for c in found[:BEST])}
     for level in NOISE_LEVELS[1:]:
-        levels[level] = _best_at(level, segments, [c.best.trial for c in found[:MOST_AT_LEVELS]])
+        scores = _at_noise(level, segments, [c.best.trial for c in found[:MOST_AT_LEVELS]])
+        levels[level] = tuple(score.trial.label for score in sorted(scores, key=worth)[:BEST])
     placebo = test.placebo([_placebos(segment.signals) for segment in segments])
     return ScoredCandidates(found, levels, float(np.max(placebo)))
 
 
-def segments_of(base: BaseModel, bag: int, noise: float = 1.0) -> list[Segment]:
+def segments_of(base: BaseModel, bag: int) -> list[Segment]:
     """One recording in pieces of bounded length, linearised at the base model's solution."""
     ticks, recording = base.problem_ticks(bag), base.recordings[bag]
     count = int(np.ceil((ticks[-1] - ticks[0]) / LONGEST))
@@ -122,54 +131,36 @@ def segments_of(base: BaseModel, bag: int, noise: float = 1.0) -> list[Segment]:
     found = []
     for t0, t1 in pairwise(edges):
         part = recording if count == 1 else recording.between(float(t0), float(t1))
-        problem = BagProblem.of(base.robot, part)
+        problem = replace(BagProblem.of(base.robot, part), owner=bag)
         x = base.states_at(bag, problem.timeline.ticks, base.layout)
         found.append(Segment.of(problem, x, base.calibrations[bag]))
     return found
 
 
-def plausible_score(score: TrialScore) -> tuple[float, int]:
-    """Largest score of sizes that all have a possible sign, and how many those are."""
-    signed = [i for i, size in enumerate(score.trial.sizes) if size.sign == "+"]
-    if all(score.estimate[i] > 0 for i in signed):
-        return score.score, score.dof
-    best = (0.0, 1)
-    everything = range(len(score.estimate))
-    for count in range(len(score.estimate) - 1, 0, -1):
-        for kept in map(list, combinations(everything, count)):
-            S, s = score.S[np.ix_(kept, kept)], score.s[kept]
-            estimate = -np.linalg.pinv(S, rcond=1e-12, hermitian=True) @ s
-            if all(estimate[kept.index(i)] > 0 for i in signed if i in kept):
-                best = max(best, (float(-estimate @ s), count))
-    return best
-
-
-def _best_at(level: float, segments: Sequence[Segment], trials: list[Trial]) -> tuple[str, ...]:
-    """The five best labels with the process noise multiplied."""
+def _at_noise(level: float, segments: Sequence[Segment], trials: list[Trial]) -> list[TrialScore]:
+    """Scores with the process noise multiplied."""
     quieter = []
     for segment in segments:
         noise = segment.problem.dynamics.steps.noise
         factors = np.full(len(noise.link_velocity) + len(noise.motor_velocity) + len(noise.memory), level)
         problem = segment.problem.with_noise(scaled(noise, factors))
         quieter.append(Segment.of(problem, segment.signals.x, segment.calibration))
-    scores = ScoreTest(quieter).each(trials)
-    scores.sort(key=lambda score: -plausible_score(score)[0])
-    return tuple(score.trial.label for score in scores[:5])
+    return ScoreTest(quieter).each(trials)
 
 
 def _placebos(s: TrialSignals) -> Array:
-    """Motions of the robot at the wrong time, as torques on every equation, shape (m + 1, r, k)."""
+    """Motions of the robot at the wrong time, as torques on all equations in turn, shape (m + 1, r, k)."""
     layout, found = s.model.layout, []
-    for shift in SHIFTS:
+    rows = range(layout.n_link + layout.n_motor)
+    plan = list(product(SHIFTS, range(len(layout.joints)), range(3), rows))
+    chosen = np.unique(np.linspace(0, len(plan) - 1, min(PLACEBOS, len(plan))).round().astype(int))
+    for shift, j, kind, row in (plan[i] for i in chosen):
         moved = np.roll(np.arange(len(s.ticks)), int(shift * len(s.ticks)))
-        for j in range(len(layout.joints)):
-            v = s.x[moved][:, layout.motor_v[j]]
-            for signal in (v, np.tanh(200.0 * v), s.tau_spring[moved][:, j]):
-                for row in range(layout.n_link + layout.n_motor):
-                    tau = np.zeros((len(s.ticks), layout.n_rates))
-                    tau[:, row] = signal
-                    found.append(s.accelerations(tau))
-    return np.stack(found[:: max(len(found) // 18, 1)], axis=2)
+        v = s.x[moved][:, layout.motor_v[j]]
+        tau = np.zeros((len(s.ticks), layout.n_rates))
+        tau[:, row] = (v, np.tanh(s.robot.choices.friction_sharpness * v), s.tau_spring[moved][:, j])[kind]
+        found.append(s.accelerations(tau))
+    return np.stack(found, axis=2)
 
 
 def _confusions(joint: JointScores) -> Array:

@@ -2,11 +2,12 @@
 """Where the shared values of several recordings stand in one vector.
 
 Dynamics and rotations are shared by all recordings; each recording has its own biases:
-(dynamics, rotations, biases of bag 0, biases of bag 1, ...).
+(dynamics, rotations, biases of bag 0, biases of bag 1, ...). A recording may come in pieces; they share its biases.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,29 +27,40 @@ class SharedLayout:
         columns: columns of each block within one recording.
         common: number of values that all recordings share.
         own: number of values that each recording has for itself.
-        bags: number of recordings.
+        owners: recording that each piece belongs to, 0, 1, ...; a recording given whole is one piece.
     """
 
     columns: dict[str, slice]
     common: int
     own: int
-    bags: int
+    owners: tuple[int, ...]
 
     @staticmethod
-    def of(calibration: Calibration, bags: int) -> SharedLayout:
-        """The layout for recordings of one robot."""
+    def of(calibration: Calibration, owners: int | Sequence[int]) -> SharedLayout:
+        """The layout for recordings of one robot.
+
+        Args:
+            calibration: shared values of one recording.
+            owners: recording of each piece, or the number of recordings that are given whole.
+        """
         columns = layout(calibration)
         own = 3 * len(calibration.biases)
-        return SharedLayout(columns, max(c.stop for c in columns.values()) - own, own, bags)
+        pieces = tuple(range(owners)) if isinstance(owners, int) else tuple(owners)
+        return SharedLayout(columns, max(c.stop for c in columns.values()) - own, own, pieces)
+
+    @property
+    def bags(self) -> int:
+        """Number of recordings."""
+        return max(self.owners) + 1
 
     @property
     def size(self) -> int:
         """Length of the global vector."""
         return self.common + self.own * self.bags
 
-    def indices(self, bag: int) -> NDArray[np.intp]:
-        """Global indices of a recording's values, in the recording's order."""
-        start = self.common + bag * self.own
+    def indices(self, piece: int) -> NDArray[np.intp]:
+        """Global indices of the values of a piece, in its recording's order."""
+        start = self.common + self.owners[piece] * self.own
         return np.concatenate([np.arange(self.common), np.arange(start, start + self.own)])
 
     def step(self, dp: Array, bag: int) -> dict[str, Array]:

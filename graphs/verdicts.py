@@ -17,12 +17,13 @@ from jointscope.graphs.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.refit import Refit
 from jointscope.graphs.scored_candidates import SIGNIFICANT, ScoredCandidate
 from jointscope.graphs.validation import ValidationError
-from jointscope.robots.effect_kinds.effect import EffectParameter
+from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
 
 MATTERS = 0.02  # share of the squared validation error that an effect must explain
 MOST = 0.6  # share of the validation blocks on which it must help
 SURE = 3.0  # [sigma] a refitted size must be away from null
 HORIZON = 0.1  # [s] predictions of this length that do not overlap count as independent
+SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
 SAME = 0.02  # relative difference of errors that decides nothing
 
 
@@ -42,16 +43,20 @@ class Trialled:
 
 
 def judge(
-    scored: ScoredCandidate, base: ValidationError, floor: float, trialled: Trialled | None, seconds: float
+    scored: ScoredCandidate,
+    base: ValidationError,
+    trialled: Trialled | None,
+    seconds: float,
+    failed: bool = False,
 ) -> Candidate:
     """The verdict on one candidate.
 
     Args:
         scored: its score.
         base: errors of the base model on validation blocks.
-        floor: error that sensor noise alone would leave there.
         trialled: its refit; None if it was not worth one.
         seconds: of all validation blocks.
+        failed: whether its refit ran away.
     """
     here, sizes = scored.best.trial.here, scored.best.trial.sizes
     if trialled is None:
@@ -59,14 +64,14 @@ def judge(
             size.name: EffectEstimate(float(value), float(sigma), size.unit)
             for size, value, sigma in zip(sizes, scored.best.estimate, scored.best.sigma, strict=True)
         }
-        verdict, reasons = _without_refit(scored)
+        verdict, reasons = _without_refit(scored, failed)
         return _candidate(scored, parameters, verdict, reasons)
     robot, refit = trialled.refit.robot, trialled.refit
     parameters = {
         p.name: EffectEstimate(robot.parameters[here.parameter(p.name)].value, refit.sigmas.get(p.name, np.nan), p.unit)
         for p in here.effect.parameters_of(robot, here.owner)
     }
-    share = excess_share(base.error, trialled.validation.error, floor)
+    share = excess_share(base.error, trialled.validation.error, SENSOR_FLOOR)
     bic = _bic(base.error, trialled.validation.error, len(parameters), seconds)
     verdict, reasons = _after_refit(scored, base, trialled, parameters, bic, sizes)
     return replace(
@@ -108,23 +113,28 @@ def worth_a_refit(scored: ScoredCandidate, placebo: float) -> bool:
     return scored.chance < SIGNIFICANT and scored.plausible / scored.best.dof > placebo
 
 
-def _without_refit(scored: ScoredCandidate) -> tuple[str, tuple[str, ...]]:
-    effect = scored.best.trial.here.effect
-    weak = [
-        size.name
-        for size, sigma in zip(scored.best.trial.sizes, scored.best.sigma, strict=True)
-        if SURE * sigma > abs(effect.example.get(size.name, np.inf))
-    ]
-    if weak:
+def _without_refit(scored: ScoredCandidate, failed: bool) -> tuple[str, tuple[str, ...]]:
+    if failed:
+        return "possible", ("its refit ran away; calibrate a robot with it to see",)
+    if scored.right_sign and scored.chance < SIGNIFICANT:
+        return "possible", ("its score is beyond chance, but others explain more; it was not refitted",)
+    effect, sizes = scored.best.trial.here.effect, scored.best.trial.sizes
+    reach = {size.name: SURE * float(sigma) for size, sigma in zip(sizes, scored.best.sigma, strict=True)}
+    if sizes and all(reach[size.name] > _worth_seeing(effect, size) for size in sizes):
+        size = sizes[0]
         return "untestable", (
-            f"this motion cannot show it: {weak[0]} of {effect.example[weak[0]]:g} would stay within {SURE:g} sigma; "
-            f"needed: {effect.card.excitation}",
+            f"this motion cannot show it: {size.name} of {_worth_seeing(effect, size):g} {size.unit} would stay within "
+            f"{SURE:g} sigma; needed: {effect.card.excitation}",
         )
     if not scored.right_sign:
         return "absent", ("the data want the impossible sign",)
-    if scored.chance < SIGNIFICANT:
-        return "possible", ("its score is beyond chance, but others explain more; it was not refitted",)
     return "absent", ("it would explain no more than chance",)
+
+
+def _worth_seeing(effect: Effect, size: EffectParameter) -> float:
+    """A size that a diagnosis should be able to see: the catalogue's example, else the largest plausible one."""
+    example = abs(effect.example.get(size.name, 0.0))
+    return example if example > 0.0 else size.prior_sigma / 10.0
 
 
 def _after_refit(
@@ -137,6 +147,8 @@ def _after_refit(
 ) -> tuple[str, tuple[str, ...]]:
     now, reasons = trialled.validation, []
     fall = 1.0 - (now.error / base.error) ** 2
+    if not trialled.refit.converged and not fall >= MATTERS:
+        return "possible", ("its refit did not converge; calibrate a robot with it to see",)
     if not np.isfinite(now.error) or fall < MATTERS:
         return "absent", (
             f"with it the error on validation blocks goes from {base.error:.3g} to {now.error:.3g} sigma",

@@ -13,7 +13,7 @@ from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.normal_equations import accumulate, layout, whitened
 from jointscope.graphs.order_scan import scan_orders
 from jointscope.graphs.score_test import ScoreTest
-from jointscope.graphs.scored_candidates import plausible_score
+
 from jointscope.graphs.trial_columns import columns_of
 from jointscope.graphs.trial_system import Segment, rows_of
 from jointscope.graphs.trials import trials_of
@@ -148,7 +148,7 @@ def test_an_injected_effect_comes_out_with_its_size_and_sign(long):
     for amount in (2.0, -2.0):
         (score,) = ScoreTest([with_residual_of(segment, x, trial, np.array([amount]))]).each([trial])
         assert score.estimate[0] == pytest.approx(amount, rel=0.02)
-        assert plausible_score(score)[0] == (pytest.approx(score.score) if amount > 0 else 0.0)
+        assert score.plausible[0] == (pytest.approx(score.score) if amount > 0 else 0.0)
         assert score.score > 0.0
 
 
@@ -166,6 +166,6 @@ def test_the_order_of_an_injected_ripple_is_found(long, order):
     segment, x = long
     cogging = [t for t in trials_of(segment.problem.robot, {"joint2": (order,)}) if t.label == "cogging@joint2"]
     rippled = with_residual_of(segment, x, cogging[0], np.array([0.4, 0.3]))
-    found = scan_orders([rippled])
+    found = scan_orders([rippled]).orders
     reach = np.ptp(x[:, segment.problem.robot.layout.motor_q[1]])
     assert min(abs(found["joint2"][i] - order) for i in range(len(found["joint2"]))) < np.pi / reach

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.score_test import TrialScore
-from jointscope.graphs.scored_candidates import ScoredCandidate, plausible_score
+from jointscope.graphs.scored_candidates import ScoredCandidate
 from jointscope.graphs.trials import Trial
 from jointscope.graphs.validation import ValidationError
 from jointscope.graphs.verdicts import Trialled, excess_share, judge, worth_a_refit
@@ -19,7 +19,7 @@ from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.robot_file import load_robot
 
 DOGGY = load_robot("doggy")
-FLOOR, SECONDS = 1.0, 10.0
+SECONDS = 10.0
 BLOCKS = 5
 
 
@@ -35,7 +35,7 @@ def score(label, estimate, sigma):
 
 def scored(label="motor_viscous@joint2", estimate=(2.0,), sigma=(0.1,), chance=1e-9, p_value=1e-6):
     best = score(label, estimate, sigma)
-    return ScoredCandidate(best, plausible_score(best)[0], p_value, chance, ())
+    return ScoredCandidate(best, best.plausible[0], p_value, chance, ())
 
 
 def errors(error, better=BLOCKS, before=4.0):
@@ -49,11 +49,11 @@ BASE = ValidationError(4.0, 4.0, np.full(BLOCKS, 4.0), {})
 
 def refitted(error, value=2.0, sigma=0.1, better=BLOCKS):
     robot = add_effect(DOGGY, "motor_viscous@joint2", {"coefficient": value})
-    return Trialled(SimpleNamespace(robot=robot, sigmas={"coefficient": sigma}), errors(error, better), 1.7)
+    return Trialled(SimpleNamespace(robot=robot, sigmas={"coefficient": sigma}, converged=True), errors(error, better), 1.7)
 
 
 def verdict(candidate, trialled=None):
-    found = judge(candidate, BASE, FLOOR, trialled, SECONDS)
+    found = judge(candidate, BASE, trialled, SECONDS)
     return found.verdict, found.reasons
 
 
@@ -74,7 +74,7 @@ def test_an_effect_that_raises_the_error_is_absent():
 
 
 def test_a_prediction_that_runs_away_makes_an_effect_absent():
-    found = judge(scored(), BASE, FLOOR, refitted(float("nan")), SECONDS)
+    found = judge(scored(), BASE, refitted(float("nan")), SECONDS)
     assert found.verdict == "absent"
     assert np.isnan(found.bic)
 
@@ -100,16 +100,16 @@ def test_help_on_less_than_three_of_five_blocks_is_only_possible():
 
 def test_an_effect_that_does_not_pay_for_its_parameters_is_only_possible():
     """Ten seconds are a hundred predictions: 100 log(0.97) = -3.0 does not pay for log(100) = 4.6."""
-    candidate = judge(scored(), BASE, FLOOR, refitted(4.0 * np.sqrt(0.97)), SECONDS)
+    candidate = judge(scored(), BASE, refitted(4.0 * np.sqrt(0.97)), SECONDS)
     assert candidate.verdict == "possible"
     assert candidate.bic == pytest.approx(100.0 * np.log(0.97) + np.log(100.0))
-    longer = judge(scored(), BASE, FLOOR, refitted(4.0 * np.sqrt(0.97)), 3.0 * SECONDS)
+    longer = judge(scored(), BASE, refitted(4.0 * np.sqrt(0.97)), 3.0 * SECONDS)
     assert longer.verdict == "missing"
     assert longer.bic < 0.0
 
 
 def test_a_refit_reports_its_values_and_errors():
-    candidate = judge(scored(), BASE, FLOOR, refitted(2.0), SECONDS)
+    candidate = judge(scored(), BASE, refitted(2.0), SECONDS)
     assert candidate.refitted
     assert candidate.validation_error == 2.0
     assert candidate.heldout_error == 1.7
@@ -119,7 +119,7 @@ def test_a_refit_reports_its_values_and_errors():
 
 
 def test_without_a_refit_the_linear_step_is_reported():
-    candidate = judge(scored(estimate=(1.5,)), BASE, FLOOR, None, SECONDS)
+    candidate = judge(scored(estimate=(1.5,)), BASE, None, SECONDS)
     assert not candidate.refitted
     assert candidate.parameters["coefficient"].value == 1.5
     assert np.isnan(candidate.share)
@@ -146,7 +146,8 @@ def test_a_score_with_the_impossible_sign_is_absent():
 def test_an_effect_whose_example_would_not_show_is_untestable_and_never_absent():
     effect = catalogue()["motor_viscous"]
     expected = (
-        "this motion cannot show it: coefficient of 2 would stay within 3 sigma; needed: " + effect.card.excitation
+        "this motion cannot show it: coefficient of 2 N m s/rad would stay within 3 sigma; needed: "
+        + effect.card.excitation
     )
     for estimate in (2.0, -2.0):
         assert verdict(scored(estimate=(estimate,), sigma=(0.7,), chance=1.0)) == ("untestable", (expected,))
@@ -154,8 +155,8 @@ def test_an_effect_whose_example_would_not_show_is_untestable_and_never_absent()
 
 def test_one_size_of_two_with_the_impossible_sign_leaves_the_score_of_the_other():
     best = score("bearing_flexibility@joint1", (1e-3, -1e-3), (1e-4, 1e-4))
-    value, count = plausible_score(best)
-    assert (value, count) == (pytest.approx(100.0), 1)
+    value, kept = best.plausible
+    assert (value, len(kept)) == (pytest.approx(100.0), 1)
 
 
 def test_the_share_is_of_the_squared_error_above_the_floor():
@@ -170,3 +171,13 @@ def test_a_refit_must_beat_chance_and_the_placebo():
     assert worth_a_refit(scored(), placebo=10.0)
     assert not worth_a_refit(scored(), placebo=1000.0)
     assert not worth_a_refit(scored(chance=0.02), placebo=10.0)
+
+
+def test_a_refit_that_ran_away_leaves_an_effect_possible():
+    found = judge(scored(), BASE, None, SECONDS, failed=True)
+    assert (found.verdict, found.reasons) == ("possible", ("its refit ran away; calibrate a robot with it to see",))
+
+
+def test_one_weak_size_of_two_does_not_make_an_effect_untestable():
+    candidate = scored("bearing_flexibility@joint1", (1e-4, 1e-4), (1e-6, 1.0), chance=1.0)
+    assert judge(candidate, BASE, None, SECONDS).verdict == "absent"
