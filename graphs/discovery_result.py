@@ -41,8 +41,8 @@ class DiscoveryStep:
     Attributes:
         added, removed: ID@OWNER, or None; the first step is the base model.
         robot: calibrated with all training recordings.
-        train_error: error on the training recordings, where a diagnosis validates; the model was fitted
-            to all of them, nothing is left out here.
+        train_error: error on the training recordings, on the pieces where a diagnosis validates; this model was fitted
+            to all of them, so nothing is left out.
         heldout_error: error on the held-out recording, which never chooses; NaN without one.
         floor: of the held-out recording, else of the first training recording.
         diagnosis: what was found with this model as the base; None for the last step where nothing was diagnosed.

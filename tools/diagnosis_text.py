@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.tools.report.candidate_numbers import origin_text, p_text, parameter_texts, share_text
-from jointscope.tools.report.model_answer import diagnosis_answer, of_verdict
+from jointscope.tools.report.model_answer import diagnosis_answer, missing_numerics, of_verdict
 from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.report.robot_argument import robot_argument
 from jointscope.tools.text_table import text_table
@@ -34,8 +34,8 @@ def diagnosis_text(result: Diagnosis) -> str:
 
 
 def leaders(result: Diagnosis) -> list[Candidate]:
-    """Candidates whose size matters: missing or possible ones."""
-    return [c for c in result.candidates if c.verdict in ("missing", "possible")][:SHOWN_SIZES]
+    """Candidates whose size matters: missing or possible ones that have one."""
+    return [c for c in result.candidates if c.verdict in ("missing", "possible") and c.parameters][:SHOWN_SIZES]
 
 
 def ranking_text(result: Diagnosis) -> str:
@@ -51,8 +51,8 @@ def ranking_text(result: Diagnosis) -> str:
     if len(result.candidates) > SHOWN:
         lines.append(f"  and {len(result.candidates) - SHOWN} more in the report")
     lines.append(
-        f"  base model: validation {significant(result.validation_error)}, largest score of meaningless regressors "
-        f"{significant(result.placebo_score)} per degree of freedom"
+        f"  base model: {significant(result.validation_error)} on the validation blocks, which it was fitted to, too; "
+        f"largest score of meaningless regressors {significant(result.placebo_score)} per degree of freedom"
     )
     return "\n".join(lines)
 
@@ -97,7 +97,7 @@ def _untestable(result: Diagnosis) -> str:
 
 
 def _next(result: Diagnosis) -> str:
-    missing = of_verdict(result, "missing")
+    missing = of_verdict(result, "missing") or missing_numerics(result)
     if result.adequate or not missing:
         return ""
     share = missing[0].share

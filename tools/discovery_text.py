@@ -38,7 +38,7 @@ def waterfall_text(result: Discovery) -> str:
         for k, step in enumerate(result.steps)
     ]
     head = ["step", "change", "training", "held out", "floor", "unexplained", "robot file"]
-    title = "Error 0.1 s ahead in sensor sigmas, on blocks left out of training and on the held-out recording:"
+    title = "Error 0.1 s ahead in sensor sigmas, on the training recordings (fitted to) and on the held-out recording:"
     return f"{title}\n{text_table(head, rows, '><>>>><')}"
 
 

@@ -20,6 +20,12 @@ def look_alike_reasons(effect: str) -> Mapping[str, str]:
     return card.look_alikes if card else {}
 
 
+def is_numerics(effect: str) -> bool:
+    """Whether it is a defect of the computation."""
+    card = _card(effect)
+    return card is not None and card.numerics
+
+
 def _card(effect: str) -> Card | None:
     from jointscope.robots.effect_catalogue import catalogue  # reads every effect's file: only where it is needed
 

@@ -13,6 +13,7 @@ from jointscope.tools.diagnosis_text import diagnosis_text
 from jointscope.tools.report import diagnosis_report
 from jointscope.tools.report.model_answer import diagnosis_answer, enumerated
 from jointscope.tools.report.torque_spectrum import torque_spectrum
+from jointscope.tools.rerun_log.diagnosis_documents import diagnosis_markdown, ranking_markdown
 
 SECTIONS = (
     "verdict ranking channels regimes correlations horizons worst maps torque levels untestable next notices provenance"
@@ -72,7 +73,17 @@ def test_an_adequate_model_is_called_adequate_and_has_nothing_to_add():
     page.check()
     assert "The model is adequate: no physical effect is missing." in page.text
     assert "jointscope add" not in page.text
-    assert "on blocks that were left out" in page.text
+    assert "on the training recording, which the model was fitted to, the error is 1.23 sensor sigmas" in page.text
+    assert "the base model, which was fitted to them, too, has 1.26 σ" in page.text
+
+
+def test_what_is_unexplained_is_that_of_the_error_beside_it(found):
+    after_the_refit = dataclasses.replace(found, unexplained_share=0.02)
+    assert "; 99 % of the squared error is unexplained." in diagnosis_answer(after_the_refit).why
+    assert (
+        "first training recording"
+        in diagnosis_answer(dataclasses.replace(found, heldout=None, recordings=found.recordings * 2)).why
+    )
 
 
 def test_a_bare_diagnosis_is_reported(found):
@@ -144,6 +155,26 @@ def test_a_defect_of_the_computation_is_no_missing_physics(found):
     numerics = dataclasses.replace(found.candidates[-1], verdict="missing")
     answer = diagnosis_answer(dataclasses.replace(found, candidates=(numerics,), adequate=True))
     assert answer.headline == "The model is adequate: no physical effect is missing."
+
+
+def test_a_missing_defect_of_the_computation_without_sizes_leaves_no_holes(found):
+    numerics = dataclasses.replace(
+        found.candidates[-1], verdict="missing", share=0.97, refitted=True, validation_error=1.3, bic=-900.0
+    )
+    result = dataclasses.replace(found, candidates=(numerics, *found.candidates[1:]))
+    headline = "The model is not adequate: its computation is too coarse (integration_error@robot)."
+    page, text, markdown = ResultPage(diagnosis_report(result)), diagnosis_text(result), ranking_markdown(result)
+    page.check()
+    for told in (page.text, text, diagnosis_markdown(result)):
+        assert headline in told
+    assert "ΔBIC −900" in page.text and "refit, ΔBIC −900" not in page.text
+    assert "jointscope add doggy integration_error@robot" in page.text
+    assert "Next: jointscope add doggy integration_error@robot" in text
+    assert "| **missing** (numerics) | 61.0 | 1 | 0.020 | 97 % | 1.30 | — | — |" in markdown
+    sizes = text.split("Sizes:")[1].split("\n\n")[0]
+    assert "integration_error" not in sizes and "gyro_scale@imu1" in sizes
+    for told in (text, markdown, page.text):
+        assert "()" not in told and "nan" not in told.split() and "None" not in told
 
 
 def test_the_screen_shows_ranking_sizes_and_what_to_do():

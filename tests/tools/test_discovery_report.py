@@ -56,11 +56,14 @@ def test_before_and_after_stand_in_one_picture(page):
     assert 'data-name="base model"' in page.html and 'data-name="last model"' in page.html
 
 
-def test_without_a_held_out_recording_the_blocks_judge():
+def test_without_a_held_out_recording_the_training_error_judges_and_is_called_so():
     result = fake_discovery(held_out=False)
     page = ResultPage(discovery_report(result))
     page.check()
-    assert "on blocks that were left out went from 12.3 to 1.24 sensor sigmas" in page.text
+    told = "The error on the training recordings, which the model is fitted to, went from 12.3 to 1.24 sensor sigmas"
+    assert told in page.text
+    assert "error 0.1 s ahead on the training recordings" in page.text
+    assert "left out" not in discovery_text(result)
     assert "held-out recording</button>" not in page.html
     assert result.to_json()["steps"][0]["heldout_error"] is None
     assert "nan" not in discovery_text(result)
@@ -97,6 +100,18 @@ def test_an_effect_that_was_taken_out_again_is_no_change(result):
     out = dataclasses.replace(step, added="cogging@joint1", removed=BEARING)
     assert changes(dataclasses.replace(result, steps=(base, step, out))) == ["cogging@joint1"]
     assert changes(dataclasses.replace(result, steps=(base, out))) == ["cogging@joint1", f"without {BEARING}"]
+
+
+def test_a_better_integrator_is_told_as_a_defect_that_went(result):
+    base, step = result.steps
+    better = dataclasses.replace(step, added="integration_error@robot", robot=base.robot)
+    found = dataclasses.replace(result, steps=(base, better))
+    page = ResultPage(discovery_report(found))
+    page.check()
+    assert "The model is adequate without integration_error@robot." in page.text
+    assert "integration_error@robot: without a size." in page.text
+    assert "jointscope remove" not in page.text  # the robot file names an integrator, not an effect
+    assert "The model is adequate without integration_error@robot." in discovery_text(found)
 
 
 def test_the_screen_shows_the_waterfall_and_why_it_stopped(result):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery_result import Discovery, DiscoveryStep
+from jointscope.tools.effect_cards import is_numerics
 from jointscope.tools.report.numbers import percent, significant
 
 
@@ -23,19 +24,23 @@ class Answer:
 
 def diagnosis_answer(result: Diagnosis) -> Answer:
     """What a diagnosis says about its base model."""
-    where = "on the held-out recording" if result.heldout is not None else "on blocks that were left out"
+    fitted = "" if result.heldout is not None else ", which the model was fitted to,"
     why = (
-        f"0.1 s ahead {where} the error is {significant(result.error)} sensor sigmas, noise alone would give "
-        f"{significant(result.floor)}; {percent(max(result.unexplained_share, 0.0))} of the squared error is "
-        "unexplained."
+        f"0.1 s ahead on the {judged_recording(result)}{fitted} the error is {significant(result.error)} sensor "
+        f"sigmas, noise alone would give {significant(result.floor)}; {percent(base_unexplained_share(result))} of the "
+        "squared error is unexplained."
     )
     missing, possible = of_verdict(result, "missing"), of_verdict(result, "possible")
+    defects = missing_numerics(result)
     if result.adequate:
         return Answer("good", "The model is adequate: no physical effect is missing.", why)
     if len(missing) == 1:
         return Answer("bad", f"The model is not adequate: it lacks {missing[0].label}.", why)
     if missing:
         return Answer("bad", f"The model is not adequate: it lacks {enumerated([c.label for c in missing])}.", why)
+    if defects:
+        labels = enumerated([c.label for c in defects])
+        return Answer("bad", f"The model is not adequate: its computation is too coarse ({labels}).", why)
     if possible:
         labels = enumerated([c.label for c in possible[:3]], "or")
         return Answer("warn", f"The model is not adequate; it may lack {labels}, but no effect is certain.", why)
@@ -45,7 +50,9 @@ def diagnosis_answer(result: Diagnosis) -> Answer:
 def discovery_answer(result: Discovery) -> Answer:
     """What a discovery says about its last model."""
     first, last = result.steps[0], result.steps[-1]
-    where = "on the held-out recording" if result.held_out else "on blocks that were left out"
+    where = (
+        "on the held-out recording" if result.held_out else "on the training recordings, which the model is fitted to,"
+    )
     floor = f"noise alone would give {significant(last.floor)}"
     if len(result.steps) == 1:
         why = f"The error {where} is {significant(judged_error(first))} sensor sigmas; {floor}."
@@ -54,31 +61,39 @@ def discovery_answer(result: Discovery) -> Answer:
             f"The error {where} went from {significant(judged_error(first))} to {significant(judged_error(last))} "
             f"sensor sigmas; {floor}."
         )
-    effects = enumerated(changes(result))
+    added, gone = _added_and_gone(result)
+    effects = " and ".join(
+        [f"{word} {enumerated(names)}" for word, names in (("with", added), ("without", gone)) if names]
+    )
     if result.adequate:
-        text = f"The model is adequate with {effects}." if effects else "The model is adequate as it was."
-        return Answer("good", text, why)
+        return Answer("good", f"The model is adequate {effects or 'as it was'}.", why)
     if effects:
-        return Answer("warn", f"The model is better with {effects}, but still not adequate.", why)
+        return Answer("warn", f"The model is better {effects}, but still not adequate.", why)
     return Answer("bad", "The model is not adequate, and no known effect makes it better.", why)
 
 
 def changes(result: Discovery) -> list[str]:
-    """Effects that were added and are still there, then what was removed from the base model."""
+    """Effects that were added and are still there, then what the last model is without."""
+    added, gone = _added_and_gone(result)
+    return added + [f"without {label}" for label in gone]
+
+
+def _added_and_gone(result: Discovery) -> tuple[list[str], list[str]]:
+    """Adding a defect of the computation means doing without it."""
     added: list[str] = []
-    removed: list[str] = []
+    gone: list[str] = []
     for step in result.steps:
         if step.removed in added:
             added.remove(step.removed)
         elif step.removed:
-            removed.append(f"without {step.removed}")
+            gone.append(step.removed)
         if step.added:
-            added.append(step.added)
-    return added + removed
+            (gone if is_numerics(step.added.split("@")[0]) else added).append(step.added)
+    return added, gone
 
 
 def judged_error(step: DiscoveryStep) -> float:
-    """The error on the held-out recording where there is one, else on blocks that were left out."""
+    """The error on the held-out recording where there is one, else on the training recordings."""
     return step.heldout_error if math.isfinite(step.heldout_error) else step.train_error
 
 
@@ -88,9 +103,26 @@ def unexplained_share(step: DiscoveryStep) -> float:
     return max(0.0, 1.0 - (step.floor / error) ** 2) if error > 0.0 else 0.0
 
 
+def judged_recording(result: Diagnosis) -> str:
+    """Where error and floor of a diagnosis's base model were found."""
+    if result.heldout is not None:
+        return "held-out recording"
+    return "first training recording" if len(result.recordings) > 1 else "training recording"
+
+
+def base_unexplained_share(result: Diagnosis) -> float:
+    """Of the base model, like the error and the floor it stands beside; that of a diagnosis may be after a refit."""
+    return max(0.0, 1.0 - (result.floor / result.error) ** 2) if result.error > 0.0 else 0.0
+
+
 def of_verdict(result: Diagnosis, verdict: str) -> list[Candidate]:
     """Physical candidates of one verdict, best first."""
     return [c for c in result.candidates if c.verdict == verdict and not c.numerics]
+
+
+def missing_numerics(result: Diagnosis) -> list[Candidate]:
+    """Defects of the computation that were found, best first."""
+    return [c for c in result.candidates if c.verdict == "missing" and c.numerics]
 
 
 def enumerated(names: Sequence[str], word: str = "and") -> str:

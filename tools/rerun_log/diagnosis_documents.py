@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery_result import Discovery
-from jointscope.tools.report.candidate_numbers import p_text, parameter_texts, share_text
+from jointscope.tools.report.candidate_numbers import NOTHING, p_text, parameter_texts, share_text
 from jointscope.tools.report.model_answer import (
     diagnosis_answer,
     discovery_answer,
@@ -57,7 +57,7 @@ def ranking_markdown(result: Diagnosis) -> str:
     lines = ["# What may be missing", "", *_table(head, [_row(k + 1, c) for k, c in enumerate(result.candidates)])]
     told = [c for c in result.candidates if c.reasons and (c.verdict != "absent" or c in result.candidates[:TOLD])]
     for candidate in told:
-        lines += ["", f"**{candidate.label}**, {candidate.verdict}:"]
+        lines += ["", f"**{candidate.label}**, {candidate.verdict}{_numerics(candidate)}:"]
         lines += ["", *(f"- {sentence(text)}" for text in candidate.reasons)]
         if candidate.look_alikes:
             lines.append(f"- Looks like {enumerated(candidate.look_alikes, 'or')} in these recordings.")
@@ -90,15 +90,19 @@ def _row(rank: int, c: Candidate) -> list[str]:
     return [
         str(rank),
         c.label,
-        f"**{c.verdict}**" if c.verdict in ("missing", "possible") else c.verdict,
+        (f"**{c.verdict}**" if c.verdict in ("missing", "possible") else c.verdict) + _numerics(c),
         significant(c.score),
         str(c.dof),
         p_text(c.p_value),
         share_text(c.share),
         significant(c.validation_error),
         significant(c.heldout_error),
-        ", ".join(sizes),
+        ", ".join(sizes) or NOTHING,
     ]
+
+
+def _numerics(c: Candidate) -> str:
+    return " (numerics)" if c.numerics else ""
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

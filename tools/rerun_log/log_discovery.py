@@ -58,7 +58,7 @@ def _diagnoses(result: Discovery) -> dict[int, Diagnosis]:
 
 
 def _send_bars(stream: rr.RecordingStream, result: Discovery) -> None:
-    """Two bars per step: blocks left out of training, held-out recording."""
+    """Two bars per step: training recordings, held-out recording."""
     import rerun as rr
 
     steps = range(len(result.steps))
@@ -74,7 +74,7 @@ def _blueprint(result: Discovery) -> rrb.Blueprint:
 
     waterfall = rrb.Horizontal(
         rrb.TextDocumentView(origin="/waterfall/text", name="what was found"),
-        rrb.BarChartView(origin="/waterfall/bars", name="error by step [sigma]: blue left out, orange held out"),
+        rrb.BarChartView(origin="/waterfall/bars", name="error by step [sigma]: blue training, orange held out"),
         column_shares=[3, 2],
         name="waterfall",
     )

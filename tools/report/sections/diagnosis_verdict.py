@@ -5,7 +5,12 @@ from __future__ import annotations
 
 from jointscope.graphs.diagnosis_result import Diagnosis
 from jointscope.tools.report.candidate_numbers import share_text
-from jointscope.tools.report.model_answer import diagnosis_answer, of_verdict
+from jointscope.tools.report.model_answer import (
+    base_unexplained_share,
+    diagnosis_answer,
+    judged_recording,
+    of_verdict,
+)
 from jointscope.tools.report.numbers import significant
 from jointscope.tools.report.page import Section
 from jointscope.tools.report.sections.answer_box import answer_box
@@ -15,11 +20,10 @@ def diagnosis_verdict(result: Diagnosis) -> Section:
     """Headline, big numbers, findings."""
     missing, untestable = of_verdict(result, "missing"), of_verdict(result, "untestable")
     sigma = "<small>σ</small>"
-    judged = "held-out recording" if result.heldout is not None else "blocks left out of training"
     figures = [
-        (f"{significant(result.error)} {sigma}", f"error 0.1 s ahead on the {judged}"),
+        (f"{significant(result.error)} {sigma}", f"error 0.1 s ahead on the {judged_recording(result)}"),
         (f"{significant(result.floor)} {sigma}", "what sensor noise and the uncertainty of the state alone would give"),
-        (share_text(max(result.unexplained_share, 0.0)), "of the squared error is unexplained"),
+        (share_text(base_unexplained_share(result)), "of the squared error is unexplained"),
         (str(len(result.candidates)), f"effects tried: {len(missing)} missing, {len(untestable)} not testable here"),
     ]
     return answer_box("verdict", "Does the model lack something?", diagnosis_answer(result), figures, result.paragraphs)

@@ -14,7 +14,7 @@ from jointscope.tools.report.sections.answer_box import answer_box
 def discovery_verdict(result: Discovery) -> Section:
     """Headline, big numbers, what every step means."""
     first, last = result.steps[0], result.steps[-1]
-    judged = "held-out recording" if result.held_out else "blocks left out of training"
+    judged = "held-out recording" if result.held_out else "training recordings"
     before, after = significant(judged_error(first)), significant(judged_error(last))
     arrow = f"{before} → {after}" if len(result.steps) > 1 else after
     figures = [

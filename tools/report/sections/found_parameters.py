@@ -9,6 +9,7 @@ from html import escape
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.parameter import Parameter
 from jointscope.tools.report.candidate_numbers import effect_rows, parameter_texts
+from jointscope.tools.report.model_answer import enumerated
 from jointscope.tools.report.numbers import minus, with_sigma
 from jointscope.tools.report.page import Section, foldable, table
 
@@ -36,7 +37,7 @@ def found_parameters(result: Discovery) -> Section:
 
 def _from_ranking(result: Discovery) -> str:
     """Where the last robot has no effect of its own: the sizes of what was added, as the diagnosis saw them."""
-    added = {step.added for step in result.steps if step.added}
+    added = list(dict.fromkeys(step.added for step in result.steps if step.added))
     seen = {c.label: c for step in result.steps if step.diagnosis for c in step.diagnosis.candidates}
     rows = [
         [f"<code>{escape(label)}</code>", escape(name), value, sigma, escape(unit)]
@@ -45,7 +46,7 @@ def _from_ranking(result: Discovery) -> str:
         for name, value, sigma, unit in parameter_texts(seen[label])
     ]
     if not rows:
-        return "<p>No effect was added.</p>"
+        return f"<p>{escape(enumerated(added))}: without a size.</p>" if added else "<p>No effect was added.</p>"
     return table(["effect", "parameter", "value", "± sigma", "unit"], rows, [2, 3])
 
 

@@ -10,7 +10,7 @@ from html import escape
 from jointscope.graphs.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.recording import Recording
-from jointscope.tools.report.model_answer import of_verdict
+from jointscope.tools.report.model_answer import missing_numerics, of_verdict
 from jointscope.tools.report.page import Section
 from jointscope.tools.report.robot_argument import robot_argument
 
@@ -18,7 +18,8 @@ from jointscope.tools.report.robot_argument import robot_argument
 def after_diagnosis(result: Diagnosis) -> Section:
     """Add the missing effect and calibrate, or let discover do it; or use the model."""
     robot, bags, held = _quoted(robot_argument(result.robot)), _paths(result.recordings), _holdout(result.heldout)
-    found = [c.label for c in of_verdict(result, "missing")] or [c.label for c in of_verdict(result, "possible")][:1]
+    missing = of_verdict(result, "missing") or missing_numerics(result)
+    found = [c.label for c in missing or of_verdict(result, "possible")]
     if result.adequate:
         return _section(
             [("The model is adequate: calibrate with all recordings and use it.", [_calibrate(robot, bags)])]
@@ -42,7 +43,7 @@ def after_discovery(result: Discovery) -> Section:
     first = _quoted(result.steps[0].robot_file or robot_argument(result.steps[0].robot))
     blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
     last = result.steps[-1].added
-    if last:
+    if last and last in {here.label for here in result.robot.effects}:  # a better integrator is no effect
         blocks.append(
             ("Take the last effect out again:", [f"jointscope remove {file} {_quoted(last)} -o without.yaml"])
         )

@@ -25,7 +25,7 @@ def ranking(result: Diagnosis, id_: str = "ranking", title: str = "What may be m
         "Score: s' S⁻¹ s where the effect is zero, chi-square with as many degrees of freedom (dof) as it has sizes if "
         "the noise were white. p is robust against coloured noise and corrected for the number of candidates. A long "
         "recording makes everything significant, so a verdict also needs size: explains is the part of the excess "
-        "squared error, on blocks that were left out, that a refit removes."
+        "squared error, on blocks that the refit leaves out, that it removes."
     )
     if not result.candidates:
         return Section(id_, title, "<p>No effect of the catalogue can act on this robot.</p>", lead)
@@ -36,9 +36,9 @@ def ranking(result: Diagnosis, id_: str = "ranking", title: str = "What may be m
     if rows[cut:]:
         body += foldable(f"{len(rows) - cut} more candidates", _table(rows[cut:]))
     body += (
-        f'<p class="quiet">The base model has {significant(result.validation_error)} σ on the blocks that were left '
-        f"out. Regressors that mean nothing reach a score of {significant(result.placebo_score)} per degree of "
-        "freedom: a score near that is no evidence.</p>"
+        '<p class="quiet">On these blocks the base model, which was fitted to them, too, has '
+        f"{significant(result.validation_error)} σ. Regressors that mean nothing reach a score of "
+        f"{significant(result.placebo_score)} per degree of freedom: a score near that is no evidence.</p>"
     )
     return Section(id_, title, body, lead)
 
@@ -100,7 +100,7 @@ def _explains(c: Candidate) -> str:
 
 
 def _errors(c: Candidate) -> str:
-    """After the refit: on blocks that were left out, and on the held-out recording."""
+    """After the refit: on blocks that it left out, and on the held-out recording."""
     lines = [f"{significant(c.validation_error)} blocks"] if math.isfinite(c.validation_error) else []
     lines += [f"{significant(c.heldout_error)} held out"] if math.isfinite(c.heldout_error) else []
     return "<br>".join(lines) or "—"
@@ -108,7 +108,7 @@ def _errors(c: Candidate) -> str:
 
 def _size(c: Candidate) -> str:
     lines = [f"{escape(name)} = {value} ± {sigma} {escape(unit)}" for name, value, sigma, unit in parameter_texts(c)]
-    if not lines:
-        return "—"
-    bic = f", ΔBIC {significant(c.bic)}" if math.isfinite(c.bic) else ""
-    return "<br>".join(lines) + f'<br><small class="quiet">{origin_text(c)}{bic}</small>'
+    origin = [origin_text(c)] if lines else []
+    origin += [f"ΔBIC {significant(c.bic)}"] if math.isfinite(c.bic) else []
+    small = [f'<small class="quiet">{", ".join(origin)}</small>'] if origin else []
+    return "<br>".join([*(lines or ["—"]), *small])

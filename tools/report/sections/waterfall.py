@@ -16,18 +16,18 @@ from jointscope.tools.report.scale import log_ticks
 LEFT, BAR, RIGHT = 300, 640, 100  # [px] names, longest bar, numbers
 ROW = 52  # [px]
 LEAST = 0.5  # [sensor sigma] left end of the axis
-AXIS = "error [sensor sigma]: blue left out of training, orange held out, mark: floor"
+AXIS = "error [sensor sigma]: blue training recordings, orange held out, mark: floor"
 TRAINING, HELD_OUT = "m0", "m1"
 
 
 def waterfall(result: Discovery) -> Section:
     """Bars and the same as a table."""
     lead = (
-        "Error 0.1 s ahead, root mean square over all channels, in sensor sigmas. Training: blocks that were left out "
-        "of the fit. The held-out recording is scored once per step and never chooses. Mark: the floor, what noise "
-        "and the uncertainty of the state alone would give."
+        "Error 0.1 s ahead, root mean square over all channels, in sensor sigmas. Training: on the recordings that "
+        "every step was calibrated with, nothing left out. The held-out recording is scored once per step and never "
+        "chooses. Mark: the floor, what noise and the uncertainty of the state alone would give."
     )
-    keys = [Key("blocks left out of training", TRAINING, "thick")]
+    keys = [Key("training recordings", TRAINING, "thick")]
     keys += [Key("held-out recording", HELD_OUT, "thick")] if result.held_out else []
     body = figure([waterfall_picture(result)], [*keys, Key("floor", "ink", "thick")]) + _table(result)
     return Section("waterfall", "Step by step", body, lead)
