@@ -10,7 +10,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from jointscope.robots.effect_at import EffectAt
-from jointscope.robots.effect_catalogue import parse_effect
+from jointscope.robots.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
@@ -19,6 +19,7 @@ from jointscope.robots.errors import EffectError
 from jointscope.robots.noise_section import HINGE_DENSITY
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.robot import ProcessNoise, Robot
+from jointscope.robots.yaml_comments import remove_at
 
 BEST_INTEGRATOR = "simpson"
 
@@ -65,26 +66,39 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     """A robot without one of its effects.
 
     Raises:
-        EffectError: the robot does not have it.
+        EffectError: the robot does not have it, or it is a choice of the model and no entry.
     """
     gone = [here for here in robot.effects if here.label == label]
     if not gone:
-        known = ", ".join(here.label for here in robot.effects) or "none"
-        raise EffectError(f"{robot.name} does not have the effect {label!r}; it has {known}")
+        raise EffectError(_why_not_removed(robot, label))
     document = copy.deepcopy(robot.document)
-    document["effects"].remove(label)
-    if not document["effects"]:
-        del document["effects"]
+    remove_at(document, "effects", document["effects"].index(label))
     start = gone[0].parameter("")
     parameters = {name: p for name, p in robot.parameters.items() if not name.startswith(start)}
     for name in robot.parameters:
-        if name.startswith(start):
-            document["parameters"].pop(name, None)
-    if "effects" in document["noise"]:
-        del document["noise"]["effects"]
+        if name.startswith(start) and name in document["parameters"]:
+            remove_at(document, "parameters", name)
     effects = tuple(here for here in robot.effects if here.label != label)
     new = replace(robot, parameters=parameters, effects=effects, document=document)
+    by_name = set(new.layout.links) - set(new.layout.joints) | set(new.memories)
+    if not by_name and "effects" in document["noise"]:
+        remove_at(document, "noise", "effects")
     return replace(new, noise=carried_noise(robot, new))
+
+
+def _why_not_removed(robot: Robot, label: str) -> str:
+    """What to tell about an effect that is not among those of the robot."""
+    effect_id, _, owner = label.partition("@")
+    effect = catalogue().get(effect_id)
+    of_integrator = isinstance(effect, Structure) and effect.form == "integration" and owner in effect.owners_of(robot)
+    if of_integrator and robot.choices.integrator == BEST_INTEGRATOR:
+        return (
+            f"{label} is not listed under effects of {robot.name}: adding it only sets "
+            f"`model: integrator: {BEST_INTEGRATOR}`; to go back, set the integrator in {robot.path.name} "
+            "to what it was (euler or midpoint)"
+        )
+    known = ", ".join(here.label for here in robot.effects) or "none"
+    return f"{robot.name} does not have the effect {label!r}; it has {known}"
 
 
 def cannot_be_added(robot: Robot, here: EffectAt) -> str:
