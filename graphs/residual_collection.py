@@ -40,10 +40,18 @@ class SensorResiduals:
     freedom: Array
 
     @staticmethod
-    def of(part: ResidualPart, residual: Array, expected: Array) -> SensorResiduals:
-        """With the sums of a factor's part."""
-        squares, freedom = np.sum(part.residual**2, axis=0), np.sum(1.0 - part.leverage, axis=0)
-        return SensorResiduals(part.factor.rows, residual, expected, squares, freedom)
+    def of(part: ResidualPart, sigma: float) -> SensorResiduals:
+        """Residuals of a factor's part against the sensor's own sigma.
+
+        Samples of a quantized encoder that share one error count for less in the fit; each of them alone still has
+        the sensor's sigma, and the fit hardly follows it.
+        """
+        sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
+        residual = part.residual * sigmas
+        freedom = np.where(sigmas > sigma * (1.0 + 1e-9), 1.0, 1.0 - part.leverage)
+        expected = np.minimum(sigmas, sigma) * np.sqrt(np.clip(freedom, 1e-6, 1.0))
+        squares = np.sum((residual / np.minimum(sigmas, sigma)) ** 2, axis=0)
+        return SensorResiduals(part.factor.rows, residual, expected, squares, np.sum(freedom, axis=0))
 
 
 @dataclass
@@ -81,13 +89,15 @@ def collect(
         evidence.add(part)
         if part.factor.states:
             scores.add(ticks[part.ticks], part)
-        sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
-        expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
         if isinstance(part.factor, DynamicsFactor):
+            sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
+            expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
             rates = problem.robot.layout.n_rates
             collected.process.append(((part.residual * sigmas)[:, :rates], expected[:, :rates]))
         elif part.factor.name in collected.series:
-            collected.series[part.factor.name].append(SensorResiduals.of(part, part.residual * sigmas, expected))
+            collected.series[part.factor.name].append(
+                SensorResiduals.of(part, problem.robot.sensors[part.factor.name].sigma)
+            )
     return collected
 
 

@@ -14,8 +14,10 @@ from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.interpolated import InterpolatedFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.relative_gyro import RelativeGyroFactor
+from jointscope.factors.rescaled import RescaledFactor
 from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
+from jointscope.graphs.coarse_encoder import shared_error
 from jointscope.graphs.timeline import Timeline
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.lateness import Lateness, late_channels
@@ -111,7 +113,10 @@ def _rate_of_change(stream: Stream) -> Array:
 
 def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
     sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
-    if isinstance(sensor, MotorEncoder) or sensor.form == "full":
+    if isinstance(sensor, MotorEncoder):
+        factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigma)
+        return factor if shared is None else RescaledFactor(factor, shared[chosen])
+    if sensor.form == "full":
         return factor_on_state(robot, name, values, times)
     if sensor.form == "vertical":
         return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)

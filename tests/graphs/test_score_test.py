@@ -13,7 +13,6 @@ from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.normal_equations import accumulate, layout, whitened
 from jointscope.graphs.order_scan import scan_orders
 from jointscope.graphs.score_test import ScoreTest
-
 from jointscope.graphs.trial_columns import columns_of
 from jointscope.graphs.trial_system import Segment, rows_of
 from jointscope.graphs.trials import trials_of

@@ -49,7 +49,8 @@ BASE = ValidationError(4.0, 4.0, np.full(BLOCKS, 4.0), {})
 
 def refitted(error, value=2.0, sigma=0.1, better=BLOCKS):
     robot = add_effect(DOGGY, "motor_viscous@joint2", {"coefficient": value})
-    return Trialled(SimpleNamespace(robot=robot, sigmas={"coefficient": sigma}, converged=True), errors(error, better), 1.7)
+    fit = SimpleNamespace(robot=robot, sigmas={"coefficient": sigma}, converged=True)
+    return Trialled(fit, errors(error, better), 1.7)
 
 
 def verdict(candidate, trialled=None):
