@@ -90,7 +90,7 @@ class InterpolatedFactor:
         inner = self.inner.linearize((interpolate(self.layout, x[0], x[1], fraction, self.h),), calibration)
         J, s = inner.by_state[0], fraction[:, None, None]
         J0, J1 = np.empty_like(J), np.empty_like(J)
-        position, velocity = ([w[:, None, None] for w in part] for part in _weights(fraction, self.h))
+        position, velocity = ([w[:, None, None] for w in part] for part in weights_between(fraction, self.h))
         q, v, z = self.layout.positions, self.layout.velocities, self.layout.memory
         J0[:, :, q] = position[0] * J[:, :, q] + velocity[0] * J[:, :, v]
         J0[:, :, v] = position[1] * J[:, :, q] + velocity[1] * J[:, :, v]
@@ -140,7 +140,7 @@ def interpolate(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: A
     """
     x = np.empty_like(x0)
     q, v, z = layout.positions, layout.velocities, layout.memory
-    weights = _weights(fraction, h)
+    weights = weights_between(fraction, h)
     pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
     x[:, q] = sum(w[:, None] * part for w, part in zip(weights[0], pairs, strict=True))
     x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
@@ -155,13 +155,13 @@ def rate_between(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: 
     s = fraction
     pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
     curvature = ((12 * s - 6) / h**2, (6 * s - 4) / h, -(12 * s - 6) / h**2, (6 * s - 2) / h)
-    rate[:, q] = sum(w[:, None] * part for w, part in zip(_weights(s, h)[1], pairs, strict=True))
+    rate[:, q] = sum(w[:, None] * part for w, part in zip(weights_between(s, h)[1], pairs, strict=True))
     rate[:, v] = sum(w[:, None] * part for w, part in zip(curvature, pairs, strict=True))
     rate[:, z] = (x1[:, z] - x0[:, z]) / h[:, None]
     return rate
 
 
-def _weights(s: Array, h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+def weights_between(s: Array, h: Array) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Weights of (q0, v0, q1, v1) in the position and in the velocity, shape (m,) each."""
     position = ((1 + 2 * s) * (1 - s) ** 2, h * s * (1 - s) ** 2, s**2 * (3 - 2 * s), h * s**2 * (s - 1))
     slope = 6 * s * (s - 1) / h

@@ -27,3 +27,7 @@ class SolveError(JointscopeError):
 
 class SimulationError(JointscopeError):
     """A simulation was asked for something that it cannot do."""
+
+
+class EstimatorError(JointscopeError):
+    """The estimator for the control loop was called with something that it cannot be meant to take."""

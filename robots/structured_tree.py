@@ -48,6 +48,10 @@ class StructuredTree:
 
     Args:
         robot: the robot.
+
+    Attributes:
+        kinematics: the bodies with the inertias of the URDF.
+        coriolis_scale: name of the parameter that scales the Coriolis terms; None where they are all there, or none.
     """
 
     def __init__(self, robot: Robot):
@@ -58,20 +62,20 @@ class StructuredTree:
             for i, joint in enumerate(robot.joints)
             if joint not in robot.layout.motors
         ]
-        self._scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
+        self.coriolis_scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
         self._cache: tuple[tuple[float, ...], RigidTree] | None = None
 
     @property
     def varies(self) -> bool:
         """Whether any parameter changes the tree."""
-        return bool(self._changes or self._armature or self._scale)
+        return bool(self._changes or self._armature or self.coriolis_scale)
 
     def acceleration(self, q: Array, v: Array, tau: Array, values: Mapping[str, float]) -> Array:
         """Accelerations, shape (m, n_link) [rad/s^2]; arguments as those of `RigidTree.acceleration`."""
-        tree = self._tree(values)
-        if self._scale is None:
+        tree = self.bodies(values)
+        if self.coriolis_scale is None:
             return tree.acceleration(q, v, tau)
-        s = values[self._scale]
+        s = values[self.coriolis_scale]
         still = tree.acceleration(q, np.zeros_like(v), tau)
         return still if s == 0.0 else still + s * (tree.acceleration(q, v, tau) - still)
 
@@ -79,10 +83,10 @@ class StructuredTree:
         self, q: Array, v: Array, tau: Array, values: Mapping[str, float]
     ) -> tuple[Array, Array, Array, Array]:
         """As `RigidTree.acceleration_derivatives`."""
-        tree = self._tree(values)
-        if self._scale is None:
+        tree = self.bodies(values)
+        if self.coriolis_scale is None:
             return tree.acceleration_derivatives(q, v, tau)
-        s = values[self._scale]
+        s = values[self.coriolis_scale]
         moving = tree.acceleration_derivatives(q, v, tau)
         still = tree.acceleration_derivatives(q, np.zeros_like(v), tau)
         a, da_dq = (still[i] + s * (moving[i] - still[i]) for i in (0, 1))
@@ -92,18 +96,18 @@ class StructuredTree:
         self, q: Array, v: Array, tau: Array, a: Array, M_inverse: Array, values: Mapping[str, float]
     ) -> dict[str, Array]:
         """Derivatives of the accelerations by parameters of the tree, by name, shape (m, n_link) each."""
-        tree = self._tree(values)
+        tree = self.bodies(values)
         found: dict[str, Array] = {}
         for change in self._changes:
-            torque = inertia_torque(tree, change, q, v, a, 1.0 if self._scale is None else values[self._scale])
+            torque = inertia_torque(tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale])
             found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         for name, link in self._armature:
             found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]
-        if self._scale is not None:
-            found[self._scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
+        if self.coriolis_scale is not None:
+            found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
         return found
 
-    def _tree(self, values: Mapping[str, float]) -> RigidTree:
+    def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
         if not (self._changes or self._armature):
             return self.kinematics

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Slow adaptation of chosen parameters: the motion's derivative by each, and a model that follows their estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.robot import Robot
+from jointscope.robots.state_rates import StateRates
+
+Array = NDArray[np.float64]
+
+STEP = 1e-4  # relative change of a parameter for the difference quotient; laws are smooth in their parameters
+REBUILT = 0.1  # [sigma] of a parameter's own uncertainty after which the model is built anew
+SMALLEST = 0.05  # share of the file's value below which a positive parameter is not followed
+
+
+class Adaptation:
+    """Rates of the state and their derivatives by the adapted parameters.
+
+    Args:
+        robot: with the values at which adaptation begins.
+        names: full names of the parameters.
+
+    Attributes:
+        model: with the values of `at`.
+        at: values at which the model was built, shape (p,).
+    """
+
+    def __init__(self, robot: Robot, names: Sequence[str]):
+        self._robot, self.names = robot, tuple(names)
+        self._start = np.array([robot.parameters[name].value for name in self.names])
+        self._floor = np.array(
+            [SMALLEST * abs(robot.parameters[name].value) if robot.parameters[name].positive else -np.inf for name in names]
+        )
+        self._build(self._start)
+
+    def follow(self, values: Array, sigmas: Array) -> None:
+        """Builds the model anew where its values are too far from these, shape (p,) each."""
+        if self.names and np.any(np.abs(values - self.at) > REBUILT * np.maximum(sigmas, 1e-12)):
+            self._build(np.maximum(values, self._floor))
+
+    def slopes(self, x: Array, u: Array) -> Array:
+        """Derivative of dx/dt by the parameters at a state and a command, shape (d, p)."""
+        here = self.model.rates(x, self.model.command_torque(u))
+        moved = [v.rates(x, v.command_torque(u)) for v in self._variants]
+        return np.column_stack([(m - here) / step for m, step in zip(moved, self._steps, strict=True)])
+
+    def _build(self, values: Array) -> None:
+        self.at = values
+        named = dict(zip(self.names, values.tolist(), strict=True))
+        self.model = StateRates(self._robot, named)
+        self._steps = STEP * np.maximum(np.abs(self._start), 1e-6)
+        self._variants = [
+            StateRates(self._robot, {**named, name: named[name] + step})
+            for name, step in zip(self.names, self._steps, strict=True)
+        ]

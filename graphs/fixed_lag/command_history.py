@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands of the last while, whatever the order in which they came, and what acts of them in a step.
+
+A command acts from its stamp until the next one. Effects on commands (delays, lags, dead bands) need the history; a
+history of half a second holds all that a delay or a lag of the catalogue reaches back to.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.command_path import CommandPath
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+KEPT = 0.5  # [s] of history beyond the lag where effects need it
+PERIOD_SHARE = 0.02  # weight of a new distance between commands in the running estimate of their period
+TYPICAL = 3.0  # distances up to this many periods count as one period with jitter
+
+
+class CommandHistory:
+    """Commands in the order of their stamps.
+
+    Args:
+        robot: for its effects and number of joints.
+        lag: length of the estimator's window [s].
+
+    Attributes:
+        period: usual distance between two commands [s]; infinite before the third.
+        typical_change: root mean square change from one command to the next, shape (n,) [unit of the command].
+    """
+
+    def __init__(self, robot: Robot, lag: float):
+        self._robot, self._effects = robot, robot.effects
+        probe = CommandPath(np.array([0.0, 1.0]), np.zeros((1, robot.n)), robot.effects, robot.joints)
+        self._changes = probe.changes
+        self._kept = lag + KEPT
+        self._values: Mapping[str, float] = {name: p.value for name, p in robot.parameters.items()}
+        self._times: list[float] = []
+        self._u: list[Array] = []
+        self.period = float("inf")
+        self.typical_change = np.zeros(robot.n)
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    @property
+    def last_time(self) -> float:
+        """Stamp of the newest command [s]; minus infinity without one."""
+        return self._times[-1] if self._times else float("-inf")
+
+    def knows(self, t: float) -> bool:
+        """Whether there is a command with this stamp."""
+        i = bisect_left(self._times, t)
+        return i < len(self._times) and self._times[i] == t
+
+    def add(self, t: float, u: Array) -> None:
+        """Takes in a command; it may be older than others."""
+        i = bisect_right(self._times, t)
+        if i == len(self._times) and i:
+            self._learn(t - self._times[-1], u - self._u[-1])
+        self._times.insert(i, t)
+        self._u.insert(i, u)
+        while len(self._times) > 2 and self._times[1] < self._times[-1] - self._kept:
+            del self._times[0], self._u[0]
+
+    def mean(self, t0: float, t1: float) -> Array:
+        """Mean command that acts between two times, effects included, shape (n,); zero before the first command."""
+        if not self._times or t1 <= self._times[0]:
+            return np.zeros(self._robot.n)
+        first = max(bisect_right(self._times, t0) - 1, 0)
+        last = bisect_left(self._times, t1)  # first command that acts only later
+        if self._changes:
+            return self._after_effects(t0, t1, last)
+        if last - first == 1 and t0 >= self._times[first]:
+            return self._u[first]
+        edges = np.array([*self._times[first:last], t1])
+        edges[:-1] = np.maximum(edges[:-1], t0)
+        before = max(self._times[0] - t0, 0.0)
+        weights = np.diff(edges)
+        return weights @ np.array(self._u[first:last]) / (weights.sum() + before)
+
+    def missing(self, t0: float, t1: float) -> float:
+        """Time between t0 and t1 in which, by the usual period, another command should have come [s]."""
+        i = bisect_right(self._times, t0 + 1e-9) - 1
+        if i < 0 or not np.isfinite(self.period):
+            return 0.0
+        held_until = self._times[i] + 1.5 * self.period
+        return max(t1 - max(held_until, t0), 0.0) if i + 1 == len(self._times) or self._times[i + 1] >= t1 else 0.0
+
+    def _learn(self, distance: float, change: Array) -> None:
+        if distance > 0.0:
+            typical = distance < TYPICAL * self.period
+            if not np.isfinite(self.period):
+                self.period = distance
+            elif typical:
+                # the shortest usual distance: lost commands make distances longer, never shorter
+                share = PERIOD_SHARE if distance > self.period else 0.5
+                self.period += share * (min(distance, 1.2 * self.period) - self.period)
+        mean_square = self.typical_change**2
+        self.typical_change = np.sqrt(mean_square + PERIOD_SHARE * (change**2 - mean_square))
+
+    def _after_effects(self, t0: float, t1: float, last: int) -> Array:
+        """As `mean`, with the effects on commands."""
+        inner = [t for t in self._times[:last] if t < t0]
+        edges = np.array([*inner, *([t0] if not inner or inner[-1] < t0 else []), *(
+            t for t in self._times[len(inner):last] if t > t0
+        ), t1])
+        index = np.maximum(np.searchsorted(self._times, edges[:-1], side="right") - 1, 0)
+        path = CommandPath(edges, np.array(self._u)[index], self._effects, self._robot.joints)
+        u, h = path.acting(self._values)[0], np.diff(edges)
+        own = edges[:-1] >= t0
+        return h[own] @ u[own] / h[own].sum()

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the estimator knows of the robot at one time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.state_layout import StateLayout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EstimatedState:
+    """State with covariance.
+
+    Attributes:
+        time: when the robot is in this state [s].
+        mean: in the robot's layout: q_link, v_link, q_motor, v_motor, memories, shape (d,).
+        covariance: shape (d, d).
+        age: time since the newest sample that went in [s]; infinite before the first.
+        biases, bias_sigmas: offset of each gyro and its standard deviations, shape (3,) [rad/s].
+        parameters: value and standard deviation of each adapted parameter, by full name.
+        layout: of the state.
+    """
+
+    time: float
+    mean: Array
+    covariance: Array
+    age: float
+    layout: StateLayout
+    biases: Mapping[str, Array] = field(default_factory=dict)
+    bias_sigmas: Mapping[str, Array] = field(default_factory=dict)
+    parameters: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of every component, shape (d,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def q_link(self) -> Array:
+        """Link positions of the joints, shape (n,) [rad]."""
+        return self.mean[self.layout.joint_q]
+
+    @property
+    def v_link(self) -> Array:
+        """Link velocities of the joints, shape (n,) [rad/s]."""
+        return self.mean[self.layout.joint_v]
+
+    @property
+    def q_motor(self) -> Array:
+        """Motor positions in link units, shape (n,) [rad]."""
+        return self.mean[self.layout.motor_q]
+
+    @property
+    def v_motor(self) -> Array:
+        """Motor velocities in link units, shape (n,) [rad/s]."""
+        return self.mean[self.layout.motor_v]

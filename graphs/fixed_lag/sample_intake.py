@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From messages to observations: shapes are checked, bad data are counted and told, stamps are corrected."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jointscope.graphs.fixed_lag.innovation import Innovation
+from jointscope.graphs.fixed_lag.observation import Observation
+from jointscope.graphs.fixed_lag.sample_checks import SampleChecks
+from jointscope.graphs.fixed_lag.status import EstimatorStatus, EventLog
+from jointscope.robots.effect_at import EffectAt
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.errors import EstimatorError
+from jointscope.robots.lateness import late_channels
+from jointscope.robots.robot import Robot
+from jointscope.robots.sensors import Gyro
+
+Array = NDArray[np.float64]
+
+
+class SampleIntake:
+    """The way into the estimator.
+
+    Args:
+        robot: sensors and effects on their stamps.
+        status: counts what comes and what is dropped.
+        log: receives events.
+    """
+
+    def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog):
+        self._robot, self._status, self._log = robot, status, log
+        self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._checks = {"command": SampleChecks(robot.n, 0.0, False)}
+        self._groups = {name: late_channels(robot, name) for name in robot.sensors}
+        for name, sensor in robot.sensors.items():
+            self._checks[name] = SampleChecks(len(sensor.channels), sensor.sigma, isinstance(sensor, Gyro))
+
+    def command(self, t: float, u: ArrayLike) -> Array | None:
+        """A command if it can be used, shape (n,)."""
+        values = self._shaped("command", t, u, self._robot.n)
+        if values is None:
+            return None
+        if not np.isfinite(values).all():
+            self._drop("command", t, "not_finite", "a command that is not finite was left out")
+            return None
+        return values
+
+    def sample(self, name: str, t: float, values: ArrayLike) -> list[Observation]:
+        """The channels of a sample that can be used, in groups that were taken at the same time."""
+        if name not in self._groups:
+            known = ", ".join(["command", *self._groups])
+            raise EstimatorError(f"no sensor {name!r}; robot {self._robot.name!r} has {known}")
+        sensor, checks = self._robot.sensors[name], self._checks[name]
+        found = self._shaped(name, t, values, len(sensor.channels))
+        if found is None:
+            return []
+        good = np.isfinite(found)
+        if not good.all():
+            self._drop(name, t, "not_finite", f"{name} gave values that are not finite; they are left out")
+        stuck = checks.stuck(found)
+        if stuck.any():
+            good &= ~stuck
+            self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
+        if not good.any():
+            return []
+        sigma = sensor.sigma * np.ones(len(found))
+        if not isinstance(sensor, Gyro):
+            sigma = sigma * checks.shared_error(t, found)
+        result = []
+        for channels, effects in self._groups[name]:
+            chosen = channels[good[channels]]
+            if len(chosen):
+                late = _lateness(effects, t, self._values) if effects else 0.0
+                result.append(Observation(name, t, t - late, chosen, found[chosen], sigma[chosen]))
+        return result
+
+    def too_late(self, o: Observation, now: float) -> None:
+        """Counts a sample from before the window."""
+        self._drop(o.sensor, now, "too_late", f"{o.sensor}: a sample came {now - o.taken:.3f} s late, after its window")
+
+    def is_late(self, o: Observation, now: float) -> None:
+        """Counts a sample that was used although later ones had come before."""
+        self._status.late[o.sensor] += 1
+        self._log.tell(now, "late", o.sensor, f"{o.sensor}: a sample came {1e3 * (now - o.taken):.1f} ms late")
+
+    def outlier(self, innovation: Innovation) -> None:
+        """Counts a sample that was too far away."""
+        far = float(np.max(np.abs(innovation.residual) / innovation.sigma))
+        names = ", ".join(innovation.channels)
+        self._drop(innovation.sensor, innovation.time, "outlier", f"{names}: {far:.0f} sigma off, taken for a glitch")
+
+    def _shaped(self, name: str, t: float, values: ArrayLike, size: int) -> Array | None:
+        """Values of the right shape; None if the stamp makes them useless."""
+        found = np.asarray(values, dtype=float)
+        if found.shape != (size,):
+            raise EstimatorError(f"{name}: expected {size} values, got an array of shape {found.shape}")
+        self._status.received[name] += 1
+        if not math.isfinite(t):
+            self._drop(name, 0.0, "not_finite", f"{name}: a stamp that is not finite was left out")
+            return None
+        if self._checks[name].is_duplicate(t):
+            self._drop(name, t, "duplicate", f"{name}: two messages with one stamp; the first counts")
+            return None
+        return found
+
+    def _drop(self, name: str, t: float, kind: str, text: str) -> None:
+        self._status.drop(name, kind)
+        self._log.tell(t, kind, name, text)
+
+
+def _lateness(effects: tuple[EffectAt, ...], t: float, values: dict[str, float]) -> float:
+    """How late a stamp is by the effects of the robot file [s]."""
+    total, stamp = 0.0, np.array([t])
+    for here in effects:
+        assert isinstance(here.effect, TimeShift)
+        own = {p.name: values[here.parameter(p.name)] for p in here.effect.parameters}
+        total += float(here.effect.late(stamp, own)[0][0])
+    return total

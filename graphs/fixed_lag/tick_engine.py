@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From one tick to the next: predict, hold samples against the prediction, hand the linear rows to the window.
+
+A step and its samples are linearised once, at the best state known when they come; the nominal state of a tick is where
+it was predicted. Samples that come late, and commands that come late, change rows of older ticks; the newest state is
+then read from the window again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.fixed_lag.adaptation import Adaptation
+from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
+from jointscope.graphs.fixed_lag.innovation import Innovation
+from jointscope.graphs.fixed_lag.newest_state import NewestState
+from jointscope.graphs.fixed_lag.observation import AT_TICK, Observation, ObservedRows, observed_rows
+from jointscope.graphs.fixed_lag.outlier_gate import OutlierGate
+from jointscope.graphs.fixed_lag.smoother_window import Rows, SmootherWindow
+from jointscope.graphs.fixed_lag.step_noise import StepNoise
+from jointscope.graphs.fixed_lag.tick_step import TickStep, take_step
+from jointscope.robots.readings_at_one_state import ReadingsAtOneState
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class PastTick:
+    """A tick in the window.
+
+    Attributes:
+        number: of the tick.
+        time: [s].
+        nominal: state from which deviations count, shape (D,).
+        slot: of the factor of the step that led here; -1 for the first tick.
+        rows: of that step.
+        u: mean command of that step, shape (n,).
+        b_by_command: change of the rows' b per command, shape (r, n).
+    """
+
+    number: int
+    time: float
+    nominal: Array
+    slot: int = -1
+    rows: Rows | None = None
+    u: Array | None = None
+    b_by_command: Array | None = None
+
+
+class TickEngine:
+    """The estimate between the first tick and the newest.
+
+    Args:
+        robot: model, noise, sensors.
+        lag: length of the window [s].
+        adapt: density of the random walk of each adapted parameter, by full name [unit/sqrt(s)].
+        bias_walk: density of the random walk of the gyro biases [rad/s/sqrt(s)].
+    """
+
+    def __init__(self, robot: Robot, lag: float, adapt: Mapping[str, float], bias_walk: float):
+        self.layout = AugmentedLayout(robot.layout, tuple(g.name for g in robot.gyros), tuple(adapt))
+        self._lag, self._rule = lag, robot.choices.integrator
+        self._channels = {name: sensor.channels for name, sensor in robot.sensors.items()}
+        self._scale = self.layout.scale(robot)
+        self._adaptation = Adaptation(robot, tuple(adapt))
+        self._readings = ReadingsAtOneState(robot)
+        self._noise = StepNoise(robot, self._adaptation.model)
+        walk = [bias_walk] * (3 * len(self.layout.gyros)) + list(adapt.values())
+        self._walk, self._ones = np.array(walk), np.ones(robot.n)
+        self._gate = OutlierGate()
+        self.past: deque[PastTick] = deque()
+
+    @property
+    def time(self) -> float:
+        """Of the newest tick [s]."""
+        return self.past[-1].time
+
+    @property
+    def torque_gain(self) -> Array:
+        """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
+        return self._adaptation.model.command_torque(self._ones)
+
+    def start(self, time: float, state: NewestState) -> None:
+        """Begins with a Gaussian at a time."""
+        self.newest, self.window = state, SmootherWindow(self._lag, self._scale)
+        self.past.clear()
+        self.past.append(PastTick(0, time, state.mean.copy()))
+        self.window.add_tick(0, time)
+        root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
+        self.window.add_rows(Rows((0,), (root,), np.zeros(len(root))))
+        self.window.commit()
+
+    def advance(
+        self, time: float, u: Array, doubt: Array | None, observations: Sequence[Observation]
+    ) -> list[Innovation]:
+        """Closes a new tick.
+
+        Args:
+            time: of the tick [s].
+            u: mean command since the newest tick, shape (n,).
+            doubt: standard deviation of a further torque of each motor over the step, shape (n,) [N m]; None for none.
+            observations: taken in between or at the new tick.
+        """
+        before, x0 = self.past[-1], self.newest
+        step, rows, predicted, b_by_command = self._predicted(time, u, doubt)
+        here = PastTick(before.number + 1, time, predicted.mean.copy(), -1, rows, u, b_by_command)
+        self.window.add_tick(here.number, time)
+        self.window.add_rows(rows)
+        innovations: list[Innovation] = []
+        if observations:
+            start = None if all(o.taken >= time - AT_TICK for o in observations) else x0.mean
+            seen = observed_rows(
+                self._readings, self.layout, observations, start, predicted.mean, before.time, time
+            )
+            F = self._transition
+            gain_rows, S = seen.by_end @ predicted.covariance, None
+            if seen.by_start is not None:
+                cross = seen.by_start @ x0.covariance
+                middle = cross @ F.T
+                both = middle @ seen.by_end.T
+                S = gain_rows @ seen.by_end.T + both + both.T + cross @ seen.by_start.T
+                gain_rows = gain_rows + middle
+            else:
+                S = gain_rows @ seen.by_end.T
+            S.flat[:: len(S) + 1] += seen.sigma**2
+            keep, innovations = self._judged(observations, seen, S)
+            if not keep.all():
+                seen, gain_rows, S = seen.chosen(keep), gain_rows[keep], S[np.ix_(keep, keep)]
+            if len(seen.residual):
+                self.window.add_rows(self._sensor_rows(seen, before, here, x0.mean, predicted.mean))
+                predicted.update(gain_rows, S, seen.residual)
+        here.slot = int(self.window.commit()[0])
+        self.newest = predicted
+        self.past.append(here)
+        while self.past[0].time < time - self._lag:
+            self.past.popleft()
+        return innovations
+
+    def late(self, observations: Sequence[Observation]) -> list[Innovation]:
+        """Takes in samples that were taken at or before the newest tick; those before the window are left out."""
+        ticks = list(self.past)
+        times = np.array([tick.time for tick in ticks])
+        innovations: list[Innovation] = []
+        for o in observations:
+            i = int(np.searchsorted(times, o.taken - AT_TICK))
+            first, last = ticks[max(i - 1, 0)], ticks[min(i, len(ticks) - 1)]
+            at_tick = abs(last.time - o.taken) <= AT_TICK
+            x1 = self._estimate(last)
+            x0 = None if at_tick or first is last else self._estimate(first)
+            seen = observed_rows(self._readings, self.layout, [o], x0, x1, first.time, last.time)
+            H = seen.by_end if seen.by_start is None else seen.by_end + seen.by_start
+            S = H @ self.window.covariance(last.number) @ H.T
+            S.flat[:: len(S) + 1] += seen.sigma**2
+            keep, found = self._judged([o], seen, S)
+            innovations += found
+            seen = seen.chosen(keep)
+            if len(seen.residual):
+                self.window.add_rows(self._sensor_rows(seen, first, last, x0, x1))
+        self._reread()
+        return innovations
+
+    def corrected(self, tick: PastTick, u: Array) -> None:
+        """Another mean command of the step that led to a tick, shape (n,), for the next `reread`."""
+        if tick.rows is None or tick.u is None or tick.b_by_command is None:
+            return
+        b = tick.rows.b + tick.b_by_command @ (u - tick.u)
+        tick.rows, tick.u = Rows(tick.rows.ticks, tick.rows.A, b), u
+        self.window.remove(tick.slot)
+        self.window.add_rows(tick.rows)
+
+    def apply_corrections(self, ticks: Sequence[PastTick]) -> None:
+        """Commits corrected steps, in the order in which they were corrected."""
+        slots = self.window.commit()
+        for tick, slot in zip(ticks, slots, strict=False):
+            tick.slot = int(slot)
+        self._reread(committed=True)
+
+    def ahead(self, time: float, u: Array) -> NewestState:
+        """The newest state, predicted to a later time with a mean command, shape (n,); nothing is kept."""
+        if time <= self.time:
+            return self.newest
+        return self._predicted(time, u, None)[2]
+
+    def smoothed(self, covariance: bool) -> tuple[PastTick, Array, Array]:
+        """The oldest tick of the window, its mean, shape (D,), and covariance, shape (D, D); NaN if not wanted."""
+        oldest = self.past[0]
+        mean = self._estimate(oldest)
+        P = self.window.covariance(oldest.number) if covariance else np.full((len(mean), len(mean)), np.nan)
+        return oldest, mean, P
+
+    def from_window(self) -> NewestState:
+        """Mean and covariance of the newest tick as the window has them."""
+        newest = self.past[-1]
+        return NewestState(self._estimate(newest), self.window.covariance(newest.number))
+
+    def _estimate(self, tick: PastTick) -> Array:
+        return tick.nominal + self.window.deviation(tick.number)
+
+    def _reread(self, committed: bool = False) -> None:
+        if not committed:
+            self.window.commit()
+        self.newest = self.from_window()
+
+    def _predicted(self, time: float, u: Array, doubt: Array | None) -> tuple[TickStep, Rows, NewestState, Array]:
+        """One step from the newest state: its linearization, its rows, the state it leads to."""
+        layout, before, x0 = self.layout, self.past[-1], self.newest
+        d, h, model = layout.d, time - before.time, self._adaptation.model
+        own = x0.mean[:d]
+        self._adaptation.follow(x0.mean[layout.adapted], np.sqrt(np.diag(x0.covariance)[layout.adapted]))
+        step = take_step(model, self._rule, own, model.command_torque(u), h)
+        extra = None
+        if doubt is not None:
+            extra = np.sqrt(((step.by_torque[layout.robot.rates] * doubt) ** 2).sum(axis=1))
+        T, G = self._noise.of_step(own, h, extra)
+        walk = self._walk * np.sqrt(h)
+        F, Q = np.eye(layout.size), np.zeros((layout.size, layout.size))
+        A0, A1 = np.zeros_like(F), np.zeros_like(F)
+        F[:d, :d] = step.transition
+        A0[:d, :d], A1[:d, :d] = T @ step.by_start, T @ step.by_end
+        spread = step.by_end_inverse @ G
+        Q[:d, :d] = spread @ spread.T
+        walking = np.arange(d, layout.size)
+        A0[walking, walking], A1[walking, walking], Q[walking, walking] = -1.0 / walk, 1.0 / walk, walk**2
+        mean = x0.mean.copy()
+        mean[:d] = step.x1
+        if layout.parameters:
+            slopes = h * self._adaptation.slopes(own, u)
+            A0[:d, layout.adapted] = -T @ slopes
+            F[:d, layout.adapted] = step.by_end_inverse @ slopes
+            mean[:d] += F[:d, layout.adapted] @ (x0.mean[layout.adapted] - self._adaptation.at)
+        self._transition = F
+        rows = Rows((before.number, before.number + 1), (A0, A1), A0 @ (x0.mean - before.nominal))
+        b_by_command = np.zeros((layout.size, len(u)))
+        b_by_command[:d] = T @ (step.by_torque * self.torque_gain)
+        return step, rows, x0.predicted(mean, F, Q), b_by_command
+
+    def _sensor_rows(
+        self, seen: ObservedRows, first: PastTick, last: PastTick, x0: Array | None, x1: Array
+    ) -> Rows:
+        """Whitened rows of samples that were linearised at x0 and x1."""
+        b = seen.residual + seen.by_end @ (x1 - last.nominal)
+        weight = 1.0 / seen.sigma
+        if seen.by_start is None or x0 is None:
+            return Rows((last.number,), (seen.by_end * weight[:, None],), b * weight)
+        b = b + seen.by_start @ (x0 - first.nominal)
+        A = seen.by_start * weight[:, None], seen.by_end * weight[:, None]
+        return Rows((first.number, last.number), A, b * weight)
+
+    def _judged(
+        self, observations: Sequence[Observation], seen: ObservedRows, S: Array
+    ) -> tuple[NDArray[np.bool_], list[Innovation]]:
+        """Rows to use, and the innovations of all samples."""
+        sigma = np.sqrt(S.diagonal())
+        keep = self._gate.believed(observations, seen.residual, sigma)
+        innovations = []
+        for o, part in zip(observations, seen.parts, strict=True):
+            good = keep[part]
+            for chosen, used in ((good, True), (~good, False)):
+                if chosen.any():
+                    rows = np.arange(part.start, part.stop)[chosen]
+                    innovations.append(self._innovation(o, o.channels[chosen], seen.residual[rows], S, rows, used))
+        return keep, innovations
+
+    def _innovation(
+        self, o: Observation, channels: NDArray[np.intp], residual: Array, S: Array, rows: NDArray[np.intp], used: bool
+    ) -> Innovation:
+        own = S[rows[:, None], rows]
+        nis = float(residual @ np.linalg.solve(own, residual))
+        names = self._channels[o.sensor]
+        return Innovation(
+            o.sensor,
+            o.stamp,
+            tuple(names[c] for c in channels.tolist()),
+            residual,
+            np.sqrt(own.diagonal()),
+            nis,
+            len(rows),
+            used,
+        )
