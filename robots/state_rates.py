@@ -66,6 +66,12 @@ class StateRates:
         self._kinematic[layout.positions, layout.velocities] = 1.0
         n, m = layout.n_link, layout.n_motor
         self._n, self._motor_rows, self._memory_rows = n, slice(n, n + m), slice(n + m, layout.n_rates)
+        self._no_velocity, self._weights = np.zeros(n), (1.0 / self._inertia)[:, None]
+        self._by_torque = np.zeros((layout.size, robot.n))
+        self._on_links = [(j, row) for j, row in enumerate(self._rows.tolist()) if row < n]
+        for j, row in enumerate(self._rows.tolist()):
+            if row >= n:
+                self._by_torque[layout.v_motor.start + row - n, j] = 1.0 / self._inertia[row - n]
 
     def command_torque(self, u: Array) -> Array:
         """Torque of the motors for a command in its SI unit, shape (n,) [N m]."""
@@ -90,7 +96,7 @@ class StateRates:
         moving = pin.aba(self._model, self._data, q, v, torque).copy() if self._moving else 0.0
         a = moving
         if self._still:
-            still = pin.aba(self._model, self._data, q, np.zeros_like(v), torque)
+            still = pin.aba(self._model, self._data, q, self._no_velocity, torque)
             a = still + self._scale * (moving - still)
         return self._rate(x, tau, a)
 
@@ -116,14 +122,13 @@ class StateRates:
         A[layout.v_link] = M_inverse @ by_state[:n]
         A[layout.v_link, layout.q_link] += by_q
         A[layout.v_link, layout.v_link] += by_v
-        A[layout.v_motor] = by_state[self._motor_rows] / self._inertia[:, None]
+        A[layout.v_motor] = by_state[self._motor_rows] * self._weights
         A[layout.memory] = by_state[self._memory_rows]
-        by_torque = np.zeros((layout.size, len(self._rows)))
-        for j, row in enumerate(self._rows.tolist()):
-            if row < n:
+        by_torque = self._by_torque
+        if self._on_links:
+            by_torque = by_torque.copy()
+            for j, row in self._on_links:
                 by_torque[layout.v_link, j] = M_inverse[:, row]
-            else:
-                by_torque[layout.v_motor.start + row - n, j] = 1.0 / self._inertia[row - n]
         return self._rate(x, tau, a), A, by_torque
 
     def mass_matrix(self, x: Array) -> Array:
@@ -135,7 +140,7 @@ class StateRates:
         found = [self._derivatives(q, v, tau)] if self._moving else []
         if not self._still:
             return found[0]
-        still = self._derivatives(q, np.zeros_like(v), tau)
+        still = self._derivatives(q, self._no_velocity, tau)
         if not found:
             return still[0], still[1], np.zeros_like(still[2]), still[3]
         s, moving = self._scale, found[0]

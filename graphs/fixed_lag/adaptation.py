@@ -38,10 +38,12 @@ class Adaptation:
         )
         self._build(self._start)
 
-    def follow(self, values: Array, sigmas: Array) -> None:
-        """Builds the model anew where its values are too far from these, shape (p,) each."""
-        if self.names and np.any(np.abs(values - self.at) > REBUILT * np.maximum(sigmas, 1e-12)):
+    def follow(self, values: Array, sigmas: Array) -> bool:
+        """Builds the model anew where its values are too far from these, shape (p,) each; says whether it did."""
+        far = bool(self.names) and bool(np.any(np.abs(values - self.at) > REBUILT * np.maximum(sigmas, 1e-12)))
+        if far:
             self._build(np.maximum(values, self._floor))
+        return far
 
     def slopes(self, x: Array, u: Array) -> Array:
         """Derivative of dx/dt by the parameters at a state and a command, shape (d, p)."""

@@ -7,14 +7,11 @@ second is held against what chi-square allows for the number of samples in it th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
 
 from jointscope.graphs.fixed_lag.innovation import Innovation
-
-Array = NDArray[np.float64]
 
 SECONDS = 1.0  # over which squares are averaged
 UPPER = 2.0  # mean square above which there is an alarm; 4 % of wrong noise would not matter, a missing effect is 10
@@ -27,52 +24,71 @@ class Consistency:
     """Running mean squares of innovations.
 
     Attributes:
-        mean_square: by channel, normalised; 1 is right.
-        alarms: channels that are out of their bounds now.
+        alarms: channels that are out of their bounds now, with their mean square.
     """
 
     def __init__(self) -> None:
-        self.mean_square: dict[str, float] = {}
         self.alarms: dict[str, float] = {}
-        self._count: dict[str, int] = {}
-        self._last: dict[str, float] = {}
-        self._nis, self._weight, self._time = 0.0, 0.0, 0.0
+        self._groups: dict[tuple[str, ...], _Group] = {}
+        self._nis, self._weight, self._time = 0.0, 0.0, -math.inf
 
     @property
     def nis_mean(self) -> float:
-        """Mean normalised innovation squared per degree of freedom over the last seconds; NaN before the first."""
+        """Mean normalised innovation squared per degree of freedom over the last second; NaN before the first."""
         return self._nis / self._weight if self._weight else float("nan")
 
-    def add(self, innovations: Sequence[Innovation]) -> list[tuple[str, bool]]:
-        """Takes in innovations; returns the channels whose alarm begins (True) or ends (False)."""
+    @property
+    def mean_square(self) -> dict[str, float]:
+        """Of the normalised innovations, by channel; 1 is right."""
+        found: dict[str, float] = {}
+        for channels, group in self._groups.items():
+            found |= dict(zip(channels, group.mean_square, strict=True))
+        return found
+
+    def add(self, innovations: Sequence[Innovation]) -> list[tuple[str, float, bool]]:
+        """Takes in innovations; returns channels whose alarm begins (True) or ends (False), with their mean square."""
         changed = []
         for innovation in innovations:
             if not innovation.used:
                 continue
-            self._add_whole(innovation)
-            squares = np.minimum((innovation.residual / innovation.sigma) ** 2, LARGEST).tolist()
-            for channel, square in zip(innovation.channels, squares, strict=True):
-                changed += self._add_channel(channel, innovation.time, square)
+            if innovation.time > self._time:
+                decay = math.exp(-(innovation.time - self._time) / SECONDS)
+                self._nis, self._weight, self._time = decay * self._nis, decay * self._weight, innovation.time
+            self._nis += min(innovation.nis, LARGEST * innovation.dof)
+            self._weight += innovation.dof
+            group = self._groups.get(innovation.channels)
+            if group is None:
+                group = self._groups[innovation.channels] = _Group(innovation)
+            group.add(innovation)
+            if group.count > FEWEST and (self.alarms or max(group.mean_square) > UPPER):
+                changed += self._crossed(innovation.channels, group)
         return changed
 
-    def _add_whole(self, innovation: Innovation) -> None:
-        decay = np.exp(-max(innovation.time - self._time, 0.0) / SECONDS)
-        self._time = max(innovation.time, self._time)
-        self._nis = decay * self._nis + min(innovation.nis, LARGEST * innovation.dof)
-        self._weight = decay * self._weight + innovation.dof
+    def _crossed(self, channels: tuple[str, ...], group: _Group) -> list[tuple[str, float, bool]]:
+        changed = []
+        for channel, mean in zip(channels, group.mean_square, strict=True):
+            if channel in self.alarms:
+                self.alarms[channel] = mean
+                if mean < BACK:
+                    del self.alarms[channel]
+                    changed.append((channel, mean, False))
+            elif mean > UPPER:
+                self.alarms[channel] = mean
+                changed.append((channel, mean, True))
+        return changed
 
-    def _add_channel(self, channel: str, time: float, square: float) -> list[tuple[str, bool]]:
-        count = self._count.get(channel, 0) + 1
-        before = self.mean_square.get(channel, 1.0)
-        share = min(max(time - self._last.get(channel, time), 0.0) / SECONDS, 1.0)
-        mean = before + share * (square - before)
-        self.mean_square[channel], self._count[channel], self._last[channel] = mean, count, time
-        if channel in self.alarms:
-            self.alarms[channel] = mean
-            if mean < BACK:
-                del self.alarms[channel]
-                return [(channel, False)]
-        elif mean > UPPER and count > FEWEST:
-            self.alarms[channel] = mean
-            return [(channel, True)]
-        return []
+
+class _Group:
+    """Channels that are always sampled together."""
+
+    def __init__(self, first: Innovation):
+        self.mean_square, self.count, self._last = [1.0] * first.dof, 0, first.time
+
+    def add(self, innovation: Innovation) -> None:
+        share = min(max(innovation.time - self._last, 0.0) / SECONDS, 1.0)
+        normalised = (innovation.residual / innovation.sigma).tolist()
+        self.mean_square = [
+            mean + share * (min(z * z, LARGEST) - mean) for mean, z in zip(self.mean_square, normalised, strict=True)
+        ]
+        self.count += 1
+        self._last = max(innovation.time, self._last)

@@ -261,13 +261,7 @@ class FixedLagEstimator:
         """Messages about times before the newest tick."""
         engine, found = self._engine, list[Innovation]()
         if self._late_command < math.inf:
-            touched = [p for p in engine.past if p.slot >= 0 and p.time > self._late_command]
-            starts = {p.number: q.time for q, p in zip(engine.past, list(engine.past)[1:], strict=False)}
-            touched = [p for p in touched if p.number in starts]
-            for past in touched:
-                engine.corrected(past, self._commands.mean(starts[past.number], past.time))
-            if touched:
-                engine.apply_corrections(touched)
+            engine.correct_commands(self._late_command, self._commands.mean)
             self._late_command = math.inf
         late = [o for o in self._pending if o.taken <= engine.time + AT_TICK]
         if late:
@@ -290,8 +284,8 @@ class FixedLagEstimator:
         engine, status = self._engine, self.status
         status.updates += 1
         self._count(used, innovations)
-        for channel, begins in self._consistency.add(innovations):
-            self._tell_alarm(channel, begins)
+        for channel, mean_square, begins in self._consistency.add(innovations):
+            self._tell_alarm(channel, mean_square, begins)
         status.nis_mean = self._consistency.nis_mean
         status.lost = self._watch.check(engine.time)
         if not self._is_sane(innovations):
@@ -309,12 +303,10 @@ class FixedLagEstimator:
             if not innovation.used:
                 self._intake.outlier(innovation)
 
-    def _tell_alarm(self, channel: str, begins: bool) -> None:
-        self.status.nis = self._consistency.mean_square
+    def _tell_alarm(self, channel: str, mean_square: float, begins: bool) -> None:
         self.status.alarms = tuple(self._consistency.alarms)
-        mean = self._consistency.mean_square[channel]
         if begins:
-            text = f"innovations of {channel} are {math.sqrt(mean):.1f} times as large as expected; diagnose says why"
+            text = f"innovations of {channel} are {math.sqrt(mean_square):.1f} times as large as expected; diagnose says why"
         else:
             text = f"innovations of {channel} are as large as expected again"
         self._log.tell(self._engine.time, "alarm" if begins else "alarm_over", channel, text)

@@ -3,12 +3,8 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
-
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 STUCK_AFTER = 20  # equal samples in a row of a channel with noise: it is saturated or dead
 COARSE = 1.0  # [sigma] an encoder whose smallest change is larger is quantized; see graphs/coarse_encoder.py
@@ -31,10 +27,10 @@ class SampleChecks:
         self._sigma, self._noisy = sigma, noisy
         self._stamps: set[float] = set()
         self._order: deque[float] = deque()
-        self._last: Array | None = None
-        self._equal = np.zeros(channels, dtype=int)
-        self._step = np.full(channels, np.inf)
-        self._recent: deque[tuple[float, Array]] = deque(maxlen=SMOOTHING + 1)
+        self._last: list[float] = [float("nan")] * channels
+        self._equal = [0] * channels
+        self._step = [float("inf")] * channels
+        self._recent: deque[tuple[float, list[float]]] = deque(maxlen=SMOOTHING + 1)
 
     def is_duplicate(self, t: float) -> bool:
         """Whether a sample with this stamp came before; remembers it."""
@@ -46,29 +42,41 @@ class SampleChecks:
             self._stamps.discard(self._order.popleft())
         return False
 
-    def stuck(self, values: Array) -> NDArray[np.bool_]:
-        """Channels that repeat one value although they have noise, shape (c,)."""
+    def stuck(self, values: list[float]) -> list[int]:
+        """Channels that repeat one value although they have noise."""
         if not self._noisy:
-            return np.zeros(len(values), dtype=bool)
-        if self._last is not None:
-            self._equal = np.where(values == self._last, self._equal + 1, 0)
+            return []
+        found = []
+        for j, value in enumerate(values):
+            if value == self._last[j]:
+                self._equal[j] += 1
+                if self._equal[j] >= STUCK_AFTER:
+                    found.append(j)
+            else:
+                self._equal[j] = 0
         self._last = values
-        return self._equal >= STUCK_AFTER
+        return found
 
-    def shared_error(self, t: float, values: Array) -> Array | float:
-        """Factor on the sigma of an encoder's sample: those of a quantized one share errors in slow motion."""
+    def shared_error(self, t: float, values: list[float]) -> list[float] | None:
+        """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""
         if not self._recent:
             self._recent.append((t, values))
-            return 1.0
+            return None
         before_t, before = self._recent[-1]
-        change = np.abs(values - before)
-        self._step = np.minimum(self._step, np.where(change > SMALLEST_CHANGE, change, np.inf))
+        for j, value in enumerate(values):
+            change = abs(value - before[j])
+            if SMALLEST_CHANGE < change < self._step[j]:
+                self._step[j] = change
         if t > before_t:
             self._recent.append((t, values))
-        if len(self._recent) <= SMOOTHING or not np.any(np.isfinite(self._step) & (self._step > COARSE * self._sigma)):
-            return 1.0
-        t0, first = self._recent[0]
-        period = (t - t0) / SMOOTHING
-        speed = np.abs(values - first) / max(t - t0, period)
-        worth_one = np.clip(self._step / np.maximum(speed * period, SMALLEST_CHANGE), 1.0, MOST)
-        return np.where(np.isfinite(self._step) & (self._step > COARSE * self._sigma), np.sqrt(worth_one), 1.0)
+        threshold = COARSE * self._sigma
+        coarse = [threshold < step < float("inf") for step in self._step]
+        if len(self._recent) <= SMOOTHING or not any(coarse):
+            return None
+        first = self._recent[0][1]
+        # samples that share one error: a step over the way from one sample to the next
+        ways = [abs(value - start) / SMOOTHING for value, start in zip(values, first, strict=True)]
+        return [
+            math.sqrt(min(max(step / max(way, SMALLEST_CHANGE), 1.0), MOST)) if is_coarse else 1.0
+            for step, way, is_coarse in zip(self._step, ways, coarse, strict=True)
+        ]

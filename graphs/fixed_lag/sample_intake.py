@@ -35,6 +35,7 @@ class SampleIntake:
         self._robot, self._status, self._log = robot, status, log
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
         self._checks = {"command": SampleChecks(robot.n, 0.0, False)}
+        self._sigmas = {name: np.full(len(s.channels), s.sigma) for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(len(sensor.channels), sensor.sigma, isinstance(sensor, Gyro))
@@ -44,7 +45,7 @@ class SampleIntake:
         values = self._shaped("command", t, u, self._robot.n)
         if values is None:
             return None
-        if not np.isfinite(values).all():
+        if not math.isfinite(sum(values.tolist())):
             self._drop("command", t, "not_finite", "a command that is not finite was left out")
             return None
         return values
@@ -58,24 +59,26 @@ class SampleIntake:
         found = self._shaped(name, t, values, len(sensor.channels))
         if found is None:
             return []
-        good = np.isfinite(found)
-        if not good.all():
+        numbers = found.tolist()
+        bad = [] if math.isfinite(sum(numbers)) else [j for j, value in enumerate(numbers) if not math.isfinite(value)]
+        if bad:
             self._drop(name, t, "not_finite", f"{name} gave values that are not finite; they are left out")
-        stuck = checks.stuck(found)
-        if stuck.any():
-            good &= ~stuck
+        stuck = checks.stuck(numbers)
+        if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
-        if not good.any():
-            return []
-        sigma = sensor.sigma * np.ones(len(found))
-        if not isinstance(sensor, Gyro):
-            sigma = sigma * checks.shared_error(t, found)
+        sigma = self._sigmas[name]
+        shared = None if isinstance(sensor, Gyro) or bad else checks.shared_error(t, numbers)
+        if shared is not None:
+            sigma = sigma * np.array(shared)
         result = []
         for channels, effects in self._groups[name]:
-            chosen = channels[good[channels]]
-            if len(chosen):
-                late = _lateness(effects, t, self._values) if effects else 0.0
-                result.append(Observation(name, t, t - late, chosen, found[chosen], sigma[chosen]))
+            if bad or stuck:
+                channels = np.setdiff1d(channels, [*bad, *stuck])
+            if len(channels):
+                taken = t - _lateness(effects, t, self._values) if effects else t
+                whole = len(channels) == len(found)
+                chosen = (found, sigma) if whole else (found[channels], sigma[channels])
+                result.append(Observation(name, t, taken, channels, *chosen))
         return result
 
     def too_late(self, o: Observation, now: float) -> None:

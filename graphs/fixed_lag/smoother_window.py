@@ -64,13 +64,14 @@ class SmootherWindow:
         self._values.insert(key, self._zero)
         self._times[key] = time
 
-    def add_rows(self, rows: Rows) -> None:
-        """A factor for the next commit."""
+    def add_rows(self, rows: Rows) -> int:
+        """A factor for the next commit; returns its place among the slots that this will tell."""
         noise = _unit_noise(len(rows.b))
         terms: list = []
         for tick, A in zip(rows.ticks, rows.A, strict=True):
             terms += [_key(tick), A * self._scale]
         self._graph.add(gtsam.LinearContainerFactor(gtsam.JacobianFactor(*terms, rows.b, noise)))
+        return self._graph.size() - 1
 
     def remove(self, slot: int) -> None:
         """Takes a factor out with the next commit, by the slot that `commit` told."""
@@ -79,6 +80,8 @@ class SmootherWindow:
     def commit(self) -> Sequence[int]:
         """Runs iSAM2 on what was added; returns the slots of the new factors in the order in which they were added."""
         added = self._graph.size()
+        if not (added or self._removed):
+            return []
         self._smoother.update(self._graph, self._values, self._times, self._removed)
         slots = self._smoother.getISAM2Result().getNewFactorsIndices() if added else []
         self._graph, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()

@@ -8,12 +8,14 @@ then read from the window again.
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from jointscope.graphs.fixed_lag.adaptation import Adaptation
 from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
@@ -23,11 +25,13 @@ from jointscope.graphs.fixed_lag.observation import AT_TICK, Observation, Observ
 from jointscope.graphs.fixed_lag.outlier_gate import OutlierGate
 from jointscope.graphs.fixed_lag.smoother_window import Rows, SmootherWindow
 from jointscope.graphs.fixed_lag.step_noise import StepNoise
-from jointscope.graphs.fixed_lag.tick_step import TickStep, take_step
+from jointscope.graphs.fixed_lag.tick_step import RatesAt, take_step
 from jointscope.robots.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
+
+COMMITTED_TOGETHER = 5  # ticks that wait for iSAM2; the newest state does not need it
 
 
 @dataclass
@@ -73,8 +77,11 @@ class TickEngine:
         self._noise = StepNoise(robot, self._adaptation.model)
         walk = [bias_walk] * (3 * len(self.layout.gyros)) + list(adapt.values())
         self._walk, self._ones = np.array(walk), np.ones(robot.n)
+        self._walk_kept: tuple[float, tuple[Array, Array, Array, Array]] | None = None
         self._gate = OutlierGate()
         self.past: deque[PastTick] = deque()
+        self._uncommitted: list[tuple[PastTick, int]] = []  # and the place of each step among the new factors
+        self._rates: RatesAt | None = None  # near the newest state
 
     @property
     def time(self) -> float:
@@ -90,6 +97,8 @@ class TickEngine:
         """Begins with a Gaussian at a time."""
         self.newest, self.window = state, SmootherWindow(self._lag, self._scale)
         self.past.clear()
+        self._uncommitted.clear()
+        self._rates = None
         self.past.append(PastTick(0, time, state.mean.copy()))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
@@ -108,10 +117,10 @@ class TickEngine:
             observations: taken in between or at the new tick.
         """
         before, x0 = self.past[-1], self.newest
-        step, rows, predicted, b_by_command = self._predicted(time, u, doubt)
+        rows, predicted, b_by_command, self._rates = self._predicted(time, u, doubt)
         here = PastTick(before.number + 1, time, predicted.mean.copy(), -1, rows, u, b_by_command)
         self.window.add_tick(here.number, time)
-        self.window.add_rows(rows)
+        first_row = self.window.add_rows(rows)
         innovations: list[Innovation] = []
         if observations:
             start = None if all(o.taken >= time - AT_TICK for o in observations) else x0.mean
@@ -135,15 +144,18 @@ class TickEngine:
             if len(seen.residual):
                 self.window.add_rows(self._sensor_rows(seen, before, here, x0.mean, predicted.mean))
                 predicted.update(gain_rows, S, seen.residual)
-        here.slot = int(self.window.commit()[0])
         self.newest = predicted
         self.past.append(here)
+        self._uncommitted.append((here, first_row))
+        if len(self._uncommitted) >= COMMITTED_TOGETHER:
+            self._commit()
         while self.past[0].time < time - self._lag:
             self.past.popleft()
         return innovations
 
     def late(self, observations: Sequence[Observation]) -> list[Innovation]:
         """Takes in samples that were taken at or before the newest tick; those before the window are left out."""
+        self._commit()
         ticks = list(self.past)
         times = np.array([tick.time for tick in ticks])
         innovations: list[Innovation] = []
@@ -165,30 +177,32 @@ class TickEngine:
         self._reread()
         return innovations
 
-    def corrected(self, tick: PastTick, u: Array) -> None:
-        """Another mean command of the step that led to a tick, shape (n,), for the next `reread`."""
-        if tick.rows is None or tick.u is None or tick.b_by_command is None:
-            return
-        b = tick.rows.b + tick.b_by_command @ (u - tick.u)
-        tick.rows, tick.u = Rows(tick.rows.ticks, tick.rows.A, b), u
-        self.window.remove(tick.slot)
-        self.window.add_rows(tick.rows)
+    def correct_commands(self, since: float, mean: Callable[[float, float], Array]) -> None:
+        """Commands have come late: steps that end after a time get other torques.
 
-    def apply_corrections(self, ticks: Sequence[PastTick]) -> None:
-        """Commits corrected steps, in the order in which they were corrected."""
-        slots = self.window.commit()
-        for tick, slot in zip(ticks, slots, strict=False):
-            tick.slot = int(slot)
-        self._reread(committed=True)
+        Args:
+            since: stamp of the oldest of these commands [s].
+            mean: gives the mean command between two times, shape (n,).
+        """
+        self._commit()
+        for start, tick in itertools.pairwise(self.past):
+            if tick.time > since and tick.rows is not None and tick.u is not None and tick.b_by_command is not None:
+                u = mean(start.time, tick.time)
+                b = tick.rows.b + tick.b_by_command @ (u - tick.u)
+                tick.rows, tick.u = Rows(tick.rows.ticks, tick.rows.A, b), u
+                self.window.remove(tick.slot)
+                self._uncommitted.append((tick, self.window.add_rows(tick.rows)))
+        self._reread()
 
     def ahead(self, time: float, u: Array) -> NewestState:
         """The newest state, predicted to a later time with a mean command, shape (n,); nothing is kept."""
         if time <= self.time:
             return self.newest
-        return self._predicted(time, u, None)[2]
+        return self._predicted(time, u, None)[1]
 
     def smoothed(self, covariance: bool) -> tuple[PastTick, Array, Array]:
         """The oldest tick of the window, its mean, shape (D,), and covariance, shape (D, D); NaN if not wanted."""
+        self._commit()
         oldest = self.past[0]
         mean = self._estimate(oldest)
         P = self.window.covariance(oldest.number) if covariance else np.full((len(mean), len(mean)), np.nan)
@@ -196,37 +210,44 @@ class TickEngine:
 
     def from_window(self) -> NewestState:
         """Mean and covariance of the newest tick as the window has them."""
+        self._commit()
         newest = self.past[-1]
         return NewestState(self._estimate(newest), self.window.covariance(newest.number))
 
     def _estimate(self, tick: PastTick) -> Array:
         return tick.nominal + self.window.deviation(tick.number)
 
-    def _reread(self, committed: bool = False) -> None:
-        if not committed:
-            self.window.commit()
+    def _reread(self) -> None:
+        self._commit()
         self.newest = self.from_window()
 
-    def _predicted(self, time: float, u: Array, doubt: Array | None) -> tuple[TickStep, Rows, NewestState, Array]:
-        """One step from the newest state: its linearization, its rows, the state it leads to."""
+    def _commit(self) -> None:
+        """Brings the window up to date."""
+        slots = self.window.commit()
+        for tick, index in self._uncommitted:
+            tick.slot = int(slots[index])
+        self._uncommitted.clear()
+
+    def _predicted(
+        self, time: float, u: Array, doubt: Array | None
+    ) -> tuple[Rows, NewestState, Array, RatesAt | None]:
+        """One step from the newest state: its rows, the state it leads to, change of b per command, rates there."""
         layout, before, x0 = self.layout, self.past[-1], self.newest
-        d, h, model = layout.d, time - before.time, self._adaptation.model
+        d, h = layout.d, time - before.time
         own = x0.mean[:d]
-        self._adaptation.follow(x0.mean[layout.adapted], np.sqrt(np.diag(x0.covariance)[layout.adapted]))
-        step = take_step(model, self._rule, own, model.command_torque(u), h)
+        if self._adaptation.follow(x0.mean[layout.adapted], np.sqrt(np.diag(x0.covariance)[layout.adapted])):
+            self._rates = None
+        model = self._adaptation.model
+        step = take_step(model, self._rule, own, model.command_torque(u), h, self._rates)
         extra = None
         if doubt is not None:
             extra = np.sqrt(((step.by_torque[layout.robot.rates] * doubt) ** 2).sum(axis=1))
         T, G = self._noise.of_step(own, h, extra)
-        walk = self._walk * np.sqrt(h)
-        F, Q = np.eye(layout.size), np.zeros((layout.size, layout.size))
-        A0, A1 = np.zeros_like(F), np.zeros_like(F)
+        F, Q, A0, A1 = (part.copy() for part in self._walked(h))
         F[:d, :d] = step.transition
         A0[:d, :d], A1[:d, :d] = T @ step.by_start, T @ step.by_end
         spread = step.by_end_inverse @ G
         Q[:d, :d] = spread @ spread.T
-        walking = np.arange(d, layout.size)
-        A0[walking, walking], A1[walking, walking], Q[walking, walking] = -1.0 / walk, 1.0 / walk, walk**2
         mean = x0.mean.copy()
         mean[:d] = step.x1
         if layout.parameters:
@@ -238,7 +259,17 @@ class TickEngine:
         rows = Rows((before.number, before.number + 1), (A0, A1), A0 @ (x0.mean - before.nominal))
         b_by_command = np.zeros((layout.size, len(u)))
         b_by_command[:d] = T @ (step.by_torque * self.torque_gain)
-        return step, rows, x0.predicted(mean, F, Q), b_by_command
+        return rows, x0.predicted(mean, F, Q), b_by_command, step.end
+
+    def _walked(self, h: float) -> tuple[Array, Array, Array, Array]:
+        """Transition, covariance and rows of what walks over a step; the robot's own part is zero."""
+        if self._walk_kept is None or self._walk_kept[0] != h:
+            d, size, walk = self.layout.d, self.layout.size, self._walk * np.sqrt(h)
+            F, (Q, A0, A1) = np.eye(size), np.zeros((3, size, size))
+            own = np.arange(d, size)
+            A0[own, own], A1[own, own], Q[own, own] = -1.0 / walk, 1.0 / walk, walk**2
+            self._walk_kept = h, (F, Q, A0, A1)
+        return self._walk_kept[1]
 
     def _sensor_rows(
         self, seen: ObservedRows, first: PastTick, last: PastTick, x0: Array | None, x1: Array
@@ -259,27 +290,26 @@ class TickEngine:
         sigma = np.sqrt(S.diagonal())
         keep = self._gate.believed(observations, seen.residual, sigma)
         innovations = []
+        whole = bool(keep.all())
         for o, part in zip(observations, seen.parts, strict=True):
+            if whole:
+                own = S[part, part]
+                innovations.append(self._innovation(o, o.channels, seen.residual[part], own, sigma[part], True))
+                continue
             good = keep[part]
             for chosen, used in ((good, True), (~good, False)):
                 if chosen.any():
                     rows = np.arange(part.start, part.stop)[chosen]
-                    innovations.append(self._innovation(o, o.channels[chosen], seen.residual[rows], S, rows, used))
+                    own = S[np.ix_(rows, rows)]
+                    found = self._innovation(o, o.channels[chosen], seen.residual[rows], own, sigma[rows], used)
+                    innovations.append(found)
         return keep, innovations
 
     def _innovation(
-        self, o: Observation, channels: NDArray[np.intp], residual: Array, S: Array, rows: NDArray[np.intp], used: bool
+        self, o: Observation, channels: NDArray[np.intp], residual: Array, own: Array, sigma: Array, used: bool
     ) -> Innovation:
-        own = S[rows[:, None], rows]
-        nis = float(residual @ np.linalg.solve(own, residual))
+        nis = float(residual @ lapack.dposv(own, residual)[1])
         names = self._channels[o.sensor]
-        return Innovation(
-            o.sensor,
-            o.stamp,
-            tuple(names[c] for c in channels.tolist()),
-            residual,
-            np.sqrt(own.diagonal()),
-            nis,
-            len(rows),
-            used,
-        )
+        if len(channels) < len(names):
+            names = tuple(names[c] for c in channels.tolist())
+        return Innovation(o.sensor, o.stamp, names, residual, sigma, nis, len(residual), used)

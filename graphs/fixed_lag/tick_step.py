@@ -13,18 +13,51 @@ over within the step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from jointscope.robots.state_rates import StateRates
 
 Array = NDArray[np.float64]
 
 ITERATIONS = 4
+SAME_SLOPE = 0.02  # change of the argument of the friction's tanh within which its slope counts as the same
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
+
+
+@dataclass(frozen=True)
+class RatesAt:
+    """dx/dt at a state and a torque, with derivatives.
+
+    Attributes:
+        x: state, shape (d,).
+        torque: of the commands, shape (n,) [N m].
+        f: dx/dt, shape (d,).
+        A: its derivative by the state, shape (d, d).
+        C: its derivative by the torque of each motor, shape (d, n).
+    """
+
+    x: Array
+    torque: Array
+    f: Array
+    A: Array
+    C: Array
+
+    @staticmethod
+    def of(model: StateRates, x: Array, torque: Array) -> RatesAt:
+        """Evaluated there."""
+        return RatesAt(x, torque, *model.with_jacobian(x, torque))
+
+    def near(self, model: StateRates, x: Array, torque: Array) -> RatesAt:
+        """At a state so near that derivatives stay; evaluated anew where friction says that it is not."""
+        moved = x - self.x
+        if np.abs(moved[model.friction_columns]).max() * model.sharpness > SAME_SLOPE:
+            return RatesAt.of(model, x, torque)
+        return RatesAt(x, torque, self.f + self.A @ moved + self.C @ (torque - self.torque), self.A, self.C)
 
 
 @dataclass(frozen=True)
@@ -37,6 +70,7 @@ class TickStep:
         by_end_inverse: (dr/dx1)^-1, shape (d, d).
         by_end: R1 = dr/dx1, shape (d, d).
         by_torque: -dr/dtau of the torque of each motor, shape (d, n).
+        end: rates where the end was linearised; None where the rule does not look there.
     """
 
     x1: Array
@@ -44,6 +78,7 @@ class TickStep:
     by_end: Array
     by_end_inverse: Array
     by_torque: Array
+    end: RatesAt | None
 
     @property
     def transition(self) -> Array:
@@ -51,7 +86,9 @@ class TickStep:
         return -self.by_end_inverse @ self.by_start
 
 
-def take_step(model: StateRates, rule: str, x0: Array, torque: Array, h: float) -> TickStep:
+def take_step(
+    model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None = None
+) -> TickStep:
     """Integrates over one step.
 
     Args:
@@ -60,42 +97,43 @@ def take_step(model: StateRates, rule: str, x0: Array, torque: Array, h: float) 
         x0: state at the beginning, shape (d,).
         torque: mean torque of the commands over the step, shape (n,) [N m].
         h: length of the step [s].
+        before: rates near the beginning, if they are known.
     """
-    f0, A0, C0 = model.with_jacobian(x0, torque)
+    start = RatesAt.of(model, x0, torque) if before is None else before.near(model, x0, torque)
+    eye, columns = _eye(len(x0)), model.friction_columns
     if rule == "euler":
-        eye = np.eye(len(x0))
-        return TickStep(x0 + h * f0, -eye - h * A0, eye, eye, h * C0)
+        return TickStep(x0 + h * start.f, -eye - h * start.A, eye, eye, h * start.C, None)
     defect = _simpson if rule == "simpson" else _midpoint
-    x1 = x0 + np.linalg.solve(np.eye(len(x0)) - 0.5 * h * A0, h * f0)
-    columns = model.friction_columns
+    x1 = x0 + lapack.dgesv(eye - 0.5 * h * start.A, h * start.f)[2]
     for _ in range(ITERATIONS):
-        r, R0, R1 = defect(model, x0, x1, torque, h, f0, A0)
-        inverse = np.linalg.inv(R1)
+        r, R0, R1, end = defect(model, start, x1, h)
+        inverse = lapack.dgesv(R1, eye)[2]
         change = inverse @ r
         x1 = x1 - change
         if np.abs(change[columns]).max() * model.sharpness < SMALL_TURN:
             break
-    return TickStep(x1, R0, R1, inverse, h * C0)
+    return TickStep(x1, R0, R1, inverse, h * start.C, end)
 
 
-Defect = Callable[[StateRates, Array, Array, Array, float, Array, Array], tuple[Array, Array, Array]]
+def _simpson(model: StateRates, start: RatesAt, x1: Array, h: float) -> tuple[Array, Array, Array, RatesAt | None]:
+    """Defect, its derivatives by beginning and end, and the rates at the end."""
+    x0, torque, end = start.x, start.torque, RatesAt.of(model, x1, start.torque)
+    f_mid, A_mid, _ = model.with_jacobian(0.5 * (x0 + x1) + h / 8.0 * (start.f - end.f), torque)
+    eye, sixth = _eye(len(x0)), h / 6.0
+    r = x1 - x0 - sixth * (start.f + 4.0 * f_mid + end.f)
+    twice = 2.0 * A_mid
+    R0 = -eye - sixth * (start.A + twice + 0.5 * h * A_mid @ start.A)
+    R1 = eye - sixth * (end.A + twice - 0.5 * h * A_mid @ end.A)
+    return r, R0, R1, end
 
 
-def _simpson(
-    model: StateRates, x0: Array, x1: Array, torque: Array, h: float, f0: Array, A0: Array
-) -> tuple[Array, Array, Array]:
-    f1, A1, _ = model.with_jacobian(x1, torque)
-    f_mid, A_mid, _ = model.with_jacobian(0.5 * (x0 + x1) + h / 8.0 * (f0 - f1), torque)
-    eye, sixth = np.eye(len(x0)), h / 6.0
-    r = x1 - x0 - sixth * (f0 + 4.0 * f_mid + f1)
-    R0 = -eye - sixth * (A0 + A_mid @ (2.0 * eye + 0.5 * h * A0))
-    R1 = eye - sixth * (A1 + A_mid @ (2.0 * eye - 0.5 * h * A1))
-    return r, R0, R1
+def _midpoint(model: StateRates, start: RatesAt, x1: Array, h: float) -> tuple[Array, Array, Array, RatesAt | None]:
+    """As `_simpson`."""
+    f_mid, A_mid, _ = model.with_jacobian(0.5 * (start.x + x1), start.torque)
+    eye, half = _eye(len(x1)), 0.5 * h * A_mid
+    return x1 - start.x - h * f_mid, -eye - half, eye - half, None
 
 
-def _midpoint(
-    model: StateRates, x0: Array, x1: Array, torque: Array, h: float, f0: Array, A0: Array
-) -> tuple[Array, Array, Array]:
-    f_mid, A_mid, _ = model.with_jacobian(0.5 * (x0 + x1), torque)
-    eye, half = np.eye(len(x0)), 0.5 * h * A_mid
-    return x1 - x0 - h * f_mid, -eye - half, eye - half
+@cache
+def _eye(size: int) -> Array:
+    return np.eye(size)
