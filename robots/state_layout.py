@@ -41,22 +41,22 @@ class StateLayout:
         names = tuple(joints)
         return StateLayout(names, names, names)
 
-    @property
+    @cached_property
     def n_link(self) -> int:
         """Number of link coordinates."""
         return len(self.links)
 
-    @property
+    @cached_property
     def n_motor(self) -> int:
         """Number of motor coordinates."""
         return len(self.motors)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Length d of a state."""
         return 2 * (self.n_link + self.n_motor) + len(self.memories)
 
-    @property
+    @cached_property
     def n_rates(self) -> int:
         """Number of velocities and memories."""
         return self.n_link + self.n_motor + len(self.memories)
@@ -138,7 +138,7 @@ class StateLayout:
         own = [self.n_link + self.motors.index(j) if j in self.motors else self.links.index(j) for j in self.joints]
         return np.array(own, dtype=np.intp)
 
-    @property
+    @cached_property
     def elastic_joints(self) -> tuple[int, ...]:
         """Indices of the joints with motor coordinates of their own."""
         return tuple(i for i, joint in enumerate(self.joints) if joint in self.motors)

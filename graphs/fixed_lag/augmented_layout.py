@@ -36,12 +36,12 @@ class AugmentedLayout:
     gyros: tuple[str, ...]
     parameters: tuple[str, ...]
 
-    @property
+    @cached_property
     def d(self) -> int:
         """Size of the robot's own state."""
         return self.robot.size
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Size D of the whole."""
         return self.d + 3 * len(self.gyros) + len(self.parameters)

@@ -25,7 +25,7 @@ from jointscope.robots.state_rates import StateRates
 Array = NDArray[np.float64]
 
 ITERATIONS = 4
-SAME_SLOPE = 0.02  # change of the argument of the friction's tanh within which its slope counts as the same
+SAME_FRICTION = 1e-3  # share of the Coulomb torque that a straight line may miss before rates are evaluated anew
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
 
 
@@ -54,8 +54,10 @@ class RatesAt:
 
     def near(self, model: StateRates, x: Array, torque: Array) -> RatesAt:
         """At a state so near that derivatives stay; evaluated anew where friction says that it is not."""
-        moved = x - self.x
-        if np.abs(moved[model.friction_columns]).max() * model.sharpness > SAME_SLOPE:
+        moved, columns, k = x - self.x, model.friction_columns, model.sharpness
+        before, after = np.tanh(k * self.x[columns]), np.tanh(k * x[columns])
+        straight = (1.0 - before * before) * k * moved[columns]
+        if np.abs(after - before - straight).max() > SAME_FRICTION:
             return RatesAt.of(model, x, torque)
         return RatesAt(x, torque, self.f + self.A @ moved + self.C @ (torque - self.torque), self.A, self.C)
 
