@@ -50,7 +50,7 @@ def run_case(case: Case) -> Row:
     recordings = _simulate(case)
     began = time.perf_counter()
     try:
-        found = discover(_model(case), [recordings.train], holdout=recordings.test)
+        found = discover(_model(case), [recordings.train], holdout=recordings.test, missing_torque=False)
     except JointscopeError as err:
         seconds = time.perf_counter() - began
         return Row(case.name, case.kind, case.truth, seconds=seconds, error=str(err).splitlines()[0])

@@ -60,6 +60,7 @@ def diagnose(
     comparison: ModelComparison | None = None,
     validation: ValidationError | None = None,
     leaders: int = LEADERS,
+    missing_torque: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Ranks the effects that a model lacks.
@@ -72,6 +73,7 @@ def diagnose(
         comparison: of that model with the held-out recording, else with the first training recording, if it was made.
         validation: errors of that model on the validation blocks, if they are known.
         leaders: number of candidates to refit.
+        missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -102,10 +104,12 @@ def diagnose(
     if best is not None:
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.floor)
-    report("the missing torque", 0.95)
     refits = {label: t.refit.robot for label, t in trialled.items()}
-    missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
-    clock.stage("missing torque")
+    missing = None
+    if missing_torque:
+        report("the missing torque", 0.95)
+        missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
+        clock.stage("missing torque")
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),

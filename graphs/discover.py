@@ -38,6 +38,7 @@ def discover(
     save: Save | None = None,
     resume: Sequence[SavedStep] | None = None,
     max_steps: int = MAX_STEPS,
+    missing_torque: bool = True,
     progress: Progress | None = None,
 ) -> Discovery:
     """Finds the effects that a model lacks, one after the other.
@@ -49,13 +50,14 @@ def discover(
         save: called with the number of each finished step and the step; returns the robot file it wrote.
         resume: finished steps of an earlier run; the search goes on after the last.
         max_steps: effects to add at the most.
+        missing_torque: estimate the missing torque at every step, too; pictures need it, no verdict does.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps)
+    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps, missing_torque)
     return search.run(robot, resume or ())
 
 
@@ -69,9 +71,10 @@ class _Search:
         save: Save | None,
         report: Progress,
         max_steps: int,
+        missing_torque: bool,
     ):
         self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
-        self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
+        self.max_steps, self.missing_torque, self.steps = max_steps, missing_torque, list[DiscoveryStep]()
         self.errors: ValidationError | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
@@ -100,6 +103,7 @@ class _Search:
                 base=base,
                 comparison=self.steps[-1].comparison,
                 validation=self.errors,
+                missing_torque=self.missing_torque,
                 progress=self._part(share),
             )
             self._attach(diagnosis)
