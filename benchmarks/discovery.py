@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from statistics import median
 
 from discovery_row import Row
 from hidden_effects import KINDS, TEST, TRAIN
@@ -11,6 +12,7 @@ from tables import Section, Table
 
 FIRST = 0.95  # of the recordings whose effect matters
 PAIRS_FOUND = 0.8
+HALF = 0.5  # of the squared error above the floor
 LARGEST_Z = 3.0
 DIAGNOSE, SCORE = 60.0, 10.0  # [s] on 20 s of recording
 SCORE_STAGE = "score"  # in names of stages
@@ -56,6 +58,7 @@ def section(rows: Sequence[Row]) -> Section:
         if of_kind:
             found.tables.append(Table(TITLES[kind], HEAD, [cells(row) for row in of_kind]))
     found.notes += [f"{row.name}: ended with: {row.error}" for row in rows if row.error]
+    found.notes += [f"{row.name}: {text}" for row in rows if row.kind == "mistake" for text in row.suspicions]
     found.numbers["rows"] = [row.to_json() for row in rows]
     return found
 
@@ -82,7 +85,8 @@ def _promise_ranks(found: Section, rows: Sequence[Row]) -> None:
     telling = [row for row in rows if row.kind in ("effect", "hard") and row.truth and (row.matters or row.error)]
     _count(found, "truth or its look-alike first, where it matters by 10 %", FIRST, [r.found_first for r in telling])
     singles = [row for row in telling if row.kind == "effect"]
-    found.promise("&nbsp;&nbsp;truth itself first", "", _share([row.first in row.truth for row in singles]))
+    if singles:
+        found.promise("&nbsp;&nbsp;truth itself first", "", _share([row.first in row.truth for row in singles]))
     pairs = [row for row in rows if row.kind == "pair"]
     _count(found, "pairs: both accepted", PAIRS_FOUND, [set(row.truth) <= set(row.accepted) for row in pairs])
 
@@ -96,8 +100,13 @@ def _promise_honesty(found: Section, rows: Sequence[Row]) -> None:
         _count(found, f"nothing hidden{where}: called adequate", 1.0, [bool(row.adequate) for row in rows_without])
     outside = [row for row in rows if row.kind == "outside"]
     _count(found, "outside the catalogue: not called adequate", 1.0, [not row.adequate for row in outside])
+    explained = [row.explained < HALF for row in outside if row.accepted and row.explained is not None]
+    _count(found, "outside the catalogue: what is accepted explains less than half of the excess", 1.0, explained)
     mistakes = [row for row in rows if row.kind == "mistake"]
-    _count(found, "wrong setting: an error, or not called adequate", 1.0, [not row.adequate for row in mistakes])
+    _count(found, "wrong setting: named as what it is", 1.0, [row.named for row in mistakes])
+    _count(found, "wrong setting: never called friction or Coriolis", 1.0, [not row.blamed for row in mistakes])
+    elsewhere = [not row.adequate or row.named for row in mistakes]
+    _count(found, "wrong setting: not called adequate unless it was named", 1.0, elsewhere)
 
 
 def _promise_models(found: Section, rows: Sequence[Row]) -> None:
@@ -109,14 +118,19 @@ def _promise_models(found: Section, rows: Sequence[Row]) -> None:
 
 
 def _promise_times(found: Section, rows: Sequence[Row]) -> None:
-    """Seconds of the first diagnosis, without the calibration of the base model."""
+    """Seconds of the first diagnosis, without the calibration of the base model.
+
+    The median counts: other work on the machine lengthens single ones. Time a quiet machine with `--jobs 1`.
+    """
     stages = [row.stages for row in rows if row.stages and "short" not in row.name]
     if not stages:
         return
-    whole = max(sum(s for name, s in stage.items() if CALIBRATION_STAGE not in name) for stage in stages)
-    score = max(sum(s for name, s in stage.items() if SCORE_STAGE in name) for stage in stages)
-    found.promise(f"slowest diagnosis of {TRAIN:g} s", f"below {DIAGNOSE:g} s", f"{whole:.1f} s", whole < DIAGNOSE)
-    found.promise("&nbsp;&nbsp;slowest score step", f"below {SCORE:g} s", f"{score:.1f} s", score < SCORE)
+    whole = [sum(s for name, s in stage.items() if CALIBRATION_STAGE not in name) for stage in stages]
+    score = [sum(s for name, s in stage.items() if SCORE_STAGE in name) for stage in stages]
+    for what, seconds, limit in ((f"diagnosis of {TRAIN:g} s", whole, DIAGNOSE), ("its score step", score, SCORE)):
+        middle = median(seconds)
+        measured = f"{middle:.1f} s, slowest {max(seconds):.1f} s"
+        found.promise(f"{what}: median", f"below {limit:g} s", measured, middle < limit)
 
 
 def _count(found: Section, what: str, share: float, kept: Sequence[bool]) -> None:

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 from discovery_row import Row
-from hidden_effects import LEFT_OUT, TEST, TRAIN, Case
+from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, Case
 
 from jointscope.graphs.calibrate import calibrate
 from jointscope.graphs.compare import compare_model
-from jointscope.graphs.diagnosis_result import Diagnosis
+from jointscope.graphs.diagnose import SUSPICION
+from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discover import discover
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.effect_editing import add_effect
@@ -24,6 +25,9 @@ from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.simulator import Disturbance, simulate
+
+FAR = 3.0  # times the values of the robot file
+LEADERS = 5  # candidates that are kept in a row
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ def run_case(case: Case) -> Row:
     recordings = _simulate(case)
     began = time.perf_counter()
     try:
-        found = discover(_model(case), [recordings.train], holdout=recordings.test)
+        found = discover(_model(case), [recordings.train], holdout=recordings.test, missing_torque=False)
     except JointscopeError as err:
         seconds = time.perf_counter() - began
         return Row(case.name, case.kind, case.truth, seconds=seconds, error=str(err).splitlines()[0])
@@ -67,8 +71,10 @@ def _simulate(case: Case) -> Recordings:
 
 
 def _model(case: Case) -> Robot:
-    """The ready robot without what the case leaves out."""
+    """The ready robot without what the case leaves out, from start values that are far off where it says so."""
     robot = load_robot("doggy")
+    if case.circumstance == FAR_START:
+        return robot.with_values({n: FAR * p.value for n, p in robot.parameters.items() if not p.fixed})
     if not case.left_out:
         return robot
     text = robot.path.read_text(encoding="utf-8").replace("urdf: doggy.urdf", f"urdf: {robot.tree.urdf.resolve()}")
@@ -103,7 +109,16 @@ def _row(case: Case, recordings: Recordings, found: Discovery, seconds: float) -
         adequate=found.adequate,
         seconds=seconds,
         stages=dict(diagnosis.wall_seconds) if diagnosis else {},
+        suspicions=tuple(p for p in diagnosis.paragraphs if p.startswith(SUSPICION)) if diagnosis else (),
+        leaders=tuple(map(_leader, diagnosis.candidates[:LEADERS])) if diagnosis else (),
+        stop=found.stop_reason,
     )
+
+
+def _leader(candidate: Candidate) -> str:
+    """One of the best candidates in one line."""
+    share = f", explains {100 * candidate.share:.1f} %" if candidate.refitted else ""
+    return f"{candidate.label}: {candidate.verdict}, score {candidate.score:.3g}{share}"
 
 
 def _accepted(found: Discovery) -> tuple[str, ...]:

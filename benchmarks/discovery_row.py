@@ -7,6 +7,16 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 MATTERS = 1.1  # times the held-out error of the true structure; an effect below changes little
+MISTAKE_WORDS = {"swapped_axes": "axes", "wrong_gear": "gear ratio"}
+FRICTION = (
+    "motor_viscous",
+    "motor_stribeck",
+    "load_dependent_friction",
+    "asymmetric_friction",
+    "link_viscous",
+    "link_coulomb",
+    "coriolis",
+)
 AS_GOOD = 1.1  # times the held-out error of the true structure
 
 
@@ -28,6 +38,9 @@ class Row:
         adequate: whether the last model is called adequate.
         seconds: of the whole discovery.
         stages: seconds of the first diagnosis by stage.
+        suspicions: what the first diagnosis says to look at before any effect.
+        leaders: best candidates of the first diagnosis, one line each.
+        stop: why the discovery stopped.
         error: one line where the discovery ended with an error, else "".
     """
 
@@ -47,6 +60,9 @@ class Row:
     adequate: bool | None = None
     seconds: float = 0.0
     stages: dict[str, float] = field(default_factory=dict)
+    suspicions: tuple[str, ...] = ()
+    leaders: tuple[str, ...] = ()
+    stop: str = ""
     error: str = ""
 
     @property
@@ -65,6 +81,31 @@ class Row:
         return tuple(label for label in self.accepted if label not in self.numerics)
 
     @property
+    def explained(self) -> float | None:
+        """Share of the squared error above the floor that the last model has taken away; None where not known."""
+        if not (self.base_error and self.final_error and self.floor and self.base_error > self.floor):
+            return None
+        return (self.base_error**2 - self.final_error**2) / (self.base_error**2 - self.floor**2)
+
+    @property
+    def named(self) -> bool:
+        """Whether a mistake is told by what it is: the words for it, and the name of what it sits in."""
+        said = " ".join((self.error, *self.suspicions))
+        for label in self.truth:
+            mistake, owner = label.split("@")
+            if mistake in MISTAKE_WORDS:
+                if MISTAKE_WORDS[mistake] not in said or (owner != "robot" and owner not in said):
+                    return False
+            elif label not in self.accepted and not self.look_alike:
+                return False
+        return bool(self.truth) or not self.physics
+
+    @property
+    def blamed(self) -> tuple[str, ...]:
+        """Friction and Coriolis among what was accepted though it is not there."""
+        return tuple(a for a in self.physics if a.split("@")[0] in FRICTION and a not in self.truth)
+
+    @property
     def as_good(self) -> bool | None:
         """Whether the last model predicts as well as one of the true structure; None where that is not known."""
         if not self.final_error or not self.true_error:
@@ -78,5 +119,5 @@ class Row:
     @staticmethod
     def of_json(found: dict[str, Any]) -> Row:
         """Back from a line of JSON."""
-        lists = {key: tuple(found[key]) for key in ("truth", "ranks", "accepted", "numerics")}
+        lists = {key: tuple(found[key]) for key in ("truth", "ranks", "accepted", "numerics", "suspicions", "leaders")}
         return Row(**{**found, **lists})

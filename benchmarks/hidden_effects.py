@@ -87,7 +87,17 @@ HARD: Mapping[str, Mapping[str, Any]] = {
     "disturbed": {"disturbance": {"link": 0.3, "motor": 0.3, "correlation_time": 0.02}},
     "jittery": {"jitter": 2e-4, "drop": 0.02},
 }
-MISTAKES = ("swapped_axes@imu2", "swapped_axes@imu1:swap=23", "wrong_gear@joint1", "wrong_gear@robot:factor=1.05")
+FAR_START = "start values 3 times off"
+MISTAKES = (
+    ("swapped_axes@imu2", ""),
+    ("swapped_axes@imu1:swap=23", ""),
+    ("wrong_gear@joint1", ""),
+    ("wrong_gear@robot:factor=1.05", ""),
+    ("wrong_gear@joint2", ""),
+    ("wrong_gear@joint3", ""),
+    ("inertia_error@joint1:izz=0.01", ""),
+    ("", FAR_START),
+)
 
 CLEAN = 20
 TRAIN, TEST = 20.0, 8.0  # [s]
@@ -104,7 +114,7 @@ class Case:
         hidden: texts ID@OWNER[:param=value,...] for the simulator.
         left_out: ID@OWNER that the model leaves out, see LEFT_OUT.
         seed: of the simulation.
-        circumstance: a key of HARD, or "".
+        circumstance: a key of HARD, FAR_START, or "".
     """
 
     kind: str
@@ -134,7 +144,7 @@ def cases() -> list[Case]:
         "pair": [(pair, (), "") for pair in PAIRS],
         "outside": [((text,), (), "") for text in OUTSIDE],
         "hard": [((text,) if text else (), (), how) for how in HARD for text in IN_HARD_RECORDINGS],
-        "mistake": [((text,), (), "") for text in MISTAKES],
+        "mistake": [((text,) if text else (), (), how) for text, how in MISTAKES],
     }
     return [
         Case(kind, texts, left_out, FIRST_SEED[kind] + i, how, HARD.get(how, {}))

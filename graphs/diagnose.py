@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 LEADERS = 3  # candidates that are refitted
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
+SUSPICION = "Look at this before any effect"  # how a paragraph about a plain mistake begins
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -57,7 +58,9 @@ def diagnose(
     *,
     base: BaseModel | None = None,
     comparison: ModelComparison | None = None,
+    validation: ValidationError | None = None,
     leaders: int = LEADERS,
+    missing_torque: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Ranks the effects that a model lacks.
@@ -68,7 +71,9 @@ def diagnose(
         holdout: scored once per refit and reported; it never chooses.
         base: the model calibrated with these recordings, if that was done.
         comparison: of that model with the held-out recording, else with the first training recording, if it was made.
+        validation: errors of that model on the validation blocks, if they are known.
         leaders: number of candidates to refit.
+        missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -87,7 +92,7 @@ def diagnose(
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
     spans = base.spans()[1]
-    before = validation_error(base, base.robot, base.calibrations, spans)
+    before = validation or validation_error(base, base.robot, base.calibrations, spans)
     trialled, failed = _refit_leaders(base, scored, before.error, holdout, leaders, report)
     clock.stage("refits")
     seconds = sum(span.t1 - span.t0 for span in spans)
@@ -99,10 +104,12 @@ def diagnose(
     if best is not None:
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.floor)
-    report("the missing torque", 0.95)
     refits = {label: t.refit.robot for label, t in trialled.items()}
-    missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
-    clock.stage("missing torque")
+    missing = None
+    if missing_torque:
+        report("the missing torque", 0.95)
+        missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
+        clock.stage("missing torque")
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
@@ -129,7 +136,7 @@ def _suspicions(base: BaseModel) -> list[str]:
     """Plain mistakes that the screening saw: they look like effects, so they come first."""
     notices = [notice for recording in base.recordings for notice in screen(recording, base.robot)]
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
-    return [f"Look at this before any effect: {text}." for text in texts]
+    return [f"{SUSPICION}: {text}." for text in texts]
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:

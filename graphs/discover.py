@@ -17,7 +17,7 @@ from jointscope.graphs.diagnose import ADEQUATE, diagnose, unexplained
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.solver_context import in_solver_context
-from jointscope.graphs.validation import validation_error
+from jointscope.graphs.validation import ValidationError, validation_error
 from jointscope.graphs.verdicts import MATTERS, SURE
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_editing import remove_effect
@@ -38,6 +38,7 @@ def discover(
     save: Save | None = None,
     resume: Sequence[SavedStep] | None = None,
     max_steps: int = MAX_STEPS,
+    missing_torque: bool = True,
     progress: Progress | None = None,
 ) -> Discovery:
     """Finds the effects that a model lacks, one after the other.
@@ -49,13 +50,14 @@ def discover(
         save: called with the number of each finished step and the step; returns the robot file it wrote.
         resume: finished steps of an earlier run; the search goes on after the last.
         max_steps: effects to add at the most.
+        missing_torque: estimate the missing torque at every step, too; pictures need it, no verdict does.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps)
+    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps, missing_torque)
     return search.run(robot, resume or ())
 
 
@@ -69,9 +71,11 @@ class _Search:
         save: Save | None,
         report: Progress,
         max_steps: int,
+        missing_torque: bool,
     ):
         self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
-        self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
+        self.max_steps, self.missing_torque, self.steps = max_steps, missing_torque, list[DiscoveryStep]()
+        self.errors: ValidationError | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
         """All steps."""
@@ -81,7 +85,7 @@ class _Search:
         start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
         base = BaseModel.of(start, self.recordings)
         if not self.steps:
-            self._add_step(None, None, base, "The base model.")
+            self._add_step(None, None, base, "The base model.", self._training_errors(base))
         stop, diagnosis = self._loop(base)
         last = self.steps[-1]
         adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE
@@ -92,9 +96,15 @@ class _Search:
         refused: set[str] = set()
         while True:
             share = added / self.max_steps
-            known = self.steps[-1].comparison
             diagnosis = diagnose(
-                base.robot, self.recordings, self.holdout, base=base, comparison=known, progress=self._part(share)
+                base.robot,
+                self.recordings,
+                self.holdout,
+                base=base,
+                comparison=self.steps[-1].comparison,
+                validation=self.errors,
+                missing_torque=self.missing_torque,
+                progress=self._part(share),
             )
             self._attach(diagnosis)
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
@@ -114,13 +124,14 @@ class _Search:
         self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
         try:
             grown = BaseModel.of(diagnosis.refits[candidate.label], self.recordings, start=base)
-            error = self._training_error(grown)
+            errors = self._training_errors(grown)
         except JointscopeError:
-            error = float("inf")
-        if not error**2 < (1.0 - MATTERS) * self.steps[-1].train_error ** 2:
+            errors = None
+        before = self.steps[-1].train_error
+        if errors is None or not errors.error**2 < (1.0 - MATTERS) * before**2:
             refused.add(candidate.label)
             return None
-        self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, self.steps[-1].train_error, error))
+        self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, before, errors.error), errors)
         return grown
 
     def _without_idle(self, base: BaseModel) -> BaseModel:
@@ -131,21 +142,23 @@ class _Search:
                 continue
             try:
                 smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
-                error = self._training_error(smaller)
+                errors = self._training_errors(smaller)
             except JointscopeError:
                 continue
-            if error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
-                self._add_step(None, here.label, smaller, f"{here.label} fell back to null and was taken out.")
+            if errors.error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
+                self._add_step(None, here.label, smaller, f"{here.label} fell back to null and was taken out.", errors)
                 base = smaller
         return base
 
-    def _add_step(self, added: str | None, removed: str | None, base: BaseModel, paragraph: str) -> None:
+    def _add_step(
+        self, added: str | None, removed: str | None, base: BaseModel, paragraph: str, errors: ValidationError
+    ) -> None:
         comparison = compare_model(f"step {len(self.steps)}", base.robot, self.holdout or self.recordings[0])
         step = DiscoveryStep(
             added=added,
             removed=removed,
             robot=base.robot,
-            train_error=self._training_error(base),
+            train_error=errors.error,
             heldout_error=comparison.error if self.holdout is not None else float("nan"),
             floor=comparison.floor,
             diagnosis=None,
@@ -155,6 +168,7 @@ class _Search:
         if self.save is not None:
             step = replace(step, robot_file=self.save(len(self.steps), step))
         self.steps.append(step)
+        self.errors = errors
 
     def _restore(self, saved: SavedStep) -> None:
         comparison = compare_model(f"step {len(self.steps)}", saved.robot, self.holdout or self.recordings[0])
@@ -177,8 +191,8 @@ class _Search:
         """The last step learns what was found with it as the base."""
         self.steps[-1] = replace(self.steps[-1], diagnosis=diagnosis)
 
-    def _training_error(self, base: BaseModel) -> float:
-        return validation_error(base, base.robot, base.calibrations, base.spans()[1]).error
+    def _training_errors(self, base: BaseModel) -> ValidationError:
+        return validation_error(base, base.robot, base.calibrations, base.spans()[1])
 
     def _part(self, start: float) -> Progress:
         width = 1.0 / (self.max_steps + 1)

@@ -29,7 +29,7 @@ from jointscope.graphs.trials import Trial
 
 Array = NDArray[np.float64]
 
-BATCH = 64  # columns at once: bounds the memory
+BATCH = 16  # columns at once: bounds the memory; with more, most of the time goes into asking for memory
 BLOCK = 0.5  # [s] of the robust variance
 DETERMINED = 0.5  # [prior sigma] a size known better than this is determined by the recordings
 

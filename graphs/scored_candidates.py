@@ -143,8 +143,7 @@ def _at_noise(level: float, segments: Sequence[Segment], trials: list[Trial]) ->
     for segment in segments:
         noise = segment.problem.dynamics.steps.noise
         factors = np.full(len(noise.link_velocity) + len(noise.motor_velocity) + len(noise.memory), level)
-        problem = segment.problem.with_noise(scaled(noise, factors))
-        quieter.append(Segment.of(problem, segment.signals.x, segment.calibration))
+        quieter.append(segment.with_noise(scaled(noise, factors)))
     return ScoreTest(quieter).each(trials)
 
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ class TrialSignals:
         stiffness, damping: of every joint, shape (n,); zero for rigid ones.
         tau_spring: shape (m + 1, n) [N m].
         inertia: of each motor, shape (n,) [kg m2].
+        shared: what trials that differ in their shapes alone have in common, by label; they fill it.
     """
 
     robot: Robot
@@ -52,6 +54,7 @@ class TrialSignals:
     damping: Array
     tau_spring: Array
     inertia: Array
+    shared: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(problem: BagProblem, x: Array, calibration: Calibration) -> TrialSignals:

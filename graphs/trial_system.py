@@ -11,7 +11,7 @@ on (shared values, trials). Nothing is solved anew for a trial.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from jointscope.graphs.banded_solver import Elimination, eliminate
 from jointscope.graphs.columns.column import Column, SensorPart
 from jointscope.graphs.normal_equations import Linearized, accumulate, add_at, linearize_all, whitened
 from jointscope.graphs.trial_signals import TrialSignals
+from jointscope.robots.robot import ProcessNoise
 from jointscope.robots.sensors import Gyro
 
 Array = NDArray[np.float64]
@@ -63,6 +64,15 @@ class Segment:
             stamps.append(np.array([next(placed) for _ in range(count)]))
         elimination = eliminate(accumulate(linearized, x, calibration))
         return Segment(problem, calibration, TrialSignals.of(problem, x, calibration), linearized, stamps, elimination)
+
+    def with_noise(self, noise: ProcessNoise) -> Segment:
+        """The same with another process noise; only weights change."""
+        linearized: list[Linearized] = [
+            (factor.with_noise(noise) if isinstance(factor, DynamicsFactor) else factor, ticks, linear)
+            for factor, ticks, linear in self.linearized
+        ]
+        elimination = eliminate(accumulate(linearized, self.signals.x, self.calibration))
+        return replace(self, problem=self.problem.with_noise(noise), linearized=linearized, elimination=elimination)
 
 
 @dataclass(frozen=True)
@@ -144,7 +154,8 @@ def trial_system(segment: Segment, rows: Sequence[TrialRows], k: int) -> TrialSy
     """
     base = segment.elimination
     m, d, p = len(base.W) // base.d, base.d, base.W.shape[1]
-    B, C_pk, C_kk, g_k = np.zeros((m, d, k)), np.zeros((p, k)), np.zeros((k, k)), np.zeros(k)
+    # LAPACK wants column after column
+    B, C_pk, C_kk, g_k = np.zeros((k, m, d)).transpose(1, 2, 0), np.zeros((p, k)), np.zeros((k, k)), np.zeros(k)
     columns = _block_columns(segment.calibration)
     for part in rows:
         flat = part.by_trial.reshape(-1, k)
@@ -154,7 +165,7 @@ def trial_system(segment: Segment, rows: Sequence[TrialRows], k: int) -> TrialSy
             C_pk[columns[block]] += J.reshape(-1, J.shape[2]).T @ flat
         for i, J in enumerate(part.by_state):
             add_at(B, part.ticks + i, J.transpose(0, 2, 1) @ part.by_trial)
-    W, info = lapack.dtbtrs(base.L, np.asfortranarray(B.reshape(m * d, k)), uplo="L", overwrite_b=1)
+    W, info = lapack.dtbtrs(base.L, B.reshape(m * d, k), uplo="L", overwrite_b=1)
     assert info == 0
     H = np.block([[base.S, C_pk - base.W.T @ W], [(C_pk - base.W.T @ W).T, C_kk - W.T @ W]])
     return TrialSystem(H, np.concatenate([base.s, g_k - W.T @ base.w]), W)

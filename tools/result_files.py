@@ -43,6 +43,11 @@ class ResultFiles:
         """Those that were asked for."""
         return tuple(path for path in (self.robot, self.report, self.rrd, self.json) if path is not None)
 
+    @property
+    def pictures(self) -> bool:
+        """Whether anything with pictures was asked for."""
+        return self.report is not None or self.rrd is not None
+
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Adds --report, --rrd and --json, which every verb that estimates something takes."""

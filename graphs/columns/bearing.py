@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of a soft bearing, by its compliance: a tilt rings, gyros see its rate, the joints its inertia."""
+"""Columns of a soft bearing, by its compliance: a tilt rings, gyros see its rate, the joints its inertia.
+
+Only the ringing depends on the resonance that is tried; the rest is worked out once for each bearing.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,42 +16,60 @@ from scipy.signal import bilinear, lfilter
 from jointscope.graphs.columns.column import Column, SensorColumn, SensorPart
 from jointscope.graphs.trial_signals import TrialSignals
 from jointscope.graphs.trials import Trial
-from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.structured_tree import bearing_names, with_bearings
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class _Hinge:
+    """One of the two hinges, along the smoothed motion.
+
+    Attributes:
+        reaction: torque that the bearing carries about it, shape (m + 1,) [N m].
+        coupling: rows of the mass matrix between the links and it, shape (m + 1, n_link) [kg m2].
+        seen: what every gyro sees of a tilt and of its speed, by name, shape (m + 1, 3) each.
+    """
+
+    reaction: Array
+    coupling: Array
+    seen: Mapping[str, tuple[Array, Array]]
+
+
 def bearing_columns(trial: Trial, s: TrialSignals) -> list[Column]:
     """One column for the compliance of each hinge: accelerations and what gyros see."""
-    owner, layout = trial.here.owner, s.model.layout
+    hinges = s.shared.get(trial.label)
+    if hinges is None:
+        hinges = s.shared[trial.label] = _hinges(trial.here.owner, s)
+    omega, ratio = 2.0 * np.pi * trial.shapes["frequency"], trial.shapes["damping_ratio"]
+    found, n = [], s.model.layout.n_link
+    for hinge in hinges:
+        tilt = -_resonance(hinge.reaction, s.ticks, omega, ratio)
+        speed = np.gradient(tilt, s.ticks)
+        tau = np.zeros((len(s.ticks), s.model.layout.n_rates))
+        tau[:, :n] = -hinge.coupling * np.gradient(speed, s.ticks)[:, None]
+        rates = {name: by_q * tilt[:, None] + by_v * speed[:, None] for name, (by_q, by_v) in hinge.seen.items()}
+        found.append(Column(at_ticks=s.accelerations(tau), reading=_interpolated(rates, s.ticks)))
+    return found
+
+
+def _hinges(owner: str, s: TrialSignals) -> list[_Hinge]:
+    """Both hinges of a bearing at rest."""
+    layout = s.model.layout
     tree = s.robot.kinematic_tree.with_model(with_bearings(s.robot.kinematic_tree.model, (owner,)))
     names = tree.joints
     old = np.array([names.index(name) for name in layout.links])
     q, v, a = (np.zeros((len(s.ticks), len(names))) for _ in range(3))
     q[:, old], v[:, old], a[:, old] = s.x[:, layout.q_link], s.x[:, layout.v_link], s.a_link
     reaction, M = tree.torque(q, v, a), tree.mass_matrix(q)
-    omega, ratio = 2.0 * np.pi * trial.shapes["frequency"], trial.shapes["damping_ratio"]
+    rates = {gyro.name: tree.body_rate(gyro.body, q, v)[1:] for gyro in s.robot.gyros}
     found = []
-    for name in bearing_names(owner):
-        b = names.index(name)
-        tilt = -_resonance(reaction[:, b], s.ticks, omega, ratio)
-        speed = np.gradient(tilt, s.ticks)
-        tau = np.zeros((len(s.ticks), layout.n_rates))
-        tau[:, : layout.n_link] = -M[:, old, b] * np.gradient(speed, s.ticks)[:, None]
-        rates = _gyro_rates(s, tree, q, v, b, tilt, speed)
-        found.append(Column(at_ticks=s.accelerations(tau), reading=_interpolated(rates, s.ticks)))
-    return found
-
-
-def _gyro_rates(
-    s: TrialSignals, tree: RigidTree, q: Array, v: Array, b: int, tilt: Array, speed: Array
-) -> dict[str, Array]:
-    """What every gyro sees of a tilting bearing, by name, shape (m + 1, 3) [rad/s]."""
-    found = {}
-    for gyro in s.robot.gyros:
-        _, by_q, by_v = tree.body_rate(gyro.body, q, v)
-        found[gyro.name] = (by_q[:, :, b] * tilt[:, None] + by_v[:, :, b] * speed[:, None]) @ gyro.R_imu_body.T
+    for b in map(names.index, bearing_names(owner)):
+        seen = {}
+        for gyro in s.robot.gyros:
+            by_q, by_v = rates[gyro.name]
+            seen[gyro.name] = by_q[:, :, b] @ gyro.R_imu_body.T, by_v[:, :, b] @ gyro.R_imu_body.T
+        found.append(_Hinge(reaction[:, b], M[:, old, b], seen))
     return found
 
 

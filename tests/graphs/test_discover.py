@@ -76,7 +76,7 @@ class MadeUp:
                 robot.parameters[known.name] = replace(known, value=p.null if gone else 1.0, sigma=0.1)
         return SimpleNamespace(robot=robot, calibrations=(), spans=lambda: ([], []))
 
-    def diagnose(self, robot, recordings, holdout, base=None, comparison=None, progress=None):
+    def diagnose(self, robot, recordings, holdout, **known):
         have = self.labels(robot)
         self.diagnosed.append(have)
         candidates, refits = [], {}

@@ -46,9 +46,9 @@ def run(args: argparse.Namespace) -> int:
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
-        found = diagnose(robot, recordings, holdout, progress=progress)
+        found = diagnose(robot, recordings, holdout, missing_torque=files.pictures, progress=progress)
         result = diagnosis_of(found, recordings, holdout)
-        if files.report is not None or files.rrd is not None:
+        if files.pictures:
             progress("writing", 1.0)
         write_diagnosis(result, files)
     print(diagnosis_text(result))

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
         result = _discover(args, robot, recordings, holdout, progress)
-        if files.report is not None or files.rrd is not None:
+        if files.pictures:
             progress("writing", 1.0)
         write_discovery(result, files, robot.path.name)
     print(discovery_text(result))
@@ -88,6 +88,7 @@ def _discover(
             save=state.save,
             resume=saved or None,
             max_steps=MAX_STEPS,
+            missing_torque=ResultFiles.of(args).pictures,
             progress=progress,
         )
     except KeyboardInterrupt:
