@@ -7,6 +7,7 @@ history of half a second holds all that a delay or a lag of the catalogue reache
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 KEPT = 0.5  # [s] of history beyond the lag where effects need it
 PERIOD_SHARE = 0.02  # weight of a new distance between commands in the running estimate of their period
+CHANGE_SHARE = 5e-4  # the same for the mean square of changes: the last two thousand commands
+SAME_TIME = 1e-6  # [s]
 TYPICAL = 3.0  # distances up to this many periods count as one period with jitter
 
 
@@ -44,7 +47,7 @@ class CommandHistory:
         self._times: list[float] = []
         self._u: list[Array] = []
         self.period = float("inf")
-        self.typical_change = np.zeros(robot.n)
+        self.typical_change, self._changes_seen = np.zeros(robot.n), 0
 
     def __len__(self) -> int:
         return len(self._times)
@@ -85,13 +88,29 @@ class CommandHistory:
         weights = np.diff(edges)
         return weights @ np.array(self._u[first:last]) / (weights.sum() + before)
 
-    def missing(self, t0: float, t1: float) -> float:
-        """Time between t0 and t1 in which, by the usual period, another command should have come [s]."""
-        i = bisect_right(self._times, t0 + 1e-9) - 1
-        if i < 0 or not np.isfinite(self.period):
-            return 0.0
-        held_until = self._times[i] + 1.5 * self.period
-        return max(t1 - max(held_until, t0), 0.0) if i + 1 == len(self._times) or self._times[i + 1] >= t1 else 0.0
+    def doubt(self, t0: float, t1: float) -> tuple[Array, Array] | None:
+        """What a command that should have come between t0 and t1, but did not, leaves open.
+
+        It lay somewhere between the commands before and after it. Where there is none after it, it was like the one
+        before, give or take the usual change.
+
+        Returns:
+            Expected change of the mean command of the step, and its standard deviation, shape (n,) each; None where
+            nothing is missing.
+        """
+        i = bisect_right(self._times, t0 + SAME_TIME) - 1
+        if i < 0 or not math.isfinite(self.period):
+            return None
+        known_until = self._times[i] + self.period
+        following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
+        missing = min(t1, following) - max(t0, known_until)
+        if missing < 0.5 * self.period:
+            return None
+        share = missing / (t1 - t0)
+        if following > t1 + SAME_TIME:
+            return np.zeros_like(self.typical_change), share * self.typical_change
+        change = self._u[i + 1] - self._u[i]
+        return 0.5 * share * change, share * np.abs(change) / math.sqrt(12.0)
 
     def _learn(self, distance: float, change: Array) -> None:
         if distance > 0.0:
@@ -102,8 +121,11 @@ class CommandHistory:
                 # the shortest usual distance: lost commands make distances longer, never shorter
                 share = PERIOD_SHARE if distance > self.period else 0.5
                 self.period += share * (min(distance, 1.2 * self.period) - self.period)
+        self._changes_seen += 1
+        share = max(1.0 / self._changes_seen, CHANGE_SHARE)
         mean_square = self.typical_change**2
-        self.typical_change = np.sqrt(mean_square + PERIOD_SHARE * (change**2 - mean_square))
+        # rare jumps dominate, and are what a missing command may have been
+        self.typical_change = np.sqrt(mean_square + share * (change**2 - mean_square))
 
     def _after_effects(self, t0: float, t1: float, last: int) -> Array:
         """As `mean`, with the effects on commands."""

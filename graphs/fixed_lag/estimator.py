@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import math
 import time as clock
+from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +44,7 @@ Array = NDArray[np.float64]
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
 GAP = 0.3  # [s] without a tick after which the estimator begins anew
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
+MOST_REFUSED = 50  # samples taken for glitches that may come back when a late command explains them
 HELD_IN_DOUBT = 0.05  # [s] how long a wrong torque lasts where commands have stopped
 
 
@@ -85,6 +88,7 @@ class FixedLagEstimator:
         self._pending: list[Observation] = []
         self._wanted: float | None = None  # stamp of a command whose tick is not closed yet
         self._late_command = math.inf  # stamp of the oldest late command
+        self._refused: deque[Observation] = deque(maxlen=MOST_REFUSED)
         self._newest_sample = -math.inf
 
     @property
@@ -198,8 +202,10 @@ class FixedLagEstimator:
         for o in own:
             q[o.channels] = o.values
         taken = own[0].taken
-        if self._first and not 0.0 < taken - self._first[-1].time < GAP:
+        if self._first and abs(taken - self._first[-1].time) > GAP:
             self._first.clear()
+        if self._first and taken <= self._first[-1].time:
+            return
         self._first.append(EncoderSample(taken, q - np.asarray(encoder.zero)))
         if is_enough(self._first):
             self._start()
@@ -211,6 +217,7 @@ class FixedLagEstimator:
         self._engine.start(time, state)
         self._first.clear()
         self._pending.clear()
+        self._refused.clear()
         self._wanted, self._late_command = None, math.inf
         self.status.running = True
         self._log.tell(time, "started", "estimator", f"states are estimated from {time:.3f} s on")
@@ -251,8 +258,8 @@ class FixedLagEstimator:
             for o in self._pending:
                 (now if o.taken <= time + AT_TICK else later).append(o)
             self._pending = later
-            u = self._commands.mean(engine.time, time)
-            innovations += engine.advance(time, u, self._doubt(engine.time, time, u), now)
+            u, doubt = self._acting(engine.time, time)
+            innovations += engine.advance(time, u, doubt, now)
         if self._wanted is not None and time >= self._wanted - AT_TICK:
             self._wanted = None
         self._finish(innovations, now, clock.perf_counter() - began)
@@ -261,7 +268,8 @@ class FixedLagEstimator:
         """Messages about times before the newest tick."""
         engine, found = self._engine, list[Innovation]()
         if self._late_command < math.inf:
-            engine.correct_commands(self._late_command, self._commands.mean)
+            engine.correct_commands(self._late_command, self._acting)
+            self._readmit(self._late_command)
             self._late_command = math.inf
         late = [o for o in self._pending if o.taken <= engine.time + AT_TICK]
         if late:
@@ -277,6 +285,14 @@ class FixedLagEstimator:
                 found = engine.late(inside)
                 self._count(inside, found)
         return found
+
+    def _readmit(self, since: float) -> None:
+        """Samples that were taken for glitches get another chance where the commands were not what they seemed."""
+        for o in self._refused:
+            if o.taken >= since:
+                self._pending.append(o)
+                self.status.dropped[o.sensor]["outlier"] -= 1
+        self._refused.clear()
 
     def _finish(self, innovations: list[Innovation], used: list[Observation], seconds: float) -> None:
         """Counts, alarms, sanity, listener."""
@@ -302,6 +318,16 @@ class FixedLagEstimator:
         for innovation in innovations:
             if not innovation.used:
                 self._intake.outlier(innovation)
+                self._refuse(innovation, used)
+
+    def _refuse(self, innovation: Innovation, used: list[Observation]) -> None:
+        """Remembers the refused channels of a sample for a while."""
+        names = self.robot.sensors[innovation.sensor].channels
+        for o in used:
+            if (o.sensor, o.stamp) == (innovation.sensor, innovation.time):
+                mask = np.array([names[c] in innovation.channels for c in o.channels.tolist()])
+                if mask.any():
+                    self._refused.append(replace(o, channels=o.channels[mask], values=o.values[mask], sigma=o.sigma[mask]))
 
     def _tell_alarm(self, channel: str, mean_square: float, begins: bool) -> None:
         self.status.alarms = tuple(self._consistency.alarms)
@@ -319,17 +345,20 @@ class FixedLagEstimator:
         self.status.running, self.status.restarts = False, self.status.restarts + 1
         self._first.clear()
         self._pending.clear()
+        self._refused.clear()
         self._wanted, self._late_command = None, math.inf
         self._log.tell(t, "restarted", "estimator", f"{reason}; the estimator begins anew, biases are kept")
 
-    def _doubt(self, t0: float, t1: float, u: Array) -> Array | None:
-        """Standard deviation of the torques that missing commands leave unknown over a step, shape (n,)."""
-        gain = np.abs(self._engine.torque_gain)
+    def _acting(self, t0: float, t1: float) -> tuple[Array, Array | None]:
+        """Mean command over a step, and the standard deviation of the torques that missing commands leave open."""
+        commands, gain = self._commands, np.abs(self._engine.torque_gain)
+        u = commands.mean(t0, t1)
         if self._watch.command_is_lost(t1):
-            wrong = gain * (np.abs(u) + self._commands.typical_change)
-            return wrong * math.sqrt(HELD_IN_DOUBT / (t1 - t0))
-        missing = self._commands.missing(t0, t1)
-        return gain * self._commands.typical_change * (missing / (t1 - t0)) if missing > 0.0 else None
+            # the drives may do anything between holding the last command and nothing
+            wrong = gain * (np.abs(u) + commands.typical_change)
+            return u, wrong * math.sqrt(HELD_IN_DOUBT / (t1 - t0))
+        missing = commands.doubt(t0, t1)
+        return (u, None) if missing is None else (u + missing[0], gain * missing[1])
 
     def _state_of(self, time: float, found: NewestState) -> EstimatedState:
         layout, P = self._engine.layout, found.covariance

@@ -25,13 +25,35 @@ from jointscope.graphs.fixed_lag.observation import AT_TICK, Observation, Observ
 from jointscope.graphs.fixed_lag.outlier_gate import OutlierGate
 from jointscope.graphs.fixed_lag.smoother_window import Rows, SmootherWindow
 from jointscope.graphs.fixed_lag.step_noise import StepNoise
-from jointscope.graphs.fixed_lag.tick_step import RatesAt, take_step
+from jointscope.graphs.fixed_lag.tick_step import RatesAt, TickStep, take_step
 from jointscope.robots.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
+Acting = Callable[[float, float], tuple[Array, Array | None]]
 COMMITTED_TOGETHER = 5  # ticks that wait for iSAM2; the newest state does not need it
+
+
+@dataclass
+class PastStep:
+    """A step that may be weighed anew when commands come late.
+
+    Attributes:
+        start: state in which it was linearised, shape (D,).
+        h: length [s].
+        u: mean command, shape (n,).
+        step: its linearization.
+        by_parameters: change of its end per adapted parameter, before the dynamics of the end, shape (d, p).
+        moved: how the defect has changed by other commands since, shape (d,).
+    """
+
+    start: Array
+    h: float
+    u: Array
+    step: TickStep
+    by_parameters: Array
+    moved: Array
 
 
 @dataclass
@@ -43,18 +65,14 @@ class PastTick:
         time: [s].
         nominal: state from which deviations count, shape (D,).
         slot: of the factor of the step that led here; -1 for the first tick.
-        rows: of that step.
-        u: mean command of that step, shape (n,).
-        b_by_command: change of the rows' b per command, shape (r, n).
+        step: that led here; None for the first tick.
     """
 
     number: int
     time: float
     nominal: Array
     slot: int = -1
-    rows: Rows | None = None
-    u: Array | None = None
-    b_by_command: Array | None = None
+    step: PastStep | None = None
 
 
 class TickEngine:
@@ -117,8 +135,10 @@ class TickEngine:
             observations: taken in between or at the new tick.
         """
         before, x0 = self.past[-1], self.newest
-        rows, predicted, b_by_command, self._rates = self._predicted(time, u, doubt)
-        here = PastTick(before.number + 1, time, predicted.mean.copy(), -1, rows, u, b_by_command)
+        predicted, step, T = self._predicted(time, u, doubt)
+        self._rates = step.step.end
+        here = PastTick(before.number + 1, time, predicted.mean.copy(), -1, step)
+        rows = self._step_rows(before, step, T)
         self.window.add_tick(here.number, time)
         first_row = self.window.add_rows(rows)
         innovations: list[Innovation] = []
@@ -177,28 +197,30 @@ class TickEngine:
         self._reread()
         return innovations
 
-    def correct_commands(self, since: float, mean: Callable[[float, float], Array]) -> None:
-        """Commands have come late: steps that end after a time get other torques.
+    def correct_commands(self, since: float, acting: Acting) -> None:
+        """Commands have come late: steps that end after a time get other torques and other doubts.
 
         Args:
             since: stamp of the oldest of these commands [s].
-            mean: gives the mean command between two times, shape (n,).
+            acting: gives mean command and doubt between two times, as `advance` takes them.
         """
         self._commit()
         for start, tick in itertools.pairwise(self.past):
-            if tick.time > since and tick.rows is not None and tick.u is not None and tick.b_by_command is not None:
-                u = mean(start.time, tick.time)
-                b = tick.rows.b + tick.b_by_command @ (u - tick.u)
-                tick.rows, tick.u = Rows(tick.rows.ticks, tick.rows.A, b), u
+            if tick.time > since and tick.step is not None:
+                step = tick.step
+                u, doubt = acting(start.time, tick.time)
+                step.moved = step.moved + step.step.by_torque @ (self.torque_gain * (u - step.u))
+                step.u = u
+                T = self._noise.of_step(step.start[: self.layout.d], step.h, self._extra(step.step, doubt))[0]
                 self.window.remove(tick.slot)
-                self._uncommitted.append((tick, self.window.add_rows(tick.rows)))
+                self._uncommitted.append((tick, self.window.add_rows(self._step_rows(start, step, T))))
         self._reread()
 
     def ahead(self, time: float, u: Array) -> NewestState:
         """The newest state, predicted to a later time with a mean command, shape (n,); nothing is kept."""
         if time <= self.time:
             return self.newest
-        return self._predicted(time, u, None)[1]
+        return self._predicted(time, u, None)[0]
 
     def smoothed(self, covariance: bool) -> tuple[PastTick, Array, Array]:
         """The oldest tick of the window, its mean, shape (D,), and covariance, shape (D, D); NaN if not wanted."""
@@ -228,38 +250,44 @@ class TickEngine:
             tick.slot = int(slots[index])
         self._uncommitted.clear()
 
-    def _predicted(
-        self, time: float, u: Array, doubt: Array | None
-    ) -> tuple[Rows, NewestState, Array, RatesAt | None]:
-        """One step from the newest state: its rows, the state it leads to, change of b per command, rates there."""
+    def _predicted(self, time: float, u: Array, doubt: Array | None) -> tuple[NewestState, PastStep, Array]:
+        """The state to which a step from the newest one leads, the step, and the whitening of its defect."""
         layout, before, x0 = self.layout, self.past[-1], self.newest
-        d, h = layout.d, time - before.time
-        own = x0.mean[:d]
+        d, h, own = layout.d, time - before.time, x0.mean[: layout.d]
         if self._adaptation.follow(x0.mean[layout.adapted], np.sqrt(np.diag(x0.covariance)[layout.adapted])):
             self._rates = None
         model = self._adaptation.model
         step = take_step(model, self._rule, own, model.command_torque(u), h, self._rates)
-        extra = None
-        if doubt is not None:
-            extra = np.sqrt(((step.by_torque[layout.robot.rates] * doubt) ** 2).sum(axis=1))
-        T, G = self._noise.of_step(own, h, extra)
-        F, Q, A0, A1 = (part.copy() for part in self._walked(h))
+        T, G = self._noise.of_step(own, h, self._extra(step, doubt))
+        F, Q = (part.copy() for part in self._walked(h)[:2])
         F[:d, :d] = step.transition
-        A0[:d, :d], A1[:d, :d] = T @ step.by_start, T @ step.by_end
         spread = step.by_end_inverse @ G
         Q[:d, :d] = spread @ spread.T
-        mean = x0.mean.copy()
+        mean, slopes = x0.mean.copy(), np.zeros((d, 0))
         mean[:d] = step.x1
         if layout.parameters:
             slopes = h * self._adaptation.slopes(own, u)
-            A0[:d, layout.adapted] = -T @ slopes
             F[:d, layout.adapted] = step.by_end_inverse @ slopes
             mean[:d] += F[:d, layout.adapted] @ (x0.mean[layout.adapted] - self._adaptation.at)
         self._transition = F
-        rows = Rows((before.number, before.number + 1), (A0, A1), A0 @ (x0.mean - before.nominal))
-        b_by_command = np.zeros((layout.size, len(u)))
-        b_by_command[:d] = T @ (step.by_torque * self.torque_gain)
-        return rows, x0.predicted(mean, F, Q), b_by_command, step.end
+        return x0.predicted(mean, F, Q), PastStep(x0.mean, h, u, step, slopes, np.zeros(d)), T
+
+    def _extra(self, step: TickStep, doubt: Array | None) -> Array | None:
+        """Standard deviation of velocities and memories over a step from that of the motors' torques, shape (r,)."""
+        if doubt is None:
+            return None
+        return np.asarray(np.sqrt(((step.by_torque[self.layout.robot.rates] * doubt) ** 2).sum(axis=1)))
+
+    def _step_rows(self, before: PastTick, past: PastStep, T: Array) -> Rows:
+        """Whitened rows of a step from a tick."""
+        d, adapted = self.layout.d, self.layout.adapted
+        A0, A1 = (part.copy() for part in self._walked(past.h)[2:])
+        A0[:d, :d], A1[:d, :d] = T @ past.step.by_start, T @ past.step.by_end
+        if self.layout.parameters:
+            A0[:d, adapted] = -T @ past.by_parameters
+        b = A0 @ (past.start - before.nominal)
+        b[:d] += T @ past.moved
+        return Rows((before.number, before.number + 1), (A0, A1), b)
 
     def _walked(self, h: float) -> tuple[Array, Array, Array, Array]:
         """Transition, covariance and rows of what walks over a step; the robot's own part is zero."""
