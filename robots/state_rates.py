@@ -165,9 +165,7 @@ def _linear_torques(
 ) -> Array:
     """Torques per state of springs, dampers, bearings and back-EMF, shape (r, d)."""
     x = np.zeros((1, robot.layout.size))
-    without_friction = {
-        name: 0.0 if name.endswith(".coulomb_torque") else value for name, value in values.items()
-    }
+    without_friction = {name: 0.0 if name.endswith(".coulomb_torque") else value for name, value in values.items()}
     terms = TorqueTerms.zeros(1, robot.layout, len(parameters.names), derivatives=True)
     springs.add(terms, springs.at(x, values))
     motors.add(terms, x, without_friction)

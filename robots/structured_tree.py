@@ -99,7 +99,9 @@ class StructuredTree:
         tree = self.bodies(values)
         found: dict[str, Array] = {}
         for change in self._changes:
-            torque = inertia_torque(tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale])
+            torque = inertia_torque(
+                tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale]
+            )
             found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         for name, link in self._armature:
             found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]

@@ -34,7 +34,10 @@ class Adaptation:
         self._robot, self.names = robot, tuple(names)
         self._start = np.array([robot.parameters[name].value for name in self.names])
         self._floor = np.array(
-            [SMALLEST * abs(robot.parameters[name].value) if robot.parameters[name].positive else -np.inf for name in names]
+            [
+                SMALLEST * abs(robot.parameters[name].value) if robot.parameters[name].positive else -np.inf
+                for name in names
+            ]
         )
         self._build(self._start)
 

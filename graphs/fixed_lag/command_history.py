@@ -98,19 +98,24 @@ class CommandHistory:
             Expected change of the mean command of the step, and its standard deviation, shape (n,) each; None where
             nothing is missing.
         """
-        i = bisect_right(self._times, t0 + SAME_TIME) - 1
-        if i < 0 or not math.isfinite(self.period):
+        first = bisect_right(self._times, t0 + SAME_TIME) - 1
+        if first < 0 or not math.isfinite(self.period):
             return None
-        known_until = self._times[i] + self.period
-        following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
-        missing = min(t1, following) - max(t0, known_until)
-        if missing < 0.5 * self.period:
-            return None
-        share = missing / (t1 - t0)
-        if following > t1 + SAME_TIME:
-            return np.zeros_like(self.typical_change), share * self.typical_change
-        change = self._u[i + 1] - self._u[i]
-        return 0.5 * share * change, share * np.abs(change) / math.sqrt(12.0)
+        last = bisect_left(self._times, t1 - SAME_TIME)
+        moved, variance, complete = np.zeros_like(self.typical_change), np.zeros_like(self.typical_change), True
+        for i in range(first, last):
+            following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
+            missing = min(t1, following) - max(t0, self._times[i] + self.period)
+            if missing < 0.5 * self.period:
+                continue
+            complete, share = False, missing / (t1 - t0)
+            if following > t1 + SAME_TIME:
+                variance += (share * self.typical_change) ** 2
+            else:
+                change = self._u[i + 1] - self._u[i]
+                moved += 0.5 * share * change
+                variance += (share * change) ** 2 / 12.0
+        return None if complete else (moved, np.sqrt(variance))
 
     def _learn(self, distance: float, change: Array) -> None:
         if distance > 0.0:
@@ -130,9 +135,14 @@ class CommandHistory:
     def _after_effects(self, t0: float, t1: float, last: int) -> Array:
         """As `mean`, with the effects on commands."""
         inner = [t for t in self._times[:last] if t < t0]
-        edges = np.array([*inner, *([t0] if not inner or inner[-1] < t0 else []), *(
-            t for t in self._times[len(inner):last] if t > t0
-        ), t1])
+        edges = np.array(
+            [
+                *inner,
+                *([t0] if not inner or inner[-1] < t0 else []),
+                *(t for t in self._times[len(inner) : last] if t > t0),
+                t1,
+            ]
+        )
         index = np.maximum(np.searchsorted(self._times, edges[:-1], side="right") - 1, 0)
         path = CommandPath(edges, np.array(self._u)[index], self._effects, self._robot.joints)
         u, h = path.acting(self._values)[0], np.diff(edges)

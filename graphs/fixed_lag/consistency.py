@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-
 from jointscope.graphs.fixed_lag.innovation import Innovation
 
 SECONDS = 1.0  # over which squares are averaged

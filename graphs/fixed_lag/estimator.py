@@ -245,7 +245,7 @@ class FixedLagEstimator:
         newest = max((o.taken for o in self._pending), default=-math.inf)
         if newest > self._engine.time + SHORTEST_STEP and (t is None or newest <= t + AT_TICK):
             self._close(newest)
-        elif self._pending and self._wanted is None or self._late_command < math.inf:
+        elif (self._pending and self._wanted is None) or self._late_command < math.inf:
             self._take_late_ones()
 
     def _close(self, time: float) -> None:
@@ -327,7 +327,9 @@ class FixedLagEstimator:
             if (o.sensor, o.stamp) == (innovation.sensor, innovation.time):
                 mask = np.array([names[c] in innovation.channels for c in o.channels.tolist()])
                 if mask.any():
-                    self._refused.append(replace(o, channels=o.channels[mask], values=o.values[mask], sigma=o.sigma[mask]))
+                    self._refused.append(
+                        replace(o, channels=o.channels[mask], values=o.values[mask], sigma=o.sigma[mask])
+                    )
 
     def _tell_alarm(self, channel: str, mean_square: float, begins: bool) -> None:
         self.status.alarms = tuple(self._consistency.alarms)
@@ -392,7 +394,11 @@ def _prior_sigma(robot: Robot, name: str) -> float:
 def _checked(robot: Robot, adapt: Mapping[str, float]) -> dict[str, float]:
     for name, density in adapt.items():
         if name not in robot.parameters:
-            raise EstimatorError(f"no parameter {name!r} to adapt; robot {robot.name!r} has {', '.join(robot.parameters)}")
+            raise EstimatorError(
+                f"no parameter {name!r} to adapt; robot {robot.name!r} has {', '.join(robot.parameters)}"
+            )
         if not (math.isfinite(density) and density > 0.0):
-            raise EstimatorError(f"adapting {name} needs a positive density of its walk [unit/sqrt(s)]; got {density:g}")
+            raise EstimatorError(
+                f"adapting {name} needs a positive density of its walk [unit/sqrt(s)]; got {density:g}"
+            )
     return {name: float(density) for name, density in adapt.items()}

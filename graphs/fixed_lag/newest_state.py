@@ -32,18 +32,18 @@ class NewestState:
         """After a step, with mean as integrated, transition F and covariance Q of the step, shapes (D,), (D, D)."""
         return NewestState(mean, F @ self.covariance @ F.T + Q)
 
-    def update(self, gain_rows: Array, S: Array, residual: Array) -> None:
+    def update(self, with_state: Array, S: Array, residual: Array) -> None:
         """Takes in samples.
 
         Args:
-            gain_rows: covariance of the samples with the state, H P, shape (r, D).
+            with_state: covariance of the innovation with the state, shape (r, D).
             S: covariance of the innovation, shape (r, r).
             residual: measured - predicted, shape (r,).
         """
         factor, info = lapack.dpotrf(S, lower=1)
         if info:
             return  # cannot happen with positive sensor noise; the sample is then worth nothing
-        K, _ = lapack.dpotrs(factor, gain_rows, lower=1)
+        K, _ = lapack.dpotrs(factor, with_state, lower=1)
         self.mean = self.mean + residual @ K
-        P = self.covariance - gain_rows.T @ K
+        P = self.covariance - with_state.T @ K
         self.covariance = 0.5 * (P + P.T)
