@@ -71,8 +71,12 @@ class JointLawAtOneState:
         signals = np.append(own, self._spring @ own[:4])[:, None]
         if by_state is not None:
             signals = signals + self._moves
+        q_link, v_link, q_motor, v_motor = signals[:4]
         at = JointSignals(
-            *signals[:4],
+            q_link=q_link,
+            v_link=v_link,
+            q_motor=q_motor,
+            v_motor=v_motor,
             tau_spring=signals[-1],
             stiffness=self._stiffness,
             sharpness=self._sharpness,

@@ -93,11 +93,10 @@ class StateRates:
             law.add(x, tau, None)
         layout = self.layout
         q, v, torque = x[layout.q_link], x[layout.v_link], tau[: self._n]
-        moving = pin.aba(self._model, self._data, q, v, torque).copy() if self._moving else 0.0
-        a = moving
-        if self._still:
+        a = np.array(pin.aba(self._model, self._data, q, v if self._moving else self._no_velocity, torque))
+        if self._still and self._moving:
             still = pin.aba(self._model, self._data, q, self._no_velocity, torque)
-            a = still + self._scale * (moving - still)
+            a = still + self._scale * (a - still)
         return self._rate(x, tau, a)
 
     def with_jacobian(self, x: Array, command_torque: Array) -> tuple[Array, Array, Array]:

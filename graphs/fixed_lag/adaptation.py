@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.errors import EstimatorError
 from jointscope.robots.robot import Robot
 from jointscope.robots.state_rates import StateRates
 
@@ -63,3 +68,34 @@ class Adaptation:
             StateRates(self._robot, {**named, name: named[name] + step})
             for name, step in zip(self.names, self._steps, strict=True)
         ]
+
+
+def checked_densities(robot: Robot, densities: Mapping[str, float]) -> dict[str, float]:
+    """Densities of the walks of parameters, by full name [unit/sqrt(s)].
+
+    Raises:
+        EstimatorError: no such parameter, one that is not part of the motion, or an impossible density.
+    """
+    outside = {
+        here.parameter(p.name): here.label
+        for here in robot.effects
+        if isinstance(here.effect, ReadingEffect | TimeShift | CommandEffect)
+        for p in here.effect.parameters_of(robot, here.owner)
+    }
+    for name, density in densities.items():
+        if name not in robot.parameters:
+            known = ", ".join(robot.parameters)
+            raise EstimatorError(f"no parameter {name!r} to adapt; robot {robot.name!r} has {known}")
+        if name in outside:
+            raise EstimatorError(f"{name} cannot be adapted: {outside[name]} acts on stamps, readings or commands")
+        if not (math.isfinite(density) and density > 0.0):
+            raise EstimatorError(
+                f"adapting {name} needs a positive density of its walk [unit/sqrt(s)]; got {density:g}"
+            )
+    return {name: float(density) for name, density in densities.items()}
+
+
+def prior_sigmas(robot: Robot, names: Sequence[str]) -> Array:
+    """Standard deviations with which adaptation begins, shape (p,): of the calibration, else of the prior."""
+    found = [robot.parameters[name] for name in names]
+    return np.array([p.sigma if p.sigma is not None else p.prior_sigma for p in found], dtype=float)

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 KEPT = 0.5  # [s] of history beyond the lag where effects need it
 PERIOD_SHARE = 0.02  # weight of a new distance between commands in the running estimate of their period
 CHANGE_SHARE = 5e-4  # the same for the mean square of changes: the last two thousand commands
+HELD_IN_DOUBT = 0.05  # [s] how long a wrong torque lasts where commands have stopped
 SAME_TIME = 1e-6  # [s]
 TYPICAL = 3.0  # distances up to this many periods count as one period with jitter
 
@@ -64,6 +65,10 @@ class CommandHistory:
 
     def add(self, t: float, u: Array) -> None:
         """Takes in a command; it may be older than others."""
+        if self._times and self._times[-1] - t > self._kept:
+            # stamps have jumped back; what was there belongs to another clock
+            self._times.clear()
+            self._u.clear()
         i = bisect_right(self._times, t)
         if i == len(self._times) and i:
             self._learn(t - self._times[-1], u - self._u[-1])
@@ -87,6 +92,16 @@ class CommandHistory:
         before = max(self._times[0] - t0, 0.0)
         weights = np.diff(edges)
         return weights @ np.array(self._u[first:last]) / (weights.sum() + before)
+
+    def acting(self, t0: float, t1: float) -> tuple[Array, Array | None]:
+        """Mean command between two times, and its standard deviation where commands are missing, shape (n,) each."""
+        u, missing = self.mean(t0, t1), self.doubt(t0, t1)
+        return (u, None) if missing is None else (u + missing[0], missing[1])
+
+    def lost(self, t0: float, t1: float) -> tuple[Array, Array | None]:
+        """As `acting` where commands have stopped: drives may do anything between holding the last one and nothing."""
+        u = self.mean(t0, t1)
+        return u, (np.abs(u) + self.typical_change) * math.sqrt(HELD_IN_DOUBT / (t1 - t0))
 
     def doubt(self, t0: float, t1: float) -> tuple[Array, Array] | None:
         """What a command that should have come between t0 and t1, but did not, leaves open.

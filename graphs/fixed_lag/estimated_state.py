@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
+from jointscope.graphs.fixed_lag.newest_state import NewestState
 from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
@@ -61,3 +63,28 @@ class EstimatedState:
     def v_motor(self) -> Array:
         """Motor velocities in link units, shape (n,) [rad/s]."""
         return self.mean[self.layout.motor_v]
+
+
+def state_of(layout: AugmentedLayout, time: float, found: NewestState, age: float) -> EstimatedState:
+    """The estimator's whole state in the words of the robot."""
+    P, d = found.covariance, layout.d
+    sigma = np.sqrt(np.maximum(P.diagonal(), 0.0))
+    values, sigmas = found.mean[layout.adapted].tolist(), sigma[layout.adapted].tolist()
+    return EstimatedState(
+        time=time,
+        mean=found.mean[:d],
+        covariance=P[:d, :d],
+        age=age,
+        layout=layout.robot,
+        biases={name: found.mean[columns] for name, columns in layout.biases.items()},
+        bias_sigmas={name: sigma[columns] for name, columns in layout.biases.items()},
+        parameters=dict(zip(layout.parameters, zip(values, sigmas, strict=True), strict=True)),
+    )
+
+
+def unknown_state(layout: StateLayout, time: float, q: Array | None, age: float) -> EstimatedState:
+    """What is known before there is a first state: the last encoder sample, shape (n,) [rad], if any."""
+    mean = np.zeros(layout.size)
+    if q is not None:
+        mean[layout.motor_q] = mean[layout.joint_q] = q
+    return EstimatedState(time, mean, np.diag(np.full(layout.size, np.inf)), age, layout)

@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.bag_problem import DEFLECTION_SIGMA
+from jointscope.graphs.fixed_lag.adaptation import prior_sigmas
 from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.newest_state import NewestState
+from jointscope.graphs.fixed_lag.observation import Observation
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 WINDOW = 0.02  # [s] of encoder samples
 FEWEST = 5  # encoder samples
-LONGEST_WAIT = 0.5  # [s] after which fewer samples must do
+LONGEST_WAIT = 0.5  # [s] between two samples that belong together; after half of it fewer must do
 STILL = 4.0  # [sigma] spread of the encoders at rest
 REST_VELOCITY = 0.01  # [rad/s] uncertainty at rest; friction holds a motor while the link may still swing a little
 LINK_VELOCITY = 1.0  # [rad/s] of a link against its motor, in motion
@@ -37,12 +39,38 @@ class EncoderSample:
     q: Array
 
 
-def is_enough(samples: Sequence[EncoderSample]) -> bool:
-    """Whether the estimator can begin."""
-    if len(samples) < 2:
-        return False
-    span = samples[-1].time - samples[0].time
-    return (span >= WINDOW and len(samples) >= FEWEST) or span >= LONGEST_WAIT
+class FirstSamples:
+    """Encoder samples until there are enough.
+
+    Args:
+        robot: its encoders.
+    """
+
+    def __init__(self, robot: Robot):
+        self._encoder, self._n = robot.motor_encoder, robot.n
+        self.samples: list[EncoderSample] = []
+
+    @property
+    def newest(self) -> Array | None:
+        """Newest positions, shape (n,) [rad]; None before the first."""
+        return self.samples[-1].q if self.samples else None
+
+    def add(self, observations: Sequence[Observation]) -> bool:
+        """Takes in the groups of channels of one message; returns whether the estimator can begin."""
+        own = [o for o in observations if o.sensor == self._encoder.name]
+        if sum(len(o.values) for o in own) < self._n:
+            return False
+        q = np.empty(self._n)
+        for o in own:
+            q[o.channels] = o.values
+        taken, samples = own[0].taken, self.samples
+        if samples and abs(taken - samples[-1].time) > LONGEST_WAIT:
+            samples.clear()
+        if samples and taken <= samples[-1].time:
+            return False  # older than what is there
+        samples.append(EncoderSample(taken, q - np.asarray(self._encoder.zero)))
+        span = taken - samples[0].time
+        return (span >= WINDOW and len(samples) >= FEWEST) or (span >= LONGEST_WAIT / 2 and len(samples) > 1)
 
 
 def first_state(
@@ -50,7 +78,6 @@ def first_state(
     layout: AugmentedLayout,
     samples: Sequence[EncoderSample],
     walking: NewestState | None,
-    walks: Array,
 ) -> tuple[float, NewestState]:
     """Time and Gaussian of the first tick.
 
@@ -59,7 +86,6 @@ def first_state(
         layout: of the estimator's state.
         samples: encoder samples, in the order of time.
         walking: an earlier estimate whose biases and parameters go on; None for their priors.
-        walks: prior standard deviation of each adapted parameter, shape (p,).
     """
     own, sigma = layout.robot, robot.motor_encoder.sigma
     t = np.array([s.time for s in samples])
@@ -84,5 +110,5 @@ def first_state(
     for gyro in robot.gyros:
         mean[layout.biases[gyro.name]], variance[layout.biases[gyro.name]] = gyro.bias, gyro.bias_prior_sigma**2
     mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
-    variance[layout.adapted] = walks**2
+    variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
     return now, NewestState(mean, np.diag(variance))

@@ -81,7 +81,8 @@ def observed_rows(
         observations: taken in [t0, t1].
         x0: state at the beginning, shape (D,); None where all samples were taken at the end.
         x1: state at the end, shape (D,).
-        t0, t1: of the step [s].
+        t0: beginning of the step [s].
+        t1: end of the step [s].
     """
     d, total = layout.d, sum(len(o.values) for o in observations)
     residual, sigma = np.empty(total), np.empty(total)

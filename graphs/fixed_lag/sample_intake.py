@@ -81,9 +81,9 @@ class SampleIntake:
                 result.append(Observation(name, t, taken, channels, *chosen))
         return result
 
-    def too_late(self, o: Observation, now: float) -> None:
-        """Counts a sample from before the window."""
-        self._drop(o.sensor, now, "too_late", f"{o.sensor}: a sample came {now - o.taken:.3f} s late, after its window")
+    def too_late(self, name: str, t: float, now: float) -> None:
+        """Counts a message from before the window."""
+        self._drop(name, now, "too_late", f"{name}: a message came {now - t:.3f} s late, after its window")
 
     def is_late(self, o: Observation, now: float) -> None:
         """Counts a sample that was used although later ones had come before."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import gtsam
 import numpy as np
@@ -55,7 +56,7 @@ class SmootherWindow:
         self._smoother = gtsam.IncrementalFixedLagSmoother(lag, parameters)
         self._scale, self._zero = scale, np.zeros(len(scale))
         self._graph, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        self._times: dict[int, float] = {}
+        self._times: dict[Any, Any] = {}
         self._removed: list[int] = []
 
     def add_tick(self, tick: int, time: float) -> None:
@@ -67,10 +68,11 @@ class SmootherWindow:
     def add_rows(self, rows: Rows) -> int:
         """A factor for the next commit; returns its place among the slots that this will tell."""
         noise = _unit_noise(len(rows.b))
-        terms: list = []
+        terms: list[Any] = []
         for tick, A in zip(rows.ticks, rows.A, strict=True):
             terms += [_key(tick), A * self._scale]
-        self._graph.add(gtsam.LinearContainerFactor(gtsam.JacobianFactor(*terms, rows.b, noise)))
+        terms += [rows.b, noise]
+        self._graph.add(gtsam.LinearContainerFactor(gtsam.JacobianFactor(*terms)))
         return self._graph.size() - 1
 
     def remove(self, slot: int) -> None:

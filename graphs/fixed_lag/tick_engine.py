@@ -61,6 +61,13 @@ class TickEngine:
         """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
         return self._process.torque_gain
 
+    @property
+    def kept(self) -> NewestState | None:
+        """The newest state if it can be gone on from, else None."""
+        found = getattr(self, "newest", None)
+        good = found is not None and np.isfinite(found.mean).all() and np.isfinite(found.covariance).all()
+        return found if good else None
+
     def start(self, time: float, state: NewestState) -> None:
         """Begins with a Gaussian at a time."""
         self.newest, self.window = state, SmootherWindow(self._lag, self._scale)
@@ -145,13 +152,13 @@ class TickEngine:
             return self.newest
         return self._process.predicted(self.newest, time - self.time, u, None).state
 
-    def smoothed(self, covariance: bool) -> tuple[PastTick, Array, Array]:
-        """The oldest tick of the window, its mean, shape (D,), and covariance, shape (D, D); NaN if not wanted."""
+    def smoothed(self, covariance: bool) -> tuple[float, NewestState]:
+        """Time [s] and state of the oldest tick of the window; its covariance is NaN if not wanted."""
         self._commit()
         oldest = self.past[0]
         mean = self._estimate(oldest)
         P = self.window.covariance(oldest.number) if covariance else np.full((len(mean), len(mean)), np.nan)
-        return oldest, mean, P
+        return oldest.time, NewestState(mean, P)
 
     def from_window(self) -> NewestState:
         """Mean and covariance of the newest tick as the window has them."""
