@@ -47,6 +47,12 @@ EFFECTS = (
     ("clock_offset@imu2:offset=0.003", "clock_offset@robot:offset=-0.003"),
     ("clock_drift@imu2:drift=0.001", "clock_drift@robot:drift=0.0004"),
 )
+# Later additions; they come after everything else of their kind and leave the seeds of the others alone.
+MORE = (
+    "bearing_flexibility@joint1:compliance_x=0.0004,compliance_y=0.0003,product_xz=-0.02,product_yz=0.01",
+    "encoder_scale@joint2:scale=0.02",
+    "encoder_scale@joint3:scale=-0.05",
+)
 # What the recording contains anyway and the model leaves out: changed lines of the robot file.
 LEFT_OUT: Mapping[str, tuple[str, str]] = {
     "coriolis@robot": ("coriolis: true", "coriolis: false"),
@@ -139,7 +145,9 @@ class Case:
 def cases() -> list[Case]:
     """The whole table."""
     hidden: dict[str, list[tuple[tuple[str, ...], tuple[str, ...], str]]] = {
-        "effect": [((text,), (), "") for sizes in EFFECTS for text in sizes] + [((), (lo,), "") for lo in LEFT_OUT],
+        "effect": [((text,), (), "") for sizes in EFFECTS for text in sizes]
+        + [((), (lo,), "") for lo in LEFT_OUT]
+        + [((text,), (), "") for text in MORE],
         "clean": [((), (), "")] * CLEAN,
         "pair": [(pair, (), "") for pair in PAIRS],
         "outside": [((text,), (), "") for text in OUTSIDE],

@@ -108,8 +108,8 @@ class BagFit:
         states: smoothed states (q_link, v_link, q_motor, v_motor), shape (m, 4n).
         sigmas: their standard deviations, shape (m, 4n).
         residuals: by sensor name.
-        process: residual of the dynamics, one column per equation (link, then motor), shape (m - 1, 2n) [rad/s].
-        process_sigma: its standard deviation, shape (m - 1, 2n) [rad/s].
+        process: residual of the dynamics, one column per equation (link, motor, memories), shape (m - 1, r) [rad/s].
+        process_sigma: its standard deviation, shape (m - 1, r) [rad/s].
     """
 
     recording: Recording

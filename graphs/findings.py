@@ -61,11 +61,9 @@ def _process_noise(result: CalibrationResult) -> list[str]:
     robot, said = result.robot, []
     densities = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
     bag = result.bags[0]
-    n = robot.n
-    v = np.hstack([bag.states[:, n : 2 * n], bag.states[:, 3 * n :]])
-    for j, side in enumerate(
-        [f"{joint} link" for joint in robot.joints] + [f"{joint} motor" for joint in robot.joints]
-    ):
+    layout = robot.layout
+    v = bag.states[:, layout.velocities]
+    for j, side in enumerate([f"{name} link" for name in layout.links] + [f"{name} motor" for name in layout.motors]):
         # velocity that the model cannot explain after a tenth of a second, against the velocity itself
         drift, size = densities[j] * np.sqrt(0.1), float(np.sqrt(np.mean(v[:, j] ** 2)))
         if size > 0 and drift > 0.1 * size:

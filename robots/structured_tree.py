@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
+ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # of an inertia in pinocchio's dynamic parameters
 UNIT_CHANGE = 1e-3  # [kg m2] size of the change whose torque is taken as a difference; the torque is linear in it
 
 
@@ -147,11 +148,21 @@ def inertia_changes(robot: Robot, model: pin.Model) -> list[InertiaChange]:
                 found.append(InertiaChange(here.parameter(name), joint, np.asarray(direction, float)))
         elif _form(here.effect) == "bearing":
             present = inertia_about_joint(model, joint)
-            for axis, k in zip("xy", across_axes(model, joint), strict=True):
+            for name, (i, k) in hidden_inertias(model, joint).items():
                 direction = np.zeros(10)
-                direction[4 + (0, 2, 5)[k]] = 1.0
-                found.append(InertiaChange(here.parameter(f"inertia_{axis}"), joint, direction, float(present[k, k])))
+                direction[4 + ENTRIES.index((min(i, k), max(i, k)))] = 1.0
+                found.append(InertiaChange(here.parameter(name), joint, direction, float(present[i, k])))
     return found
+
+
+def hidden_inertias(model: pin.Model, joint: int) -> dict[str, tuple[int, int]]:
+    """Entries of a body's inertia that turning about its joint alone never shows, by the parameter that holds them.
+
+    x and y are the coordinate axes of the joint's frame across its axis, z is the third one.
+    """
+    x, y = across_axes(model, joint)
+    z = 3 - x - y
+    return {"inertia_x": (x, x), "inertia_y": (y, y), "product_xy": (x, y), "product_xz": (x, z), "product_yz": (y, z)}
 
 
 def inertia_about_joint(model: pin.Model, joint: int) -> Array:

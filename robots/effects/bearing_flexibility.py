@@ -10,7 +10,7 @@ import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.structured_tree import across_axes, inertia_about_joint
+from jointscope.robots.structured_tree import across_axes, hidden_inertias, inertia_about_joint
 
 if TYPE_CHECKING:
     from jointscope.robots.robot import Robot
@@ -24,27 +24,29 @@ class BearingFlexibility(Structure):
     """Two sprung hinges; natural scales come from the joint's own spring and body."""
 
     def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
-        """Starts ten times stiffer than the joint's spring, with the inertia of the model's body."""
+        """Starts ten times stiffer than the joint's spring, with the inertia of the model's body.
+
+        All five entries of the inertia that a rigid bearing hides come along; the sixth is that about the joint.
+        """
         model = robot.tree.model
         joint = model.getJointId(owner)
         body = inertia_about_joint(model, joint)
         spring = robot.parameters.get(f"{owner}.stiffness")
-        start: dict[str, float] = {}
+        start = {name: float(body[entry]) for name, entry in hidden_inertias(model, joint).items()}
         for axis, k in zip("xy", across_axes(model, joint), strict=True):
-            inertia = float(body[k, k])
             compliance = next(p.start for p in self.parameters if p.name == f"compliance_{axis}")
             if spring is not None:
                 compliance = 1.0 / (STIFFER * spring.value)
             start[f"compliance_{axis}"] = compliance
-            start[f"damping_{axis}"] = 2.0 * DAMPING_RATIO * float(np.sqrt(inertia / compliance))
-            start[f"inertia_{axis}"] = inertia
+            start[f"damping_{axis}"] = 2.0 * DAMPING_RATIO * float(np.sqrt(body[k, k] / compliance))
         return tuple(_at(p, start[p.name]) for p in self.parameters)
 
 
 def _at(p: EffectParameter, start: float) -> EffectParameter:
-    """The parameter with another start and the same relative prior."""
+    """The parameter with another start and the same relative prior; products of inertia may be zero."""
     grid = (start,) if p.is_shape else ()
-    return replace(p, start=start, prior_sigma=p.prior_sigma / p.start * start, grid=grid)
+    prior_sigma = p.prior_sigma / p.start * start if p.logarithmic else p.prior_sigma
+    return replace(p, start=start, prior_sigma=prior_sigma, grid=grid)
 
 
 def _size(name: str, unit: str, start: float) -> EffectParameter:
@@ -58,6 +60,11 @@ def _shape(name: str, unit: str, start: float, relative_sigma: float, weak: bool
     )
 
 
+def _product(name: str) -> EffectParameter:
+    """Zero for a body that is symmetric about the joint; a tenth of a usual moment of inertia is much."""
+    return EffectParameter(name, "kg m2", start=0.0, prior_sigma=0.2, grid=(0.0,), weak=True)
+
+
 EFFECT = BearingFlexibility(
     id="bearing_flexibility",
     form="bearing",
@@ -65,10 +72,12 @@ EFFECT = BearingFlexibility(
         *(_size(f"compliance_{axis}", "rad/(N m)", 1.0 / 3000.0) for axis in "xy"),
         *(_shape(f"damping_{axis}", "N m s/rad", 10.0, 3.0) for axis in "xy"),
         *(_shape(f"inertia_{axis}", "kg m2", 2.0, 0.5, weak=True) for axis in "xy"),
+        *(_product(f"product_{axes}") for axes in ("xy", "xz", "yz")),
     ),
     example={
         **{"compliance_x": 1.0 / 2500.0, "compliance_y": 1.0 / 3200.0},
         **{"damping_x": 12.0, "damping_y": 14.0, "inertia_x": 2.4, "inertia_y": 2.7},
+        **{"product_xy": 0.01, "product_xz": -0.015, "product_yz": 0.006},
     },
     card=Card(
         title="soft bearing",
@@ -76,7 +85,7 @@ EFFECT = BearingFlexibility(
         "-angle / compliance - damping rate; at compliance 0 they are rigid",
         explanation="The bearing or the stand gives way, so that the whole body tilts when other joints accelerate. "
         "Gyros on the body then see rates about axes about which nothing should turn. The inertia of the body about "
-        "these axes, which a rigid bearing hides, comes along as a weak parameter.",
+        "these axes and its products of inertia, which a rigid bearing hides, come along as weak parameters.",
         source="Schuethe, Wenk, Frese (2016), sec. 3.2 (not modelled), fig. 4, and sec. 6, which proposes the two "
         "hinges; Neubauer et al. (2015), eq. (1), (4) and table 1: bearings as soft as drives",
         typical="1 to 10 times as stiff as the drives; resonance at 3 to 30 Hz",

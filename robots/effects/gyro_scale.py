@@ -35,6 +35,7 @@ EFFECT = ReadingEffect(
         look_alikes={
             "encoder_eccentricity": "over a small part of a turn the slope of the error is a scale between encoder and "
             "gyro",
+            "encoder_scale": "the same share of all joints that a gyro sees is a scale of the gyro",
             "bearing_flexibility": "a small part of the tilt turns with the body's own rate",
             "gyro_bias_drift": "a motion that gets faster towards the end makes an error of scale grow with time",
         },

@@ -24,6 +24,7 @@ from jointscope.graphs.comparison_result import (
     SensorPrediction,
     WorstWindow,
 )
+from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import ProcessNoise
 from jointscope.robots.robot_file import load_robot
@@ -204,3 +205,25 @@ def fake_comparison(seconds=2.0, seed=0):
         fake_model("doggy_calibrated <b>.yaml", robot, recording, x, t, 0.05, rng),
     )
     return ComparisonResult(recording, models)
+
+
+def fake_calibration_with_effects(seconds=0.5):
+    """The same with a soft bearing, whose hinges are coordinates of their own, and a friction with a memory."""
+    result = fake_calibration(seconds)
+    robot = result.robot
+    for label in ("bearing_flexibility@joint1", "hysteresis@joint2"):
+        robot = add_effect(robot, label)
+    layout, rng = robot.layout, np.random.default_rng(1)
+
+    def grown(bag):
+        x = layout.from_joints(bag.states)
+        x[:, layout.n_link - 2 : layout.n_link] += 1e-3
+        sigmas = 1e-4 + layout.from_joints(bag.sigmas)
+        process_sigma = np.full((len(x) - 1, layout.n_rates), 3e-3)
+        process = rng.normal(size=process_sigma.shape) * process_sigma
+        return dataclasses.replace(bag, states=x, sigmas=sigmas, process=process, process_sigma=process_sigma)
+
+    link, motor = np.full(layout.n_link, 0.01), np.full(layout.n_motor, 0.008)
+    noise = dataclasses.replace(result.noise, link_velocity=link, motor_velocity=motor, memory=np.ones(1))
+    robot = dataclasses.replace(robot, noise=noise)
+    return dataclasses.replace(result, robot=robot, start=robot, bags=tuple(map(grown, result.bags)), noise=noise)

@@ -12,6 +12,7 @@ import pytest
 
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
+from jointscope.tools.calibration_text import calibration_text
 from jointscope.tools.report import calibration_report, comparison_report, write_report
 from jointscope.tools.report.decimate import min_max
 from jointscope.tools.report.judgement import judge
@@ -271,3 +272,13 @@ def test_a_full_disk_is_one_line_and_the_old_report_stays(tmp_path, monkeypatch)
         write_report(tmp_path / "r.html", "new")
     assert (tmp_path / "r.html").read_bytes() == b"old"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_calibration_with_a_bearing_and_a_memory_is_reported_by_joint_and_by_hinge():
+    result = FAKES["fake_calibration_with_effects"]()
+    text = calibration_text(result)
+    page = Page(calibration_report(result))
+    assert [i for i in page.ids if i != "theme"] == CALIBRATION_SECTIONS.split()
+    assert "imu2.z" in text
+    assert "joint1.bearing_x link" in " ".join(page.text)
+    assert not any(re.search("nan", number, re.IGNORECASE) for number in page.numbers)

@@ -187,3 +187,9 @@ def test_viewing_starts_the_viewer_with_the_file(calibration_file, monkeypatch):
     monkeypatch.setattr(view.subprocess, "run", lambda c, **k: commands.append(c) or argparse.Namespace(returncode=0))
     assert view.run(argparse.Namespace(file=calibration_file)) == 0
     assert commands[0][1:] == ["-m", "rerun", str(calibration_file)]
+
+
+def test_a_calibration_with_a_bearing_and_a_memory_shows_its_joints(tmp_path):
+    result = FAKES["fake_calibration_with_effects"]()
+    log_calibration(result, tmp_path / "run.rrd")
+    assert (tmp_path / "run.rrd").stat().st_size > 0

@@ -39,7 +39,11 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "gravity_imbalance": ("joint", "cos sin"),
     "payload": ("last joint", "inertia"),
     "inertia_error": ("joint", "ixx iyy izz"),
-    "bearing_flexibility": ("joint", "compliance_x compliance_y damping_x damping_y inertia_x inertia_y"),
+    "bearing_flexibility": (
+        "joint",
+        "compliance_x compliance_y damping_x damping_y inertia_x inertia_y product_xy product_xz product_yz",
+    ),
+    "encoder_scale": ("joint", "scale"),
     "encoder_eccentricity": ("joint", "cos sin order"),
     "encoder_delay": ("joint, robot", "delay"),
     "gyro_delay": ("imu", "delay"),

@@ -82,10 +82,11 @@ def test_accelerations_equal_those_of_pinocchio_and_the_drive_equations(truth):
 
 
 def test_a_soft_bearing_is_two_sprung_hinges_before_the_joint(truth):
-    effect = make_effect(BEARING, truth)
+    products = {"product_xy": 0.02, "product_xz": -0.03, "product_yz": 0.05}
+    effect = make_effect(f"{BEARING}:" + ",".join(f"{name}={value}" for name, value in products.items()), truth)
     engine, rng = Engine(truth, [effect], "smooth"), np.random.default_rng(1)
     assert engine.coordinates[:3] == ("joint1.bearing_x", "joint1.bearing_y", "joint1")
-    model = five_joint_model(truth.tree.model, inertia_x=2.4, inertia_y=2.7)
+    model = five_joint_model(truth.tree.model, 2.4, 2.7, products)
     data = model.createData()
     stiffness, damping = np.array([2500.0, 3200.0]), np.array([12.0, 14.0])
     for _ in range(10):
@@ -98,7 +99,7 @@ def test_a_soft_bearing_is_two_sprung_hinges_before_the_joint(truth):
         np.testing.assert_allclose(engine.accelerations(q, v, u)[:5], expected, rtol=1e-8, atol=1e-8)
 
 
-def five_joint_model(chain: pin.Model, inertia_x: float, inertia_y: float) -> pin.Model:
+def five_joint_model(chain: pin.Model, inertia_x: float, inertia_y: float, products: dict[str, float]) -> pin.Model:
     """Doggy with hinges x and y before joint 1, built in pinocchio."""
     model = pin.Model()
     model.gravity = pin.Motion.Zero()
@@ -110,6 +111,8 @@ def five_joint_model(chain: pin.Model, inertia_x: float, inertia_y: float) -> pi
         I = chain.inertias[j].inertia.copy()  # noqa: E741
         if j == 1:
             I[0, 0], I[1, 1] = inertia_x, inertia_y
+            for (i, k), value in zip(((0, 1), (0, 2), (1, 2)), products.values(), strict=True):
+                I[i, k] = I[k, i] = value
         body = pin.Inertia(chain.inertias[j].mass, chain.inertias[j].lever, I)
         model.appendBodyToJoint(parent, body, pin.SE3.Identity())
     return model

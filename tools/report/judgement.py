@@ -122,13 +122,12 @@ def _white(result: CalibrationResult) -> Check:
 
 def _even(result: CalibrationResult) -> Check:
     """The worst window in practical size: with many samples every deviation is significant, few matter."""
-    noise, n = result.noise, result.robot.n
+    noise, velocities = result.noise, result.robot.layout.velocities
     density = np.concatenate([noise.link_velocity, noise.motor_velocity])
     worst, where, when = 0.0, "", 0.0
     for bag in result.bags:
-        edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
-        v = np.hstack([bag.states[:, n : 2 * n], bag.states[:, 3 * n :]])
-        size = np.sqrt(np.mean(v**2, axis=0))
+        edges, rms = strength(bag.ticks[:-1], (bag.process / bag.process_sigma)[:, : len(density)])
+        size = np.sqrt(np.mean(bag.states[:, velocities] ** 2, axis=0))
         share = rms * density * np.sqrt(DRIFT) / np.where(size > 0, size, np.inf)
         k, i = np.unravel_index(int(np.nanargmax(share)), share.shape)
         if share[k, i] > worst:
@@ -183,8 +182,9 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
 
 
 def equation_names(result: CalibrationResult) -> list[str]:
-    """Names of the columns of BagFit.process."""
-    return [f"{joint} {side}" for side in ("link", "motor") for joint in result.robot.joints]
+    """Names of the columns of BagFit.process without those of memories."""
+    layout = result.robot.layout
+    return [f"{name} link" for name in layout.links] + [f"{name} motor" for name in layout.motors]
 
 
 def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:

@@ -43,14 +43,13 @@ class SignalRow:
 
 def signal_rows(result: CalibrationResult, bag: BagFit) -> list[SignalRow]:
     """Motor position, motor velocity, then the gyros from the tip to the base, as in the paper's figures."""
-    robot, n = result.robot, result.robot.n
-    rows = []
+    robot, rows = result.robot, []
     encoder = bag.residuals.get(robot.motor_encoder.name)
     if encoder is not None:
         t = encoder.times
         rows.append(SignalRow("motor position", "rad", robot.joints, t, encoder.measured, t, encoder.predicted))
         rate_times, rate = central_difference(t, encoder.measured)
-        v_motor = bag.states[:, 3 * n : 4 * n]
+        v_motor = bag.states[:, robot.layout.motor_v]
         rows.append(SignalRow("motor velocity", "rad/s", robot.joints, rate_times, rate, bag.ticks, v_motor))
     for gyro in reversed(robot.gyros):
         series = bag.residuals.get(gyro.name)

@@ -31,8 +31,8 @@ def send_robot(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str)
     """Entities robot/BODY, robot/trail and robot/position_2_sigma below `root`."""
     duration = float(fit.ticks[-1] - fit.ticks[0])
     keep = thinned(len(fit.ticks), max(int(FRAMES * duration), 2))
-    times, q = fit.ticks[keep], fit.states[keep, : robot.n]
-    sigma_q = fit.sigmas[keep, : robot.n]
+    times, q = fit.ticks[keep], fit.states[keep][:, robot.layout.joint_q]
+    sigma_q = fit.sigmas[keep][:, robot.layout.joint_q]
     tip = robot.tree.bodies[-1]
     _send_bodies(stream, robot, times, q, root)
     _, p_base_tip = robot.tree.body_poses(tip, q)

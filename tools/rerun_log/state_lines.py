@@ -22,11 +22,12 @@ PLOTS = (("position", "rad"), ("deflection", "rad"), ("v_link", "rad/s"), ("v_mo
 def send_states(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str) -> None:
     """Entities states/JOINT/QUANTITY below `root`."""
     n, t = robot.n, fit.ticks
+    states, sigmas = robot.layout.by_joint(fit.states), robot.layout.by_joint(fit.sigmas)
     encoder = fit.residuals.get(robot.motor_encoder.name)
     for i, joint in enumerate(robot.joints):
         path, colour = entity(root, "states", joint), JOINT_COLOURS[i % 6]
-        q_link, v_link, q_motor, v_motor = (fit.states[:, k * n + i] for k in range(4))
-        s_q_link, s_v_link, _, s_v_motor = (fit.sigmas[:, k * n + i] for k in range(4))
+        q_link, v_link, q_motor, v_motor = (states[:, k * n + i] for k in range(4))
+        s_q_link, s_v_link, _, s_v_motor = (sigmas[:, k * n + i] for k in range(4))
         if encoder is not None:
             measured = encoder.measured[:, i : i + 1]
             send_lines(stream, f"{path}/position/measured", encoder.times, measured, ["measured"], [GREY], 2.5)

@@ -19,11 +19,10 @@ from jointscope.tools.report.sensor_signals import (
 def fits(result: CalibrationResult) -> Section:
     """Motor position, motor velocity and gyros over time."""
     points = points_per_curve(result.bags)
-    n = result.robot.n
 
     def draw(bag: BagFit, group: str) -> str:
         rows = signal_rows(result, bag)
-        t0, t1 = liveliest(bag.ticks, bag.states[:, 3 * n :])
+        t0, t1 = liveliest(bag.ticks, bag.states[:, result.robot.layout.motor_v])
         whole = _panels(rows, (float(bag.ticks[0]), float(bag.ticks[-1])), 150, points)
         closer = _panels(rows, (t0, t1), 190, points)
         return (

@@ -30,9 +30,9 @@ def noise(result: CalibrationResult) -> Section:
     def draw(bag: BagFit, group: str) -> str:
         edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
         t = 0.5 * (edges[1:] + edges[:-1])
-        panels, n = [], result.robot.n
-        for k, side in enumerate(("link", "motor")):
-            curves = [Curve(joint, t, rms[:, k * n + i], COLOURS[i % 6]) for i, joint in enumerate(result.robot.joints)]
+        panels, layout = [], result.robot.layout
+        for k, (side, rows) in enumerate((("link", layout.joint_link), ("motor", layout.motor_row))):
+            curves = [Curve(joint, t, rms[:, rows[i]], COLOURS[i % 6]) for i, joint in enumerate(layout.joints)]
             title = f"residual of the {side} equations, rms over 0.25 s [sigma]"
             limits = (float(bag.ticks[0]), float(bag.ticks[-1]))
             label = "time [s]" if k else ""

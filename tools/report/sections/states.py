@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult
@@ -22,7 +24,9 @@ def states(result: CalibrationResult) -> Section:
     band = [*keys, Key("±3 sigma", "soft", "band")]
     points = points_per_curve(result.bags)
 
-    def draw(bag: BagFit, group: str) -> str:
+    def draw(whole_bag: BagFit, group: str) -> str:
+        layout = result.robot.layout
+        bag = replace(whole_bag, states=layout.by_joint(whole_bag.states), sigmas=layout.by_joint(whole_bag.sigmas))
         whole = (float(bag.ticks[0]), float(bag.ticks[-1]))
         closer = liveliest(bag.ticks, bag.states[:, 3 * len(joints) :])
         return (

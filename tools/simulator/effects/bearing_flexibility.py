@@ -2,8 +2,8 @@
 """The base of a joint tilts: two more hinges x, y with spring and damper sit before the joint.
 
 The hinges turn about the two coordinate axes of the joint's frame that are across the joint's axis, first x, then y,
-before the joint's own rotation. The moved body needs its transverse inertia, which motion about the joint alone never
-shows; it may be given here.
+before the joint's own rotation. The moved body needs its transverse inertia and its products of inertia, which
+motion about the joint alone never shows; they may be given here.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from jointscope.tools.simulator.specification import joint_axis, link_body, set_
 
 # What another effect may have given the joint.
 PASSIVE = ("stiffness", "damping", "frictionloss", "solref_friction", "solimp_friction", "armature")
+PRODUCTS = ("xy", "xz", "yz")  # z is the axis of the frame along the joint
 LARGER = (1.2, 1.35)  # transverse inertia by default, over that of the URDF
 
 
@@ -41,6 +42,7 @@ class BearingFlexibility(SimulatedEffect):
         larger = full.copy()
         larger[across] *= LARGER
         x, y = (larger if is_possible(larger) else full)[across]
+        products = full[_products(across)]
         return {
             "compliance_x": 1.0 / 2500.0,  # [rad/(N m)]
             "compliance_y": 1.0 / 3200.0,  # [rad/(N m)]
@@ -48,6 +50,7 @@ class BearingFlexibility(SimulatedEffect):
             "damping_y": 14.0,  # [N m s/rad]
             "inertia_x": float(x),  # [kg m2] of the moved body about x
             "inertia_y": float(y),  # [kg m2] of the moved body about y
+            **{f"product_{axes}": float(p) for axes, p in zip(PRODUCTS, products, strict=True)},  # [kg m2]
         }
 
     def edit(self, spec: Any) -> None:
@@ -74,10 +77,11 @@ class BearingFlexibility(SimulatedEffect):
     def _override_inertia(self, body: Any, across: NDArray[np.intp]) -> None:
         inertia = np.array(body.fullinertia)
         inertia[across] = self.parameters["inertia_x"], self.parameters["inertia_y"]
+        inertia[_products(across)] = [self.parameters[f"product_{axes}"] for axes in PRODUCTS]
         if not is_possible(inertia):
             raise EffectError(
                 f"effect {self.id}@{self.owner}: transverse inertias {inertia[across][0]:g} and "
-                f"{inertia[across][1]:g} kg m2 are impossible beside the rest of the body's inertia"
+                f"{inertia[across][1]:g} kg m2 and these products are impossible beside the rest of the body's inertia"
             )
         body.fullinertia = inertia
 
@@ -85,3 +89,10 @@ class BearingFlexibility(SimulatedEffect):
 def _across(axis: NDArray[np.float64]) -> NDArray[np.intp]:
     """The two coordinate axes that are across the joint's axis, in their order."""
     return np.sort(np.argsort(np.abs(axis))[:2])
+
+
+def _products(across: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Places of the products xy, xz, yz of inertia among the engine's six numbers."""
+    (x, y), places = across, {(0, 1): 3, (0, 2): 4, (1, 2): 5}
+    z = 3 - x - y
+    return np.array([places[min(pair), max(pair)] for pair in ((x, y), (x, z), (y, z))])
