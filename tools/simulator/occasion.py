@@ -166,14 +166,17 @@ class Occasion:
             "sampling": asdict(conditions.sampling),
         }
 
+    def at_ticks(self, fine: Array) -> Array:
+        """Rows of a trajectory's array at the ticks, shape (n, nq)."""
+        steps = self._conditions.steps_per_tick
+        return fine[: len(self.times) * steps : steps]
+
     def states(self, trajectory: Trajectory) -> tuple[Array, dict[str, Array]]:
         """(q_link, v_link, q_motor, v_motor) at the ticks, shape (n, 4 n_joints), and the further coordinates.
 
         The latter are position and velocity, shape (n, 2), by the name that an effect gave them.
         """
-        engine, steps = self.engine, self._conditions.steps_per_tick
-        at_ticks = slice(0, len(self.times) * steps, steps)
-        q, v = trajectory.q[at_ticks], trajectory.v[at_ticks]
+        engine, q, v = self.engine, self.at_ticks(trajectory.q), self.at_ticks(trajectory.v)
         states = np.hstack([q[:, engine.link], v[:, engine.link], q[:, engine.motor], v[:, engine.motor]])
         own = {*engine.link, *engine.motor}
         extra = {name: np.column_stack([q[:, i], v[:, i]]) for i, name in enumerate(engine.coordinates) if i not in own}

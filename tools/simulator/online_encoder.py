@@ -35,7 +35,9 @@ class OnlineEncoder:
         angles = self._angles(tick * TICK, past)[None]
         if self._effects:
             angles = distort(self._effects, self._encoder, np.array([tick * TICK]), angles)
-        return read_encoder(self._encoder, angles, self._noise[tick : tick + 1], self._quantized)[0] - self._encoder.zero
+        return (
+            read_encoder(self._encoder, angles, self._noise[tick : tick + 1], self._quantized)[0] - self._encoder.zero
+        )
 
     def _angles(self, now: float, past: Trajectory) -> Array:
         """Motor angles that the encoders are at, old if they are late, shape (n_joints,) [rad]."""

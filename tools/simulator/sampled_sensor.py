@@ -55,9 +55,7 @@ class SampledSensor:
         values = logged(self._effects, self.sensor, self.given_out(trajectory, slice(None)))
         kept = (self.taken <= trajectory.end) & self.kept
         sensor = self.sensor
-        return Stream(
-            sensor.name, self.stamps[kept], values[kept], sensor.channels, sensor.unit, self.received[kept]
-        )
+        return Stream(sensor.name, self.stamps[kept], values[kept], sensor.channels, sensor.unit, self.received[kept])
 
 
 class SampledEncoder(SampledSensor):

@@ -104,6 +104,18 @@ def simulate(
     conditions = Conditions(
         parameters or {}, effects, friction, disturbance or Disturbance(), sampling, hardware_seed, steps_per_tick
     )
+    return simulate_under(conditions, robot, motion, seconds, seed, progress)
+
+
+def simulate_under(
+    conditions: Conditions,
+    robot: Robot,
+    motion: str,
+    seconds: float,
+    seed: int,
+    progress: Callable[[float], None] | None = None,
+) -> Simulation:
+    """As `simulate`, with all that is true of robot and sensors in one argument."""
     occasion = Occasion(robot, motion, seconds, seed, conditions)
     schedule = make_motion(motion, robot, occasion.times, occasion.start, occasion.random("targets"))
     controller = PController(occasion.truth, schedule, occasion.encoder())
