@@ -83,6 +83,11 @@ class ClosedLoopResult:
         """The run of a controller with a source, if there was one."""
         return next((r for r in self.runs if (r.controller, r.source) == (controller, source)), None)
 
+    @property
+    def recorded(self) -> LoopRun:
+        """The run that a bag is made of: state feedback with the estimator where there was one, else the last."""
+        return self.run("state_feedback", "estimator") or self.runs[-1]
+
     def to_json(self) -> dict[str, Any]:
         """Plain numbers and texts: errors per run, the plan's hits, and what was true."""
         hits = [{"time": h.time, "q": h.q.tolist(), "v": h.v.tolist()} for h in self.plan.hits]

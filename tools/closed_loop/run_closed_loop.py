@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -152,7 +154,8 @@ class _Rehearsal:
         model, plan = self._model, self._plan
         knows = self._source(source, occasion)
         loop = Loop(OnlineSensors(occasion.sensors()), knows, self._laws[controller], model, len(plan.times))
-        trajectory = occasion.run(loop, report)
+        with _garbage_left_alone():
+            trajectory = occasion.run(loop, report)
         states, _ = occasion.states(trajectory)
         head = _head(occasion.engine, occasion.truth, occasion.at_ticks(trajectory.q))
         known = model.layout.by_joint(loop.estimates)
@@ -167,7 +170,18 @@ class _Rehearsal:
             return TrueState(model, occasion.engine)
         if name == "encoders":
             return DifferentiatedEncoders(model, self._reference, options.cutoff)
-        return EstimatedState(options.make_estimator(model, options.lag))
+        return EstimatedState(options.make_estimator(model, options.lag), self._reference)
+
+
+@contextmanager
+def _garbage_left_alone() -> Iterator[None]:
+    """As a control loop does: what is there already is not searched for garbage while the loop runs."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _report(progress: Progress | None, k: int, count: int, label: str, share: float) -> None:

@@ -40,9 +40,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="ROBOT_FILE",
         help="what controllers and estimator know; default: the truth without hidden effects, parameters a little off",
     )
-    parser.add_argument(
-        "-o", "--output", metavar="BAG", type=Path, help="record the last of the runs: .bag, .mcap, ..."
-    )
+    parser.add_argument("-o", "--output", metavar="BAG", type=Path, help="record state feedback with the estimator")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration [s]; default 10")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, hits and noise; default 0")
     parser.add_argument(
@@ -91,13 +89,13 @@ def run(args: argparse.Namespace) -> int:
     with progress_bar() as progress:
         result = run_closed_loop(robot, model, args.seconds, args.seed, conditions_of(args), options, progress)
         if bag is not None and truth_file is not None:
-            write_bag(bag, result.runs[-1].recording, robot)
+            write_bag(bag, result.recorded.recording, robot)
             write_json(truth_file, result.truth)
         write_closed_loop(result, files)
     print(closed_loop_text(result))
     written = [path for path in (bag, truth_file, *files.all) if path is not None]
     if bag is not None:
-        print(f"\n{bag} holds the last run: {result.runs[-1].label}")
+        print(f"\n{bag} holds the run of {result.recorded.label}")
     if written:
         print(f"\nWrote {', '.join(map(str, written))}")
     return 0

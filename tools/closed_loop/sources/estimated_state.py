@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.robot import Robot
+from jointscope.tools.closed_loop.reference import Reference
 from jointscope.tools.simulator.online_sensors import Sample
 from jointscope.tools.simulator.trajectory import Trajectory
 
@@ -43,17 +44,18 @@ def fixed_lag_estimator(robot: Robot, lag: float) -> Estimator:
 
 
 class EstimatedState:
-    """The newest knowledge, predicted to the present.
+    """The newest knowledge, predicted to the present; the plan's state as long as the estimator knows nothing.
 
     Args:
         estimator: of the model.
+        reference: states on the plan.
 
     Attributes:
         seconds: wall time that each tick has cost, samples, state and command together [s].
     """
 
-    def __init__(self, estimator: Estimator):
-        self._estimator = estimator
+    def __init__(self, estimator: Estimator, reference: Reference):
+        self._estimator, self._reference = estimator, reference
         self.seconds: list[float] = []
         self._spent = 0.0
 
@@ -66,9 +68,10 @@ class EstimatedState:
     def state(self, tick: int, now: float, past: Trajectory) -> Array:
         """The mean, shape (d,)."""
         begin = time.perf_counter()
-        mean = np.asarray(self._estimator.state(now).mean)
+        found = self._estimator.state(now)
         self._spent += time.perf_counter() - begin
-        return mean
+        known = bool(np.isfinite(found.covariance).all())
+        return np.asarray(found.mean) if known else self._reference.x[tick]
 
     def commanded(self, now: float, command: Array) -> None:
         """Hands the command on."""
