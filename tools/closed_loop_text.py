@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
-from jointscope.tools.report.numbers import significant
+from jointscope.tools.report.numbers import percent, significant
 from jointscope.tools.text_table import text_table
 
 HEAD = [
@@ -19,7 +19,7 @@ def closed_loop_text(result: ClosedLoopResult) -> str:
     truth, plan = result.truth, result.plan
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
     parts = [
-        f"{truth['robot']}, seed {truth['seed']}: {len(plan.hits)} hits in {truth['seconds']:g} s; "
+        f"{truth['robot']}, seed {truth['seed']}: {plan.count} in {truth['seconds']:g} s; "
         f"hidden effects: {effects}; controllers know {result.model_told}",
         "Errors against the plan (rms), and what it cost (shares of the full command):\n"
         + text_table(HEAD, [_tracking(run) for run in result.runs], "<<" + ">" * (len(HEAD) - 2)),
@@ -43,7 +43,7 @@ def _tracking(run: LoopRun) -> list[str]:
         *(significant(1e3 * t.link_position_rms), significant(t.link_velocity_rms)),
         *(significant(1e3 * t.head_position), significant(1e3 * t.hit_position), significant(t.hit_velocity)),
         *(significant(1e3 * t.overshoot), settled),
-        *(f"{t.effort:.3f}", f"{t.chatter:.4f}", f"{t.saturated:.1%}"),
+        *(f"{t.effort:.3f}", f"{t.chatter:.4f}", percent(t.saturated)),
     ]
 
 

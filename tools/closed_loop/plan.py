@@ -50,6 +50,11 @@ class Plan:
     home: Array
     hits: tuple[Hit, ...]
 
+    @property
+    def count(self) -> str:
+        """How many hits, in words."""
+        return "1 hit" if len(self.hits) == 1 else f"{len(self.hits)} hits"
+
     def tick(self, time: float) -> int:
         """The tick nearest to a time [s]."""
         step = self.times[1] - self.times[0]

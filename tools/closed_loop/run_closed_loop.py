@@ -73,8 +73,10 @@ class LoopOptions:
             ("source", self.sources, SOURCES),
         ):
             unknown = [name for name in given if name not in known]
-            if unknown or not given:
-                raise SimulationError(f"unknown {what} {', '.join(unknown) or 'list'!r}; expected {', '.join(known)}")
+            if unknown:
+                raise SimulationError(f"unknown {what} {unknown[0]!r}; expected {', '.join(known)}")
+            if not given:
+                raise SimulationError(f"no {what} is named; expected some of {', '.join(known)}")
         for name, low, high in (("lag", 1e-3, 10.0), ("cutoff", 0.1, 500.0), ("mismatch", 0.0, 0.5)):
             if not low <= getattr(self, name) <= high:
                 raise SimulationError(f"{name}: expected {low:g} to {high:g}, got {getattr(self, name):g}")
@@ -110,7 +112,9 @@ def run_closed_loop(
     occasion = Occasion(robot, "hits", seconds, seed, conditions)
     nominal = true_robot(robot, {})
     told = (
-        f"robot file {model.path.name}" if model else f"the truth, parameters off by {options.mismatch:.0%} (1 sigma)"
+        f"robot file {model.path.name}"
+        if model
+        else f"the truth, parameters off by {100 * options.mismatch:g} % (1 sigma)"
     )
     model = model or _nearly_true(nominal, occasion, options.mismatch, seed)
     _check_same_robot(robot, model)

@@ -97,7 +97,9 @@ def _send_run(stream: rr.RecordingStream, result: ClosedLoopResult, run: LoopRun
             ("v_error", run.estimates[:, n + i] - run.states[:, n + i]),
             ("command", run.commands[:, i] / result.full[i]),
         ):
-            send_lines(stream, entity(root, joint, what, run.source), t, values[:, None], name, colour)
+            send_lines(
+                stream, entity("loops", run.controller, joint, what, run.source), t, values[:, None], name, colour
+            )
 
 
 def _send_robot(stream: rr.RecordingStream, result: ClosedLoopResult) -> None:

@@ -56,7 +56,7 @@ def _findings(result: ClosedLoopResult) -> list[str]:
     truth = result.truth
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"])
     told = [
-        f"Truth: {truth['robot']}, seed {truth['seed']}, {len(result.plan.hits)} hits in {truth['seconds']:g} s, "
+        f"Truth: {truth['robot']}, seed {truth['seed']}, {result.plan.count} in {truth['seconds']:g} s, "
         f"{truth['friction']} friction, hidden effects: {effects or 'none'}",
         f"Controllers and estimator know {result.model_told}",
     ]

@@ -25,4 +25,5 @@ def by_controller(result: ClosedLoopResult) -> list[tuple[str, list[LoopRun]]]:
 
 def swatch(run: LoopRun) -> str:
     """Source of a run with its colour, as HTML."""
-    return f'<span class="{COLOURS[run.source]}"><i class="swatch coloured"></i></span>{SOURCES[run.source]}'
+    colour = f'<span class="{COLOURS[run.source]}"><i class="swatch coloured"></i></span>'
+    return f'<span class="nowrap">{colour}{SOURCES[run.source]}</span>'

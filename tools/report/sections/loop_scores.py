@@ -21,11 +21,9 @@ def _milli(value: float) -> str:
 COLUMNS: tuple[Column, ...] = (
     ("link [mrad]", lambda t: t.link_position_rms, _milli),
     ("link [rad/s]", lambda t: t.link_velocity_rms, significant),
-    ("head [mm]", lambda t: t.head_position, _milli),
-    ("head [m/s]", lambda t: t.head_velocity, significant),
-    ("at hit [mm]", lambda t: t.hit_position, _milli),
-    ("at hit [m/s]", lambda t: t.hit_velocity, significant),
-    ("overshoot [mrad]", lambda t: t.overshoot, _milli),
+    ("hit [mm]", lambda t: t.hit_position, _milli),
+    ("hit [m/s]", lambda t: t.hit_velocity, significant),
+    ("over [mrad]", lambda t: t.overshoot, _milli),
     ("settled [s]", lambda t: t.settling, lambda value: f"{value:.2f}"),
     ("effort", lambda t: t.effort, lambda value: f"{value:.3f}"),
     ("chatter", lambda t: t.chatter, lambda value: f"{value:.4f}"),
@@ -37,13 +35,17 @@ def loop_scores(result: ClosedLoopResult) -> Section:
     """One row per run; the best of each column that a real robot could reach is bold."""
     rows = []
     for title, runs in by_controller(result):
-        rows += [[title if k == 0 else "", swatch(run), *_cells(run, result)] for k, run in enumerate(runs)]
+        rows += [
+            [f'<span class="nowrap">{title}</span>' if k == 0 else "", swatch(run), *_cells(run, result)]
+            for k, run in enumerate(runs)
+        ]
     head = ["controller", "state from", *(name for name, _, _ in COLUMNS)]
     lead = (
-        "Root mean squares of true − planned over the whole run, at the hits, then after the planned arrival at home: "
-        "the largest way of a joint past it, and the median time until the head stays within 2 % of its stroke. Effort "
-        "and chatter: root mean square of the command and of its change per tick, as shares of the full command; "
-        "saturated: share of the time at its limit. Bold: best without the true state."
+        "Link: root mean square of true − planned over the whole run. Hit: the same for the head at the hits. Over: "
+        "the largest way of a joint past its home after the planned arrival; settled: median time from then until the "
+        "head stays within 2 % of its stroke. Effort and chatter: root mean square of the command and of its change "
+        "per tick, as shares of the full command; saturated: share of the time at the limit. Bold: best without the "
+        "true state."
     )
     return Section("scores", "Side by side", table(head, rows, list(range(2, len(head)))), lead)
 

@@ -19,19 +19,20 @@ def loop_setup(result: ClosedLoopResult) -> Section:
     angle, speed = WORTH_FULL_COMMAND
     sentences = [
         "The plan: random places and directions; polynomials of degree 7 in joint space, within the joints' limits, as "
-        f"fast as {COMMAND_SHARE:.0%} of the full command allow by the true robot's equations of motion without its "
-        "hidden effects.",
+        f"fast as {100 * COMMAND_SHARE:g} % of the full command allow by the true robot's equations of motion without "
+        "its hidden effects.",
         f"P-controller: {GAIN:g} times the full command per rad of planned link angle − motor angle, clipped at the "
         "full command. It uses nothing else of the state.",
         "State feedback: command and state with which the model moves as planned, and a linear-quadratic regulator "
         f"about them, gains from the model at poses 50 ms apart; {angle:g} rad or {speed:g} rad/s of a link are worth "
         "the full command. Nothing is tuned to a robot.",
-        "True state: of the simulator, at the tick. Link, motor, and the tilt of bearings that the model has.",
+        "The true state: links, motors, and the tilt of bearings that the model has, as the simulator has them at the tick.",
         f"Estimator: fixed lag {result.lag:g} s, fed with every sample as it arrives, predicted to the tick.",
         f"Encoders: last reading; velocity from differences behind a first-order low-pass of {result.cutoff:g} Hz; the "
         "link is where the planned stretch of the spring puts it, which is better than taking it to be at the motor.",
         f"Sensors: encoders {sampling['encoder_rate']:g} Hz, gyros {sampling['gyro_rate']:g} Hz, mean transport "
-        f"delay {1e3 * sampling['transport_delay']:g} ms, {sampling['drop']:.0%} lost. The controllers tick at 1 kHz.",
+        f"delay {1e3 * sampling['transport_delay']:g} ms, {100 * sampling['drop']:g} % "
+        "lost. The controllers tick at 1 kHz.",
     ]
     items = "".join(f"<li>{escape(text)}</li>" for text in sentences)
     return Section("setup", "How it was done", f'<ul class="steps">{items}</ul>{_parameters(result)}')
