@@ -25,7 +25,8 @@ STAY = 0.5  # [s] at home after each
 REACH = (0.35, 0.8)  # of the amplitude of each joint, from the middle of its range
 SPEED = (0.35, 0.6)  # of the joints' velocity limits at the hit
 COMMAND_SHARE = 0.7  # of the full command that the plan may use; the rest is for the feedback
-SHORTEST, LONGER, LONGEST = 0.15, 1.1, 5.0  # [s], factor between trials, [s]: from home to the hit
+TRIES = 10  # places before a robot is said to be too weak
+SHORTEST, LONGER, LONGEST = 0.15, 1.1, 3.0  # [s], factor between trials, [s]: from home to the hit
 RETURN = 1.3  # time of the way home over that of the way out
 STEP = 2e-3  # [s] of a trial
 NUDGE = 1e-6  # [rad] of the central difference
@@ -80,21 +81,22 @@ def speed_limits(robot: Robot) -> Array:
 
 
 def _strike(robot: Robot, home: Array, rng: np.random.Generator) -> tuple[Passage, Passage]:
-    """The way to a random hit and the way home, as fast as the drives can."""
+    """The way to a random hit and the way home, as fast as the drives can; places out of their reach are drawn anew."""
     centre, amplitude = joint_span(robot)
-    side = rng.choice([-1.0, 1.0], robot.n)
-    q = centre + side * rng.uniform(*REACH, robot.n) * amplitude
-    v = _velocity(robot, q, rng) * rng.uniform(*SPEED)
-    duration = SHORTEST
-    while duration < LONGEST:
-        there = Passage(home, 0.0 * v, q, v, duration)
-        back = Passage(q, v, home, 0.0 * v, RETURN * duration)
-        if _possible(robot, there, back):
-            return there, back
-        duration *= LONGER
+    for _ in range(TRIES):
+        side = rng.choice([-1.0, 1.0], robot.n)
+        q = centre + side * rng.uniform(*REACH, robot.n) * amplitude
+        v = _velocity(robot, q, rng) * rng.uniform(*SPEED)
+        duration = SHORTEST
+        while duration < LONGEST:
+            there = Passage(home, 0.0 * v, q, v, duration)
+            back = Passage(q, v, home, 0.0 * v, RETURN * duration)
+            if _possible(robot, there, back):
+                return there, back
+            duration *= LONGER
     raise SimulationError(
-        f"robot {robot.name!r}: no hit is possible within {LONGEST:g} s at {COMMAND_SHARE:.0%} of the full command; "
-        "check the limits, the drives and the inertias of the robot file"
+        f"robot {robot.name!r}: no hit is possible within {LONGEST:g} s at {100 * COMMAND_SHARE:g} % of the full "
+        "command; check the limits, the drives and the inertias of the robot file"
     )
 
 

@@ -62,7 +62,7 @@ def model_reference(robot: Robot, times: Array, q: Array, v: Array, a: Array) ->
     wanted = np.zeros((len(q), layout.n_link))
     wanted[:, layout.joint_link] = a
     missing = (wanted - free.value[:, : layout.n_link])[..., None]
-    torque = np.linalg.solve(free.rigid.by_torque, missing)[..., 0]
+    torque: Array = np.linalg.solve(free.rigid.by_torque, missing)[..., 0].astype(np.float64)
     springs = model.springs(x, values)
     for i in layout.elastic_joints:
         load = torque[:, layout.joint_link[i]]

@@ -28,9 +28,8 @@ class TrueState:
         places = [(name, layout.links.index(name), layout.n_link + layout.links.index(name)) for name in layout.links]
         for i in layout.elastic_joints:
             places.append((motor_joint(robot.joints[i]), int(layout.motor_q[i]), int(layout.motor_v[i])))
-        there = [place for place in places if place[0] in names]
-        self._coordinates = [names.index(name) for name, _, _ in there]
-        self._positions, self._velocities = ([place[k] for place in there] for k in (1, 2))
+        there = [(names.index(name), position, velocity) for name, position, velocity in places if name in names]
+        self._coordinates, self._positions, self._velocities = np.array(there, dtype=np.intp).T
         self._size = layout.size
 
     def take(self, sample: Sample) -> None:

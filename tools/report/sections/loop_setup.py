@@ -26,7 +26,7 @@ def loop_setup(result: ClosedLoopResult) -> Section:
         "State feedback: command and state with which the model moves as planned, and a linear-quadratic regulator "
         f"about them, gains from the model at poses 50 ms apart; {angle:g} rad or {speed:g} rad/s of a link are worth "
         "the full command. Nothing is tuned to a robot.",
-        "The true state: links, motors, and the tilt of bearings that the model has, as the simulator has them at the tick.",
+        "The true state: links, motors, and the tilt of bearings that the model has, as they are in the simulator.",
         f"Estimator: fixed lag {result.lag:g} s, fed with every sample as it arrives, predicted to the tick.",
         f"Encoders: last reading; velocity from differences behind a first-order low-pass of {result.cutoff:g} Hz; the "
         "link is where the planned stretch of the spring puts it, which is better than taking it to be at the motor.",
