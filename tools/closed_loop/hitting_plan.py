@@ -26,7 +26,7 @@ REACH = (0.35, 0.8)  # of the amplitude of each joint, from the middle of its ra
 SPEED = (0.35, 0.6)  # of the joints' velocity limits at the hit
 COMMAND_SHARE = 0.7  # of the full command that the plan may use; the rest is for the feedback
 TRIES = 10  # places before a robot is said to be too weak
-SHORTEST, LONGER, LONGEST = 0.15, 1.1, 3.0  # [s], factor between trials, [s]: from home to the hit
+SHORTEST, LONGER, LONGEST = 0.15, 1.1, 2.0  # [s], factor between trials, [s]: from home to the hit
 RETURN = 1.3  # time of the way home over that of the way out
 STEP = 2e-3  # [s] of a trial
 NUDGE = 1e-6  # [rad] of the central difference
@@ -87,7 +87,7 @@ def _strike(robot: Robot, home: Array, rng: np.random.Generator) -> tuple[Passag
         side = rng.choice([-1.0, 1.0], robot.n)
         q = centre + side * rng.uniform(*REACH, robot.n) * amplitude
         v = _velocity(robot, q, rng) * rng.uniform(*SPEED)
-        duration = SHORTEST
+        duration = SHORTEST if _can_hold(robot, q) else LONGEST
         while duration < LONGEST:
             there = Passage(home, 0.0 * v, q, v, duration)
             back = Passage(q, v, home, 0.0 * v, RETURN * duration)
@@ -117,6 +117,13 @@ def head_jacobian(robot: Robot, q: Array) -> Array:
     nudges = NUDGE * np.eye(robot.n)
     plus, minus = (robot.tree.body_poses(robot.tree.bodies[-1], q + sign * nudges)[1] for sign in (1.0, -1.0))
     return (plus - minus).T / (2.0 * NUDGE)
+
+
+def _can_hold(robot: Robot, q: Array) -> bool:
+    """Whether the drives can hold the robot at angles of shape (n_joints,) against its weight."""
+    still, times = np.tile(q, (3, 1)), STEP * np.arange(3)
+    u = model_reference(robot, times, still, 0.0 * still, 0.0 * still).u
+    return bool(np.all(np.abs(u) <= COMMAND_SHARE * full_command(robot)))
 
 
 def _possible(robot: Robot, there: Passage, back: Passage) -> bool:
