@@ -138,3 +138,17 @@ def test_without_the_estimator_the_answer_names_the_best(doggy):
     answer = loop_judgement(result)
     assert answer.headline.startswith("Best: state feedback, true state, ")
     assert answer.level == "info"
+
+
+def test_where_the_true_state_does_not_help_the_model_is_blamed(doggy):
+    """A model that takes the springs for three times as stiff plans wrong commands, whatever is known of the state."""
+    from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
+    from jointscope.tools.simulator.truth import true_robot
+
+    truth = true_robot(doggy, {})
+    heavy = truth.with_values({"motor.k_mi": 0.3 * truth.parameter("motor.k_mi").value})
+    options = LoopOptions(("state_feedback",), make_estimator=FakeEstimator)
+    answer = loop_judgement(run_closed_loop(doggy, heavy, 3.0, 3, options=options))
+    assert answer.headline.startswith("The state is not the limit: even with the true state the head is ")
+    assert answer.level == "bad"
+    assert "diagnose says what it lacks" in answer.why

@@ -113,7 +113,13 @@ def _send_robot(stream: rr.RecordingStream, result: ClosedLoopResult) -> None:
     hits = [result.head[plan.tick(hit.time)] for hit in plan.hits]
     stream.log("robot/hits", rr.Points3D(hits, radii=2 * SPOT, colors=[WHITE]), static=True)
     for run in result.runs:
-        path, colour = entity("robot", "heads", run.controller, run.source), COLOURS[run.source]
+        path, colour = entity("robot", "heads", run.controller, run.source), _colour_in_3d(run)
         stream.log(f"{path}/path", rr.LineStrips3D([run.head[keep]], colors=[colour], radii=0.002), static=True)
         spots = rr.Points3D.columns(positions=run.head[keep], radii=[SPOT] * len(keep), colors=[colour] * len(keep))
         stream.send_columns(f"{path}/now", [time_column(plan.times[keep])], spots)
+
+
+def _colour_in_3d(run: LoopRun) -> Colour:
+    """The P-controller's heads are darker, as both controllers are in one picture."""
+    red, green, blue = COLOURS[run.source]
+    return (red // 2, green // 2, blue // 2) if run.controller == "p" else (red, green, blue)

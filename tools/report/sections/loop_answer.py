@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from html import escape
 
-from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
+from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.report.model_answer import Answer
 from jointscope.tools.report.numbers import significant
 from jointscope.tools.report.page import Section
@@ -13,6 +13,7 @@ from jointscope.tools.report.sections.answer_box import answer_box
 from jointscope.tools.report.sections.loop_colours import COLOURS
 
 NEAR = 1.5  # times the error with the true state
+MODEL_LIMITS = 0.7  # of the error with encoders: if the true state does not help more than this, the model is wrong
 
 
 def loop_answer(result: ClosedLoopResult) -> Section:
@@ -36,6 +37,9 @@ def loop_judgement(result: ClosedLoopResult) -> Answer:
 
 def _judge(found: LoopRun, true: LoopRun | None, encoders: LoopRun | None) -> Answer:
     error = found.tracking.hit_position
+    if true is not None and encoders is not None:
+        if true.tracking.hit_position > MODEL_LIMITS * encoders.tracking.hit_position:
+            return _model_limits(found, true, encoders)
     headline = f"With the estimator in the loop the head is {_millimetres(found)} off at the hits"
     level, parts = "good", []
     if encoders is not None:
@@ -48,8 +52,22 @@ def _judge(found: LoopRun, true: LoopRun | None, encoders: LoopRun | None) -> An
         near = error <= NEAR * true.tracking.hit_position
         level = level if near or level == "bad" else "warn"
         parts.append(f"with the true state, which only a simulator knows, {_millimetres(true)}")
-    why = f"{found.label.split(',')[0].capitalize()}: {'; '.join(parts)}." if parts else "No other source was compared."
+    name = CONTROLLERS[found.controller]
+    why = f"{name[0].upper()}{name[1:]}: {'; '.join(parts)}." if parts else "No other source was compared."
     return Answer(level, f"{headline}.", why)
+
+
+def _model_limits(found: LoopRun, true: LoopRun, encoders: LoopRun) -> Answer:
+    """Knowing the state better does not help where the law cannot use it."""
+    name = CONTROLLERS[found.controller]
+    headline = f"The state is not the limit: even with the true state the head is {_millimetres(true)} off at the hits."
+    why = (
+        f"{name[0].upper()}{name[1:]}: with the estimator {_millimetres(found)}, with differentiated encoders "
+        f"{_millimetres(encoders)}. "
+    )
+    if found.controller == "p":
+        return Answer("info", headline, f"{why}The P-controller uses nothing of the state but the motor angle.")
+    return Answer("bad", headline, f"{why}The model is wrong where it matters: diagnose says what it lacks.")
 
 
 def _findings(result: ClosedLoopResult) -> list[str]:
