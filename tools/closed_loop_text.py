@@ -28,10 +28,11 @@ def closed_loop_text(result: ClosedLoopResult) -> str:
     if known:
         table = text_table(KNOWN_HEAD, known, "<<" + ">" * (len(KNOWN_HEAD) - 2))
         parts.append(f"What the controllers knew against the true state (rms):\n{table}")
-    updates = [run.update_ms for run in result.runs if run.update_ms is not None]
-    if updates:
-        p50, p99 = (max(update[name] for update in updates) for name in ("p50", "p99"))
-        parts.append(f"One tick of the estimator: median {p50:.2f} ms, 99th percentile {p99:.2f} ms")
+    accounts = [run.estimator for run in result.runs if run.estimator is not None]
+    if accounts:
+        p50, p99 = (max(account.update_ms[name] for account in accounts) for name in ("p50", "p99"))
+        alarms = ", ".join(sorted({channel for account in accounts for channel in account.alarms})) or "none"
+        parts.append(f"One tick of the estimator: median {p50:.2f} ms, 99th percentile {p99:.2f} ms; alarms: {alarms}")
     return "\n\n".join(parts)
 
 

@@ -14,6 +14,8 @@ class FakeEstimator:
     def __init__(self, robot, lag):
         self.robot, self.lag = robot, lag
         self.samples, self.commands, self.asked = [], [], []
+        self.events = [SimpleNamespace(kind="alarm", source="imu1.x"), SimpleNamespace(kind="late", source="imu1")]
+        self.status = SimpleNamespace(dropped={"imu1": {"late": 2}}, restarts=0)
         self._mean, self._known = np.zeros(robot.layout.size), False
 
     def sample(self, name, t, values):

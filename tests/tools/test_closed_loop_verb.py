@@ -48,6 +48,7 @@ def test_the_screen_shows_every_controller_with_every_source(written):
                 for line in screen.splitlines()
             ), (controller, source)
     assert "holds the run of state feedback, estimator" in screen
+    assert "alarms: imu1.x" in screen
     for file in ("loop.json", "loop.rrd", "loop.html", "loop.mcap", "loop.truth.json"):
         assert file in screen
         assert (folder / file).stat().st_size > 1000
@@ -61,7 +62,10 @@ def test_the_json_says_the_same_for_machines(written):
     assert feedback["hit_position_rms"] < 0.1 * p["hit_position_rms"]
     assert feedback["estimation_rms"]["v_link"] == 0.0
     assert len(feedback["hits"]) == len(content["hits"]) >= 1
-    assert set(runs["p", "estimator"]["update_ms"]) == {"p50", "p99", "max"}
+    account = runs["p", "estimator"]["estimator"]
+    assert set(account["update_ms"]) == {"p50", "p99", "max"}
+    assert account["alarms"] == ["imu1.x"]
+    assert account["dropped"] == {"imu1": {"late": 2}}
     assert content["truth"]["effects"][0]["effect"] == "bearing_flexibility"
 
 
@@ -76,6 +80,7 @@ def test_the_report_is_a_whole_page_with_all_numbers(written):
     assert f"{1e3 * best['hit_position_rms']:.3g}" in page.text
     assert "joint1.bearing_flexibility.compliance_x" in page.text
     assert "2.5 times the full command per rad" in page.text
+    assert "larger innovations than its model allows in imu1.x" in page.text
 
 
 def test_the_bag_can_be_read_and_holds_the_commands_of_the_loop(written):
@@ -141,14 +146,14 @@ def test_without_the_estimator_the_answer_names_the_best(doggy):
 
 
 def test_where_the_true_state_does_not_help_the_model_is_blamed(doggy):
-    """A model that takes the springs for three times as stiff plans wrong commands, whatever is known of the state."""
+    """A model with a third of the back-EMF plans wrong commands, whatever is known of the state."""
     from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
     from jointscope.tools.simulator.truth import true_robot
 
     truth = true_robot(doggy, {})
-    heavy = truth.with_values({"motor.k_mi": 0.3 * truth.parameter("motor.k_mi").value})
+    wrong = truth.with_values({"motor.k_mi": 0.3 * truth.parameter("motor.k_mi").value})
     options = LoopOptions(("state_feedback",), make_estimator=FakeEstimator)
-    answer = loop_judgement(run_closed_loop(doggy, heavy, 3.0, 3, options=options))
+    answer = loop_judgement(run_closed_loop(doggy, wrong, 3.0, 3, options=options))
     assert answer.headline.startswith("The state is not the limit: even with the true state the head is ")
     assert answer.level == "bad"
     assert "diagnose says what it lacks" in answer.why

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.tools.closed_loop.estimator_account import EstimatorAccount
 from jointscope.tools.closed_loop.plan import Plan
 from jointscope.tools.closed_loop.tracking import Tracking
 
@@ -30,7 +31,7 @@ class LoopRun:
         head: where the head was, shape (m, 3) [m].
         tracking: its errors.
         recording: what a bag of the run holds.
-        update_ms: wall time of the estimator per tick, {"p50", "p99", "max"} [ms]; None for the other sources.
+        estimator: what it says of itself; None for the other sources.
     """
 
     controller: str
@@ -41,7 +42,7 @@ class LoopRun:
     head: Array
     tracking: Tracking
     recording: Recording
-    update_ms: dict[str, float] | None
+    estimator: EstimatorAccount | None
 
     @property
     def label(self) -> str:
@@ -128,5 +129,5 @@ def _as_json(run: LoopRun) -> dict[str, Any]:
         "saturated": t.saturated,
         "estimation_rms": t.estimation,
         "hits": [asdict(hit) for hit in t.hits],
-        "update_ms": run.update_ms,
+        "estimator": None if run.estimator is None else asdict(run.estimator),
     }

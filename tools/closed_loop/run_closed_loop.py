@@ -165,8 +165,8 @@ class _Rehearsal:
         known = model.layout.by_joint(loop.estimates)
         errors = tracking(plan, self.head, states, head, known, loop.commands, full_command(model))
         recording = occasion.recording(trajectory, loop.commands)
-        update = knows.update_ms() if isinstance(knows, EstimatedState) else None
-        return LoopRun(controller, source, states, known, loop.commands, head, errors, recording, update)
+        account = knows.account() if isinstance(knows, EstimatedState) else None
+        return LoopRun(controller, source, states, known, loop.commands, head, errors, recording, account)
 
     def _source(self, name: str, occasion: Occasion) -> StateSource:
         model, options = self._model, self._options

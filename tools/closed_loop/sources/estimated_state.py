@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.robot import Robot
+from jointscope.tools.closed_loop.estimator_account import EstimatorAccount
 from jointscope.tools.closed_loop.reference import Reference
 from jointscope.tools.simulator.online_sensors import Sample
 from jointscope.tools.simulator.trajectory import Trajectory
@@ -22,6 +23,14 @@ LAG = 0.1  # [s]
 
 class Estimator(Protocol):
     """What a control loop needs of `FixedLagEstimator`."""
+
+    @property
+    def events(self) -> Sequence[Any]:
+        """What happened, each with a kind and a source."""
+
+    @property
+    def status(self) -> Any:
+        """Counters."""
 
     def sample(self, name: str, t: float, values: Array) -> None:
         """A sample of a stream."""
@@ -80,8 +89,6 @@ class EstimatedState:
         self.seconds.append(self._spent + time.perf_counter() - begin)
         self._spent = 0.0
 
-    def update_ms(self) -> dict[str, float]:
-        """Median, 99th percentile and largest of `seconds` [ms]."""
-        milliseconds = 1e3 * np.array(self.seconds)
-        p50, p99 = np.percentile(milliseconds, [50.0, 99.0])
-        return {"p50": float(p50), "p99": float(p99), "max": float(milliseconds.max())}
+    def account(self) -> EstimatorAccount:
+        """What the estimator says of itself."""
+        return EstimatorAccount.of(self.seconds, self._estimator.events, self._estimator.status)

@@ -83,9 +83,12 @@ def _findings(result: ClosedLoopResult) -> list[str]:
         told.append(
             f"The P-controller, {_millimetres(p)} off at the hits, knows no model and lags behind a moving target"
         )
-    update = next((run.update_ms for run in result.runs if run.update_ms), None)
-    if update is not None:
+    account = next((run.estimator for run in reversed(result.runs) if run.estimator is not None), None)
+    if account is not None:
+        update, alarms = account.update_ms, ", ".join(account.alarms)
         told.append(f"One tick of the estimator took {update['p50']:.2f} ms (median), {update['p99']:.2f} ms (99 %)")
+        doubt = f"found larger innovations than its model allows in {alarms}" if alarms else "raised no alarm"
+        told.append(f"The estimator {doubt}")
     return told
 
 
