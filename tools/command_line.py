@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command `jointscope`: finds the verbs, runs one, and turns every known trouble into one line and exit code 1.
 
-A verb is a module in `tools/verbs/`; its name is the file's, its one-line help the first line of its docstring.
+A verb is a module in `tools/verbs/`; its name is the file's with hyphens, its one-line help the first line of its
+docstring.
 Only the verb that runs is imported, so that `jointscope --help` is there at once.
 """
 
@@ -56,7 +57,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def verbs() -> dict[str, str]:
     """All verbs: name and one-line help."""
-    return {path.stem: _summary(path) for path in sorted(VERBS.glob("*.py")) if path.stem != "__init__"}
+    return {
+        path.stem.replace("_", "-"): _summary(path) for path in sorted(VERBS.glob("*.py")) if path.stem != "__init__"
+    }
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
@@ -72,7 +75,8 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     asked_for = next((argument for argument in arguments if not argument.startswith("-")), None)
     for name, summary in verbs().items():
         if name == asked_for:
-            importlib.import_module(f"jointscope.tools.verbs.{name}").add_parser(subparsers)
+            module = name.replace("-", "_")
+            importlib.import_module(f"jointscope.tools.verbs.{module}").add_parser(subparsers)
         else:
             subparsers.add_parser(name, help=summary)
     return parser

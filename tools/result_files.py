@@ -126,6 +126,19 @@ def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
         _write_views(stack, result, files, discovery_report, log_discovery)
 
 
+def write_closed_loop(result: Any, files: ResultFiles) -> None:
+    """Writes a ClosedLoopResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report import closed_loop_report
+        from jointscope.tools.rerun_log import log_closed_loop
+
+        _write_views(stack, result, files, closed_loop_report, log_closed_loop)
+
+
 def _write_views(
     stack: ExitStack,
     result: Any,

@@ -6,6 +6,7 @@ import pinocchio as pin
 import pytest
 
 from jointscope.robots.robot_file import load_robot
+from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
 from jointscope.tools.simulator import simulate
 from jointscope.tools.simulator.effect import owners_of
 from jointscope.tools.simulator.effects import make_effect, simulated_effects
@@ -94,3 +95,11 @@ def test_a_payload_sits_on_the_long_axis_and_has_weight(arm):
 def test_without_a_gear_ratio_one_period_per_turn_of_the_joint_is_assumed(arm):
     for effect_id in ("cogging", "encoder_eccentricity"):
         assert make_effect(f"{effect_id}@elbow", arm).parameters["order"] == 1.0
+
+
+def test_state_feedback_from_the_robot_file_alone_moves_the_arm_against_gravity(arm):
+    options = LoopOptions(sources=("true",))
+    result = run_closed_loop(arm, None, seconds=6.0, seed=1, options=options)
+    p, feedback = (result.run(controller, "true").tracking for controller in ("p", "state_feedback"))
+    assert feedback.hit_position < 0.05 * p.hit_position
+    assert feedback.link_position_rms < 5e-3  # [rad] although the arm sags before it is caught at the start

@@ -34,7 +34,7 @@ def send_robot(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str)
     times, q = fit.ticks[keep], fit.states[keep][:, robot.layout.joint_q]
     sigma_q = fit.sigmas[keep][:, robot.layout.joint_q]
     tip = robot.tree.bodies[-1]
-    _send_bodies(stream, robot, times, q, root)
+    send_bodies(stream, robot, times, q, root)
     _, p_base_tip = robot.tree.body_poses(tip, q)
     _send_trail(stream, times, p_base_tip, root)
     _send_ellipsoid(stream, times, p_base_tip, position_covariance(robot.tree, tip, q, sigma_q), root)
@@ -73,7 +73,8 @@ def position_covariance(tree: RigidTree, body: str, q: Array, sigma_q: Array) ->
     return spread @ spread.transpose(0, 2, 1)
 
 
-def _send_bodies(stream: rr.RecordingStream, robot: Robot, times: Array, q: Array, root: str) -> None:
+def send_bodies(stream: rr.RecordingStream, robot: Robot, times: Array, q: Array, root: str) -> None:
+    """Entities robot/BODY below `root`: the links at angles of shape (m, n) [rad], with rods and joint axes."""
     import rerun as rr
 
     tree = robot.tree

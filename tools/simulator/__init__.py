@@ -3,6 +3,6 @@
 
 from jointscope.tools.simulator.disturbance import Disturbance
 from jointscope.tools.simulator.effects import simulated_effects
-from jointscope.tools.simulator.simulation import DEFAULT_SECONDS, Simulation, simulate
+from jointscope.tools.simulator.simulation import DEFAULT_SECONDS, Simulation, simulate, simulate_under
 
-__all__ = ["DEFAULT_SECONDS", "Disturbance", "Simulation", "simulate", "simulated_effects"]
+__all__ = ["DEFAULT_SECONDS", "Disturbance", "Simulation", "simulate", "simulate_under", "simulated_effects"]

@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.hooks import distort
 from jointscope.tools.simulator.motion import Motion
-from jointscope.tools.simulator.sensing import read_encoder
+from jointscope.tools.simulator.online_encoder import OnlineEncoder
+from jointscope.tools.simulator.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -24,34 +21,29 @@ class PController:
     """Reads the encoders at every tick and remembers what it commanded.
 
     Args:
-        robot: for its command unit and encoders.
+        robot: for its command unit.
         motion: targets and limits.
-        noise: of the encoders at the ticks, standard normal, shape (ticks, n_joints).
-        quantized: whether the encoders have steps.
-        effects: those that distort the encoders distort what the controller sees.
+        encoder: what it measures with.
 
     Attributes:
         commands: issued so far, shape (ticks, n_joints), in the unit of the robot's command.
     """
 
-    def __init__(self, robot: Robot, motion: Motion, noise: Array, quantized: bool, effects: Sequence[SimulatedEffect]):
+    def __init__(self, robot: Robot, motion: Motion, encoder: OnlineEncoder):
         self.commands = np.zeros_like(motion.targets)
-        self._encoder = robot.motor_encoder
-        self._motion, self._noise, self._quantized = motion, noise, quantized
-        self._effects = [effect for effect in effects if effect.uses("reading")]
+        self._motion, self._encoder = motion, encoder
         self._full = full_command(robot)
 
-    def __call__(self, tick: int, q_motor: Array) -> Array:
-        """The command of a tick, shape (n_joints,), for the angles that the encoders see, shape (n_joints,) [rad]."""
-        motion, angles = self._motion, q_motor[None]
-        if self._effects:
-            angles = distort(self._effects, self._encoder, motion.times[tick : tick + 1], angles)
-        # The encoder's known zero is subtracted again, so that targets are angles of the robot.
-        measured = read_encoder(self._encoder, angles, self._noise[tick : tick + 1], self._quantized)[0]
-        wanted = GAIN * (motion.targets[tick] - (measured - self._encoder.zero))
-        limit = motion.limits[tick]
-        self.commands[tick] = self._full * np.minimum(np.maximum(wanted, -limit), limit)
+    def __call__(self, tick: int, past: Trajectory) -> Array:
+        """The command of a tick, shape (n_joints,), for what has happened until now."""
+        motion, measured = self._motion, self._encoder.read(tick, past)
+        self.commands[tick] = self._full * proportional(motion.targets[tick] - measured, motion.limits[tick])
         return self.commands[tick]
+
+
+def proportional(error: Array, limit: Array | float) -> Array:
+    """The law: share of the full command for errors of motor angles, both of shape (n_joints,) [rad]."""
+    return np.minimum(np.maximum(GAIN * error, -limit), limit)
 
 
 def full_command(robot: Robot) -> Array:

@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import Address, SimulatedEffect
-from jointscope.tools.simulator.hooks import acting, age
+from jointscope.tools.simulator.hooks import acting
 from jointscope.tools.simulator.mujoco_module import load_mujoco
 from jointscope.tools.simulator.rotor_friction import RotorFriction
-from jointscope.tools.simulator.specification import build_specification, drive, motor_joint
+from jointscope.tools.simulator.specification import build_specification, drive, link_body, motor_joint
 from jointscope.tools.simulator.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-Controller = Callable[[int, Array], Array]
+Controller = Callable[[int, Trajectory], Array]
 
 TICK = 1e-3  # [s]
 STEPS_PER_TICK = 5
@@ -72,11 +72,11 @@ class Engine:
         except ValueError as err:
             raise SimulationError(f"MuJoCo cannot build robot {robot.name!r}: {str(err).splitlines()[0]}") from err
         self.data = self._mujoco.MjData(self.model)
+        self._seen = self._mujoco.MjData(self.model)  # for looking at other states than the present one
         self.address = self._find_address(robot)
         self._link = np.array([self.address.link[joint] for joint in robot.joints])
         self._motor = np.array([self.address.motor[joint] for joint in robot.joints])
         self._actuator = np.array([self.address.actuator[joint] for joint in robot.joints])
-        self._encoder_age = age(self.effects, robot.motor_encoder)
         for effect in self.effects:
             effect.bind(self.model, self.data, self.address)
         # friction of a loaded gear comes after what loads it
@@ -128,8 +128,9 @@ class Engine:
         """Integrates from the present state.
 
         Args:
-            controller: maps the number of the tick and the motor angles that the encoders see, shape (n_joints,) [rad],
-                to the command, shape (n_joints,), which is held until the next tick.
+            controller: maps the number of the tick and the trajectory until now, whose last point is the true present
+                state, to the command, shape (n_joints,), which is held until the next tick. What it may know of that
+                trajectory is its own affair: see `OnlineEncoder` and `OnlineSensors`.
             link_torques: disturbance on the links, shape (ticks, n_joints) [N m].
             motor_torques: disturbance on the rotors, shape (ticks, n_joints) [N m].
             progress: called now and then with the number of ticks done.
@@ -148,7 +149,7 @@ class Engine:
         commanding = [effect for effect in self.effects if effect.uses("command")]
         with self._hooked():
             for k in range(ticks):
-                issued = controller(k, self._seen(k * TICK, Trajectory(h, q[: row + 1], v[: row + 1])))
+                issued = controller(k, Trajectory(h, q[: row + 1], v[: row + 1]))
                 ctrl[self._actuator] = issued
                 applied[self._link], applied[self._motor] = link_torques[k], motor_torques[k]
                 for _ in range(steps):
@@ -175,8 +176,7 @@ class Engine:
         Returns:
             omega_body, shape (m, 3) [rad/s].
         """
-        mujoco, model = self._mujoco, self.model
-        data = mujoco.MjData(model)
+        mujoco, model, data = self._mujoco, self.model, self._seen
         site_id, kind = model.site(site).id, mujoco.mjtObj.mjOBJ_SITE
         qpos, qvel, six, omega = data.qpos, data.qvel, np.zeros(6), np.empty((len(q), 3))
         for k in range(len(q)):
@@ -188,11 +188,24 @@ class Engine:
             omega[k] = six[:3]
         return omega
 
-    def _seen(self, now: float, past: Trajectory) -> Array:
-        """Motor angles that the encoders give out, old if they are late, shape (n_joints,) [rad]."""
-        if not self._encoder_age.any():
-            return past.q[-1, self._motor]
-        return past.at(now - self._encoder_age)[0][np.arange(len(self._motor)), self._motor]
+    def points(self, joint: str, p_link: Array, q: Array) -> Array:
+        """Where a point of the body that a joint moves is, as the engine computes it.
+
+        Args:
+            joint: name of the joint.
+            p_link: the point in the joint's frame, shape (3,) [m].
+            q: positions of all coordinates, shape (m, nq) [rad].
+
+        Returns:
+            p_world, shape (m, 3) [m].
+        """
+        data, body = self._seen, self.model.body(link_body(joint)).id
+        p_world = np.empty((len(q), 3))
+        for k in range(len(q)):
+            data.qpos[:] = q[k]
+            self._mujoco.mj_kinematics(self.model, data)
+            p_world[k] = data.xpos[body] + data.xmat[body].reshape(3, 3) @ p_link
+        return p_world
 
     def _find_address(self, robot: Robot) -> Address:
         def dof(name: str) -> int:

@@ -93,7 +93,7 @@ def make_motion(name: str, robot: Robot, times: Array, start: Array, rng: np.ran
     """
     if name not in MOTIONS:
         raise SimulationError(f"unknown motion {name!r}; expected {' or '.join(MOTIONS)}")
-    centre, amplitude = _span(robot)
+    centre, amplitude = joint_span(robot)
     n = len(times)
     motion = Motion(times, np.tile(start, (n, 1)), np.zeros(n), amplitude, centre)
     MOTIONS[name](motion, rng)
@@ -102,11 +102,11 @@ def make_motion(name: str, robot: Robot, times: Array, start: Array, rng: np.ran
 
 def start_position(robot: Robot, rng: np.random.Generator) -> Array:
     """A random position near the middle of the range, shape (n_joints,) [rad]."""
-    centre, amplitude = _span(robot)
+    centre, amplitude = joint_span(robot)
     return centre + 0.15 * amplitude * rng.uniform(-1.0, 1.0, robot.n)
 
 
-def _span(robot: Robot) -> tuple[Array, Array]:
+def joint_span(robot: Robot) -> tuple[Array, Array]:
     """Centre and amplitude of the targets of each joint, each of shape (n_joints,) [rad]."""
     low, high = robot.tree.limits.T
     bounded = np.isfinite(low) & np.isfinite(high) & (high - low < 1e3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the sensors make of a trajectory: samples at their own times, with bias, mounting error, noise and steps.
+"""How sensors are sampled, mounted and read: their own times, bias, mounting error, noise and steps.
 
 An encoder is quantized. Its step and the noise before it are chosen so that together they have the standard deviation
 of the robot file: step^2 / 12 + noise^2 = sigma^2, with noise = 0.3 sigma.
@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.recording import Stream
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
-from jointscope.tools.simulator.engine import TICK, Engine
-from jointscope.tools.simulator.hooks import age, distort, logged, taken_at
-from jointscope.tools.simulator.random_streams import random_stream
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.robots.sensors import Gyro, MotorEncoder
+from jointscope.tools.simulator.engine import TICK
 
 Array = NDArray[np.float64]
 
@@ -110,51 +106,3 @@ def read_encoder(encoder: MotorEncoder, q_motor: Array, noise: Array, quantized:
         return q_motor + encoder.zero + encoder.sigma * noise
     step = np.sqrt(12.0 * (1.0 - ANALOG_SHARE**2)) * encoder.sigma
     return step * np.rint((q_motor + encoder.zero + ANALOG_SHARE * encoder.sigma * noise) / step)
-
-
-def encoder_stream(
-    encoder: MotorEncoder,
-    engine: Engine,
-    trajectory: Trajectory,
-    stamps: Array,
-    noise: Array,
-    sampling: Sampling,
-    seed: int,
-) -> Stream:
-    """The stream of the motor encoders; `noise` is standard normal, shape (m, n_joints)."""
-    times = taken_at(engine.effects, encoder, stamps)
-    angles = _angles(trajectory, times, age(engine.effects, encoder), engine.motor)
-    angles = distort(engine.effects, encoder, stamps, angles)
-    values = logged(engine.effects, encoder, read_encoder(encoder, angles, noise, sampling.quantized))
-    return _stream(encoder, stamps, times <= trajectory.end, values, sampling, seed)
-
-
-def _angles(trajectory: Trajectory, times: Array, ages: Array, columns: NDArray[np.intp]) -> Array:
-    """Each coordinate as old as its channel, shape (m, channels) [rad]."""
-    angles = np.empty((len(times), len(columns)))
-    for old in np.unique(ages):
-        angles[:, ages == old] = trajectory.at(times - old)[0][:, columns[ages == old]]
-    return angles
-
-
-def gyro_stream(
-    gyro: MountedGyro, engine: Engine, trajectory: Trajectory, stamps: Array, sampling: Sampling, seed: int
-) -> Stream:
-    """The stream of one gyro."""
-    sensor = gyro.sensor
-    effects = engine.effects
-    times = taken_at(effects, sensor, stamps)
-    q, v = trajectory.at(times - age(effects, sensor)[0])
-    rates = distort(effects, sensor, stamps, engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T)
-    noise = sensor.sigma * random_stream(seed, "noise", sensor.name).standard_normal(rates.shape)
-    values = logged(effects, sensor, rates + gyro.bias + noise)
-    return _stream(sensor, stamps, times <= trajectory.end, values, sampling, seed)
-
-
-def _stream(
-    sensor: Sensor, stamps: Array, happened: NDArray[np.bool_], values: Array, sampling: Sampling, seed: int
-) -> Stream:
-    """What arrives of the samples; `happened` tells those that were taken before the end."""
-    kept = happened & sampling.kept(len(stamps), random_stream(seed, "drop", sensor.name))
-    received = sampling.received(stamps, random_stream(seed, "transport", sensor.name))
-    return Stream(sensor.name, stamps[kept], values[kept], sensor.channels, sensor.unit, received[kept])

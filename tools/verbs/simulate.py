@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.progress import progress_bar
-from jointscope.tools.simulator import DEFAULT_SECONDS, Disturbance, Simulation, simulate
+from jointscope.tools.simulation_options import add_simulation_options, conditions_of
+from jointscope.tools.simulator import DEFAULT_SECONDS, Simulation, simulate_under
 from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.whole_file import check_outputs, write_json
 
@@ -39,38 +39,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--motion", choices=list(DEFAULT_SECONDS), default="calibration")
     parser.add_argument("--seconds", type=float, metavar="S", help=f"duration [s]; default {defaults}")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="ID@OWNER[:param=value,...]",
-        help="a physical effect, in a size that matters unless values are given; may be repeated; the list is below",
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="true value of a parameter; may be repeated"
-    )
-    parser.add_argument("--friction", choices=["dry", "smooth"], default="dry", help="Coulomb friction of the motors")
-    _add_sensor_options(parser)
+    add_simulation_options(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
-
-
-def _add_sensor_options(parser: argparse.ArgumentParser) -> None:
-    sensors = parser.add_argument_group("sensors and disturbances")
-    sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
-    sensors.add_argument("--gyro-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
-    sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of the samples' times, 1 sigma [ms]")
-    sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="probability that a sample is lost")
-    sensors.add_argument(
-        "--transport-delay", type=float, default=0.5, metavar="MS", help="mean time from stamp to bag [ms]; default 0.5"
-    )
-    sensors.add_argument("--white-encoder", action="store_true", help="white encoder noise instead of quantization")
-    sensors.add_argument(
-        "--disturbance",
-        metavar="NAME=VALUE,...",
-        help="random torques: link and motor [N m, 1 sigma], correlation_time [s]; "
-        "for example link=0.3,motor=0.3,correlation_time=0.02",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -90,34 +61,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _simulate(robot: Robot, args: argparse.Namespace, progress: Callable[[float], None]) -> Simulation:
-    return simulate(
-        robot,
-        args.motion,
-        args.seconds,
-        args.seed,
-        parameters=_assignments(args.set),
-        effects=args.effect,
-        friction=args.friction,
-        disturbance=Disturbance.parse(args.disturbance or ""),
-        jitter=args.jitter * 1e-3,
-        drop=args.drop,
-        encoder_rate=args.encoder_rate,
-        gyro_rate=args.gyro_rate,
-        transport_delay=args.transport_delay * 1e-3,
-        quantized=not args.white_encoder,
-        progress=progress,
-    )
-
-
-def _assignments(texts: Sequence[str]) -> dict[str, float]:
-    values = {}
-    for text in texts:
-        name, _, number = text.partition("=")
-        try:
-            values[name.strip()] = float(number)
-        except ValueError:
-            raise SimulationError(f"--set {text}: expected NAME=VALUE, for example joint1.stiffness=180") from None
-    return values
+    seconds = DEFAULT_SECONDS[args.motion] if args.seconds is None else args.seconds
+    return simulate_under(conditions_of(args), robot, args.motion, seconds, args.seed, progress)
 
 
 def _summary(simulation: Simulation, bag: Path, truth_file: Path) -> dict[str, Any]:
