@@ -126,6 +126,19 @@ def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
         _write_views(stack, result, files, discovery_report, log_discovery)
 
 
+def write_replay(result: Any, files: ResultFiles) -> None:
+    """Writes a ReplayResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report.replay_report import replay_report
+        from jointscope.tools.rerun_log.log_replay import log_replay
+
+        _write_views(stack, result, files, replay_report, log_replay)
+
+
 def _write_views(
     stack: ExitStack,
     result: Any,
