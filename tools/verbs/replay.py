@@ -50,6 +50,9 @@ def add_parser(subparsers: Any) -> None:
         default=[],
         help="let a parameter walk, with this density [its unit / sqrt(s)]; may be repeated",
     )
+    parser.add_argument(
+        "--lagged-every", metavar="N", type=_count, default=20, help="read the state at the lag at every N-th tick, 20"
+    )
     parser.add_argument("-o", "--output", metavar="STATES", type=Path, help="table of the states, .parquet or .csv")
     parser.add_argument(
         "--batch",
@@ -106,7 +109,8 @@ def _replayed(args: argparse.Namespace, robot: Robot, progress: Progress, stack:
     if args.speed:
         listeners.add(Pace(args.speed))
     arrivals = ArrivalReader(args.bag, robot, reading(args.bag, progress))
-    result = replay(robot, arrivals, args.lag, adapt=adapt, listener=listeners.call if listeners else None)
+    listener = listeners.call if listeners else None
+    result = replay(robot, arrivals, args.lag, adapt=adapt, smoothed_every=args.lagged_every, listener=listener)
     if table is not None:
         table.finish()
     return _with_source(result, args, arrivals, progress)
@@ -146,6 +150,12 @@ def _positive(text: str) -> float:
     if not (value > 0.0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"expected a number above zero, got {text!r}")
     return value
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"expected a whole number above zero, got {text!r}")
+    return int(text)
 
 
 def _adapted(text: str) -> tuple[str, float]:
