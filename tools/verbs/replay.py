@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.progress import progress_bar, reading
+from jointscope.tools.progress import progress_bar
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_replay
 from jointscope.tools.state_table import check_table_name, state_table
 from jointscope.tools.user_effects import add_effects_option, load_user_effects
@@ -108,7 +108,9 @@ def _replayed(args: argparse.Namespace, robot: Robot, progress: Progress, stack:
         listeners.add(stack.enter_context(live_replay(robot, tuple(adapt))).add)
     if args.speed:
         listeners.add(Pace(args.speed))
-    arrivals = ArrivalReader(args.bag, robot, reading(args.bag, progress))
+    arrivals = ArrivalReader(
+        args.bag, robot, lambda done, expected: progress(f"replaying {args.bag.name}", done / max(expected, 1))
+    )
     listener = listeners.call if listeners else None
     result = replay(robot, arrivals, args.lag, adapt=adapt, smoothed_every=args.lagged_every, listener=listener)
     if table is not None:
