@@ -27,9 +27,8 @@ def hand_over(result: ReplayResult) -> str:
     if not off:
         return ""
     worst = off[0]
-    size = "larger" if worst.nis > 1.0 else "smaller"
     return (
-        f"{worst.sensor}: the residuals of {worst.channel} are {size} than the model expects (NIS "
+        f"{worst.sensor}: the residuals of {worst.channel} are larger than the model expects (NIS "
         f"{significant(worst.nis)} per degree of freedom). Ask what is missing:\n  {diagnose_command(result)}"
     )
 

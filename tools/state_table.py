@@ -3,7 +3,7 @@
 
 Columns: time [s]; age of the newest sample [s]; every state and its sigma; biases; adapted parameters; then the
 smoothed state at the lag with its own time. Units are SI. What is not known is NaN: the lagged state until the window
-is full, and its sigmas but for every twentieth row, as they cost more than an update.
+is full, and where it was not read (every twentieth row, if not told otherwise, as it costs more than an update).
 """
 
 from __future__ import annotations

@@ -7,6 +7,8 @@ the difference of the two estimates has covariance P - P_lag, less than P.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,24 +18,40 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 
 
-def corrections(robot: Robot, states: StateSeries, lagged: StateSeries) -> list[tuple[str, str, Array, Array]]:
-    """Newest minus smoothed state at the same instant.
+@dataclass(frozen=True)
+class Correction:
+    """Newest minus smoothed of one quantity of all joints.
 
-    Returns:
-        For deflection, link velocity and motor velocity: name, unit, difference and sigma of the newest state, shapes
-        (m, n) at `states.times`; the difference is NaN where there is no smoothed state.
+    Attributes:
+        name: of the quantity.
+        unit: its SI unit.
+        times: instants that both tell of, shape (m,) [s].
+        difference: shape (m, n).
+        sigma: of the newest state, shape (m, n).
     """
-    layout = robot.layout
+
+    name: str
+    unit: str
+    times: Array
+    difference: Array
+    sigma: Array
+
+
+def corrections(robot: Robot, states: StateSeries, lagged: StateSeries) -> list[Correction]:
+    """Deflection, link velocity and motor velocity at the times of the smoothed states."""
+    layout, t = robot.layout, lagged.times
     link, motor = layout.joint_q, layout.motor_q
-    x, s = states.mean, states.sigma
-    later = np.full_like(x, np.nan)
-    if len(lagged.times):
-        t, known = states.times, lagged.times
-        inside = (t >= known[0]) & (t <= known[-1])
-        later[inside] = np.column_stack([np.interp(t[inside], known, column) for column in lagged.mean.T])
-    away = x - later
+
+    def at_lagged(values: Array) -> Array:
+        """Newest values at these times: exact where every tick is kept, linear in between where they were thinned."""
+        if not len(t):
+            return values[:0]
+        return np.column_stack([np.interp(t, states.times, column) for column in values.T])
+
+    away, sigma = at_lagged(states.mean) - lagged.mean, at_lagged(states.sigma)
+    v, w = layout.joint_v, layout.motor_v
     return [
-        ("deflection", "rad", away[:, link] - away[:, motor], states.deflection_sigma),
-        ("v_link", "rad/s", away[:, layout.joint_v], s[:, layout.joint_v]),
-        ("v_motor", "rad/s", away[:, layout.motor_v], s[:, layout.motor_v]),
+        Correction("deflection", "rad", t, away[:, link] - away[:, motor], at_lagged(states.deflection_sigma)),
+        Correction("v_link", "rad/s", t, away[:, v], sigma[:, v]),
+        Correction("v_motor", "rad/s", t, away[:, w], sigma[:, w]),
     ]

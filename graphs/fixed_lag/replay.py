@@ -20,7 +20,7 @@ from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
 EVENTS = 5000  # kept in the result; all are counted
-SMOOTHED_SIGMA = 20  # ticks from one covariance at the lag to the next, which costs more than an update
+SMOOTHED_EVERY = 20  # ticks from one state at the lag to the next: with its covariance it costs more than an update
 Listener = Callable[[Tick, EstimatedState | None, tuple[Event, ...]], None]
 
 
@@ -30,6 +30,7 @@ def replay(
     lag: float = 0.1,
     *,
     adapt: Mapping[str, float] | None = None,
+    smoothed_every: int = SMOOTHED_EVERY,
     listener: Listener | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> ReplayResult:
@@ -40,15 +41,16 @@ def replay(
         recording: blocks of messages as they were received, or a recording, which has lost its duplicates.
         lag: length of the window [s].
         adapt: parameters that may walk: full name and density [unit/sqrt(s)].
-        listener: called after each update with the tick, the state at the lag (its covariance is NaN but for every
-            SMOOTHED_SIGMA-th tick) and the events since the update before; its time does not count.
+        smoothed_every: the state at the lag is read at every so-manieth tick.
+        listener: called after each update with the tick, the state at the lag (None where it is not read or the window
+            is not full) and the events since the update before; its time does not count.
         progress: called with the stamp of the newest command now and then [s].
 
     Raises:
         EstimatorError: an impossible lag or parameter.
         RecordingError: the messages never led to an update, or the bag cannot be read.
     """
-    run = _Run(robot, lag, adapt, listener, progress)
+    run = _Run(robot, lag, adapt, smoothed_every, listener, progress)
     gc.collect()
     gc.freeze()  # what is there by now need not be looked through in the middle of an update
     try:
@@ -67,11 +69,12 @@ class _Run:
         robot: Robot,
         lag: float,
         adapt: Mapping[str, float] | None,
+        smoothed_every: int,
         listener: Listener | None,
         progress: Callable[[float], None] | None,
     ):
         self._robot, self._lag, self._adapt = robot, lag, dict(adapt or {})
-        self._listener, self._progress = listener, progress
+        self._every, self._listener, self._progress = max(smoothed_every, 1), listener, progress
         self._log = TickLog(robot)
         self._events: list[Event] = []
         self._counts: Counter[str] = Counter()
@@ -132,10 +135,16 @@ class _Run:
         )
 
     def _ticked(self, tick: Tick) -> None:
-        """Called by the estimator in the middle of `sample`; what happens here does not count as its time."""
-        now = perf_counter()
-        lagged = tick.smoothed(covariance=self._log.ticks % SMOOTHED_SIGMA == 0)
-        self._log.add(tick, lagged, self._spent + now - self._begin)
+        """Called by the estimator in the middle of `sample`; what happens here does not count as its time.
+
+        But reading the state at the lag does: the estimator may have put work off until then. Its covariance does not.
+        """
+        wanted = self._log.ticks % self._every == 0
+        lagged = tick.smoothed(covariance=False) if wanted else None
+        seconds = self._spent + perf_counter() - self._begin
+        if lagged is not None:
+            lagged = tick.smoothed(covariance=True)
+        self._log.add(tick, lagged, seconds)
         self._spent = 0.0
         events = self._new_events()
         self._note(events)

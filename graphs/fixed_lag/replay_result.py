@@ -128,7 +128,7 @@ class ReplayResult:
         recording_seconds: from the first to the last stamp [s].
         wall_seconds: time in the estimator and in keeping this record; without reading and listeners [s].
         states: the newest knowledge at each tick.
-        lagged: smoothed states at the lag; empty if the window never filled. Sigmas are NaN but for every twentieth.
+        lagged: smoothed states at the lag, read at every twentieth tick or so; empty if the window never filled.
         innovations: by sensor.
         covariances: of the newest state.
         latency: of the updates.

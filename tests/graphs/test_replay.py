@@ -12,7 +12,7 @@ import jointscope.graphs.fixed_lag.replay as replay_module
 from jointscope.graphs.fixed_lag.batch_agreement import BatchAgreement, batch_agreement
 from jointscope.graphs.fixed_lag.corrections import corrections
 from jointscope.graphs.fixed_lag.nis_windows import NisWindows
-from jointscope.graphs.fixed_lag.replay import SMOOTHED_SIGMA, replay
+from jointscope.graphs.fixed_lag.replay import SMOOTHED_EVERY, replay
 from jointscope.graphs.fixed_lag.thinned_rows import ThinnedRows
 from jointscope.robots.arrivals import Arrivals
 from jointscope.robots.errors import EstimatorError, RecordingError
@@ -69,14 +69,14 @@ def test_one_update_per_command_with_latency_and_states(doggy, recording):
     assert 0.0 < result.latency.p50 <= result.latency.p99 <= result.latency.max
     assert result.recording_seconds == pytest.approx(0.999)
     assert result.states.parameters["joint1.stiffness"].shape == (1000, 2)
-    assert result.lagged.times[0] == pytest.approx(0.0) and result.lagged.times[-1] == pytest.approx(0.899)
+    np.testing.assert_allclose(result.lagged.times, np.arange(0.0, 0.9, 0.02), atol=1e-9)
 
 
-def test_the_covariance_at_the_lag_is_asked_for_now_and_then_only(doggy, recording):
+def test_the_state_at_the_lag_is_read_as_often_as_wanted(doggy, recording):
     lagged = replay(doggy, recording).lagged
-    known = np.isfinite(lagged.sigma).all(axis=1)
-    assert known.sum() == len(lagged.times) // SMOOTHED_SIGMA
-    assert np.isfinite(lagged.mean).all()
+    assert len(lagged.times) == 900 // SMOOTHED_EVERY
+    assert np.isfinite(lagged.sigma).all() and np.isfinite(lagged.mean).all()
+    assert len(replay(doggy, recording, smoothed_every=1).lagged.times) == 900
 
 
 def test_the_sigma_of_the_deflection_knows_the_correlation(doggy, recording):
@@ -136,7 +136,7 @@ def test_listeners_get_every_tick_with_its_events(doggy, recording):
     assert len(told) == 1000
     assert [event.kind for event in told[0][2]] == ["started"]
     assert all(events == () for _, _, events in told[1:])
-    assert told[50][1] is None and told[-1][1].time == pytest.approx(0.899)
+    assert told[50][1] is None and told[110][1] is None and told[980][1].time == pytest.approx(0.88)
 
 
 def test_events_are_not_told_twice_though_the_estimator_keeps_only_the_last(doggy, recording):
@@ -198,12 +198,10 @@ def test_agreement_is_within_the_sigmas_and_disagreement_says_where():
 
 
 def test_corrections_are_newest_minus_smoothed_at_the_same_time(doggy, recording):
-    result = replay(doggy, recording)
-    found = {name: (away, sigma) for name, _, away, sigma in corrections(doggy, result.states, result.lagged)}
-    away, sigma = found["v_link"]
-    inside = np.isfinite(away).all(axis=1)
-    assert inside.sum() in (899, 900)
-    spread = np.std(away[inside] / sigma[inside])
+    result = replay(doggy, recording, smoothed_every=1)
+    found = {c.name: c for c in corrections(doggy, result.states, result.lagged)}["v_link"]
+    assert len(found.times) == 900
+    spread = np.std(found.difference / found.sigma)
     assert 0.9 < spread < 1.6  # the fake draws both with independent noise: sqrt(1 + 0.36) over a wobbling sigma
 
 

@@ -91,7 +91,7 @@ def test_both_tables_hold_every_tick_with_mean_sigma_and_lagged_state(doggy, bag
 
     seen = []
     for name in ("states.parquet", "states.csv"):
-        assert main(["replay", "doggy", str(bag), "--no-batch", "-o", str(tmp_path / name)]) == 0
+        assert main(["replay", "doggy", str(bag), "--no-batch", "-o", str(tmp_path / name), "--lagged-every", "1"]) == 0
         seen.append([tick for tick in FakeEstimator.last.fed if tick[0] == "command"])
     table = pyarrow.parquet.read_table(tmp_path / "states.parquet")
     with (tmp_path / "states.csv").open() as file:
@@ -134,7 +134,14 @@ def test_bad_input_is_one_line_and_exit_code_1(bag, tmp_path, capsys, monkeypatc
 
 @pytest.mark.parametrize(
     "options",
-    (["--lag", "0"], ["--lag", "x"], ["--adapt", "joint1.stiffness"], ["--adapt", "a=-1"], ["--speed", "nan"]),
+    (
+        ["--lag", "0"],
+        ["--lag", "x"],
+        ["--adapt", "joint1.stiffness"],
+        ["--adapt", "a=-1"],
+        ["--speed", "nan"],
+        ["--lagged-every", "0"],
+    ),
 )
 def test_wrong_usage_exits_with_2(bag, capsys, options):
     with pytest.raises(SystemExit) as leaving:

@@ -50,11 +50,11 @@ def send_estimate_lines(stream: rr.RecordingStream, robot: Robot, states: StateS
 
 def send_corrections(stream: rr.RecordingStream, robot: Robot, states: StateSeries, lagged: StateSeries) -> None:
     """Entities corrections/JOINT/QUANTITY: newest minus smoothed state, with the +-3 sigma of the newest."""
-    for name, _, difference, sigma in corrections(robot, states, lagged):
+    for c in corrections(robot, states, lagged):
         for i, joint in enumerate(robot.joints):
-            path, colour, at = entity("corrections", joint, name), [JOINT_COLOURS[i % 6]], slice(i, i + 1)
-            send_lines(stream, f"{path}/newest_minus_smoothed", states.times, difference[:, at], [name], colour)
-            send_band(stream, f"{path}/band", states.times, 0.0 * sigma[:, at], 3.0 * sigma[:, at], [GREY])
+            path, colour, at = entity("corrections", joint, c.name), [JOINT_COLOURS[i % 6]], slice(i, i + 1)
+            send_lines(stream, f"{path}/newest_minus_smoothed", c.times, c.difference[:, at], [c.name], colour)
+            send_band(stream, f"{path}/band", c.times, 0.0 * c.sigma[:, at], 3.0 * c.sigma[:, at], [GREY])
 
 
 def correction_views(robot: Robot, states: StateSeries, lagged: StateSeries) -> rrb.Horizontal:
@@ -73,7 +73,7 @@ def correction_views(robot: Robot, states: StateSeries, lagged: StateSeries) -> 
     rows = corrections(robot, states, lagged)
     return rrb.Horizontal(
         *(
-            rrb.Vertical(*(view(joint, i, name, unit, sigma) for name, unit, _, sigma in rows))
+            rrb.Vertical(*(view(joint, i, c.name, c.unit, c.sigma) for c in rows))
             for i, joint in enumerate(robot.joints)
         ),
         name="newest - smoothed",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.progress import progress_bar, reading
+from jointscope.tools.progress import progress_bar
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_replay
 from jointscope.tools.state_table import check_table_name, state_table
 from jointscope.tools.user_effects import add_effects_option, load_user_effects
@@ -49,6 +49,9 @@ def add_parser(subparsers: Any) -> None:
         action="append",
         default=[],
         help="let a parameter walk, with this density [its unit / sqrt(s)]; may be repeated",
+    )
+    parser.add_argument(
+        "--lagged-every", metavar="N", type=_count, default=20, help="read the state at the lag at every N-th tick, 20"
     )
     parser.add_argument("-o", "--output", metavar="STATES", type=Path, help="table of the states, .parquet or .csv")
     parser.add_argument(
@@ -105,8 +108,11 @@ def _replayed(args: argparse.Namespace, robot: Robot, progress: Progress, stack:
         listeners.add(stack.enter_context(live_replay(robot, tuple(adapt))).add)
     if args.speed:
         listeners.add(Pace(args.speed))
-    arrivals = ArrivalReader(args.bag, robot, reading(args.bag, progress))
-    result = replay(robot, arrivals, args.lag, adapt=adapt, listener=listeners.call if listeners else None)
+    arrivals = ArrivalReader(
+        args.bag, robot, lambda done, expected: progress(f"replaying {args.bag.name}", done / max(expected, 1))
+    )
+    listener = listeners.call if listeners else None
+    result = replay(robot, arrivals, args.lag, adapt=adapt, smoothed_every=args.lagged_every, listener=listener)
     if table is not None:
         table.finish()
     return _with_source(result, args, arrivals, progress)
@@ -146,6 +152,12 @@ def _positive(text: str) -> float:
     if not (value > 0.0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"expected a number above zero, got {text!r}")
     return value
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"expected a whole number above zero, got {text!r}")
+    return int(text)
 
 
 def _adapted(text: str) -> tuple[str, float]:

@@ -70,18 +70,18 @@ def _closer(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
 def _corrections(result: ReplayResult, limits: Limits) -> list[str]:
     """One panel per joint and quantity."""
     panels = []
-    t = result.states.times
-    seen = (t >= limits[0]) & (t <= limits[1])
-    for name, unit, difference, sigma in corrections(result.robot, result.states, result.lagged):
+    for found in corrections(result.robot, result.states, result.lagged):
+        seen = (found.times >= limits[0]) & (found.times <= limits[1])
+        t = found.times[seen]
         for i, joint in enumerate(result.robot.joints):
-            y, s = difference[seen, i], 3.0 * sigma[seen, i]
-            largest = max(np.max(np.abs(y[np.isfinite(y)]), initial=0.0), np.max(s, initial=0.0))
-            factor, prefix_unit = prefixed(float(largest), unit)
+            y, s = found.difference[seen, i], 3.0 * found.sigma[seen, i]
+            largest = max(np.max(np.abs(y), initial=0.0), np.max(s, initial=0.0))
+            factor, unit = prefixed(float(largest), found.unit)
             marks: list[Mark] = [
-                Band("±3 sigma", t[seen], -factor * s, factor * s, COLOURS[i % 6]),
-                Curve(joint, t[seen], factor * y, COLOURS[i % 6], "hair"),
+                Band("±3 sigma", t, -factor * s, factor * s, COLOURS[i % 6]),
+                Curve(joint, t, factor * y, COLOURS[i % 6]),
             ]
-            axes = Axes(f"{joint} {name} [{prefix_unit}]", "", height=92, x_range=limits)
+            axes = Axes(f"{joint} {found.name} [{unit}]", "", height=92, x_range=limits)
             panels.append(plot(axes, marks))
     return panels
 
