@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jointscope.graphs.fixed_lag.clock_watch import ClockWatch
 from jointscope.graphs.fixed_lag.consistency import Consistency
 from jointscope.graphs.fixed_lag.innovation import Innovation
 from jointscope.graphs.fixed_lag.observation import Observation
@@ -18,6 +19,7 @@ from jointscope.graphs.fixed_lag.status import EstimatorStatus, EventLog
 from jointscope.graphs.fixed_lag.stream_watch import StreamWatch
 from jointscope.robots.robot import Robot
 
+NIS_EVERY = 10  # updates between two looks at the channels
 MOST_REFUSED = 50  # samples taken for glitches that may come back when a late command explains them
 
 
@@ -26,18 +28,21 @@ class Bookkeeping:
 
     Args:
         robot: sensors.
+        lag: length of the estimator's window [s].
 
     Attributes:
         status: counters and alarms.
         log: events.
         intake: checks and counts messages.
         watch: silence of streams.
+        clock: stamps that cannot be.
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, lag: float):
         self._robot = robot
         self.status, self.log = EstimatorStatus(), EventLog()
-        self.intake = SampleIntake(robot, self.status, self.log)
+        self.clock = ClockWatch(robot.motor_encoder.name, lag)
+        self.intake = SampleIntake(robot, self.status, self.log, self.clock)
         self.watch, self._consistency = StreamWatch(robot, self.log), Consistency()
         self._refused: deque[Observation] = deque(maxlen=MOST_REFUSED)
 
@@ -47,18 +52,20 @@ class Bookkeeping:
         status.updates += 1
         for channel, mean_square, begins in self._consistency.add(innovations):
             self._tell_alarm(time, channel, mean_square, begins)
-        status.nis_mean, status.nis = self._consistency.nis_mean, self._consistency.mean_square
+        status.nis_mean = self._consistency.nis_mean
+        if status.updates % NIS_EVERY == 0:
+            status.nis = self._consistency.mean_square
         status.lost = self.watch.check(time)
         return self.watch.fits(time, innovations)
 
-    def count(self, used: Sequence[Observation], innovations: Sequence[Innovation]) -> None:
+    def count(self, looked_at: Sequence[Observation], innovations: Sequence[Innovation]) -> None:
         """Counts samples that were used, and those that were taken for glitches."""
-        for o in used:
-            self.status.used[o.sensor] += 1
         for innovation in innovations:
-            if not innovation.used:
+            if innovation.used:
+                self.status.used[innovation.sensor] += 1
+            else:
                 self.intake.outlier(innovation)
-                self._refuse(innovation, used)
+                self._refuse(innovation, looked_at)
 
     def readmitted(self, since: float) -> list[Observation]:
         """Samples taken for glitches where commands were not what they seemed; they get another chance."""
@@ -68,9 +75,16 @@ class Bookkeeping:
         self._refused.clear()
         return again
 
-    def forget_glitches(self) -> None:
-        """Nothing comes back any more."""
+    def begins_anew(self) -> None:
+        """Nothing comes back any more, and innovations are those of another estimate."""
         self._refused.clear()
+        self._consistency, self.status.alarms = Consistency(), ()
+
+    def clock_was_set(self) -> None:
+        """Stamps have nothing to do with those before."""
+        self.clock.follow()
+        self.intake.forget_stamps()
+        self.watch = StreamWatch(self._robot, self.log)
 
     def _refuse(self, innovation: Innovation, used: Sequence[Observation]) -> None:
         names = self._robot.sensors[innovation.sensor].channels

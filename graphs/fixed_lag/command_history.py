@@ -7,6 +7,7 @@ history of half a second holds all that a delay or a lag of the catalogue reache
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
@@ -20,11 +21,12 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 
 KEPT = 0.5  # [s] of history beyond the lag where effects need it
-PERIOD_SHARE = 0.02  # weight of a new distance between commands in the running estimate of their period
-CHANGE_SHARE = 5e-4  # the same for the mean square of changes: the last two thousand commands
+RECENT = 41  # commands whose distances tell the period
+EVERY = 10  # commands after which the period is measured again
+SHORTEST = 2e-5  # [s] two commands that are nearer are one that was sent twice
+CHANGE_SHARE = 5e-4  # weight of a new change in the mean square of changes: the last two thousand commands
 HELD_IN_DOUBT = 0.05  # [s] how long a wrong torque lasts where commands have stopped
 SAME_TIME = 1e-6  # [s]
-TYPICAL = 3.0  # distances up to this many periods count as one period with jitter
 
 
 class CommandHistory:
@@ -35,7 +37,7 @@ class CommandHistory:
         lag: length of the estimator's window [s].
 
     Attributes:
-        period: usual distance between two commands [s]; infinite before the third.
+        period: usual distance between two commands [s]; infinite before the second.
         typical_change: root mean square change from one command to the next, shape (n,) [unit of the command].
     """
 
@@ -49,6 +51,7 @@ class CommandHistory:
         self._u: list[Array] = []
         self.period = float("inf")
         self.typical_change, self._changes_seen = np.zeros(robot.n), 0
+        self._added = 0
 
     def __len__(self) -> int:
         return len(self._times)
@@ -65,15 +68,14 @@ class CommandHistory:
 
     def add(self, t: float, u: Array) -> None:
         """Takes in a command; it may be older than others."""
-        if self._times and self._times[-1] - t > self._kept:
-            # stamps have jumped back; what was there belongs to another clock
-            self._times.clear()
-            self._u.clear()
         i = bisect_right(self._times, t)
         if i == len(self._times) and i:
-            self._learn(t - self._times[-1], u - self._u[-1])
+            self._learn(u - self._u[-1])
         self._times.insert(i, t)
         self._u.insert(i, u)
+        self._added += 1
+        if self._added <= RECENT or self._added % EVERY == 0:
+            self._measure_period()
         while len(self._times) > 2 and self._times[1] < self._times[-1] - self._kept:
             del self._times[0], self._u[0]
 
@@ -132,15 +134,25 @@ class CommandHistory:
                 variance += (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
-    def _learn(self, distance: float, change: Array) -> None:
-        if distance > 0.0:
-            typical = distance < TYPICAL * self.period
-            if not np.isfinite(self.period):
-                self.period = distance
-            elif typical:
-                # the shortest usual distance: lost commands make distances longer, never shorter
-                share = PERIOD_SHARE if distance > self.period else 0.5
-                self.period += share * (min(distance, 1.2 * self.period) - self.period)
+    def acts_until(self, t: float) -> float:
+        """When the command that acts at a time is replaced by the next one [s]; infinity for the last."""
+        i = bisect_right(self._times, t)
+        reach = self._kept if self._changes else 0.0
+        return self._times[i] + reach if i < len(self._times) else float("inf")
+
+    def forget_after(self, t: float) -> None:
+        """Forgets commands with later stamps, which cannot be right."""
+        i = bisect_right(self._times, t)
+        del self._times[i:], self._u[i:]
+
+    def _measure_period(self) -> None:
+        """The median distance; lost commands make some distances longer, and the newest may not have come yet."""
+        recent = self._times[-RECENT:]
+        distances = sorted(b - a for a, b in itertools.pairwise(recent) if b - a > SHORTEST)
+        if distances:
+            self.period = distances[(len(distances) - 1) // 2]
+
+    def _learn(self, change: Array) -> None:
         self._changes_seen += 1
         share = max(1.0 / self._changes_seen, CHANGE_SHARE)
         mean_square = self.typical_change**2

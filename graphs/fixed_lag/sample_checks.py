@@ -11,7 +11,6 @@ COARSE = 1.0  # [sigma] an encoder whose smallest change is larger is quantized;
 SMOOTHING = 50  # samples over which its speed is averaged
 MOST = 100.0  # samples that may share one error
 SMALLEST_CHANGE = 1e-12  # [unit] differences below this are rounding
-RECENT = 1.0  # [s] within which stamps are compared
 STAMPS = 4096  # stamps remembered against repetitions
 
 
@@ -28,7 +27,6 @@ class SampleChecks:
         self._sigma, self._noisy = sigma, noisy
         self._stamps: set[float] = set()
         self._order: deque[float] = deque()
-        self._newest = -math.inf
         self._last: list[float] = [float("nan")] * channels
         self._equal = [0] * channels
         self._step = [float("inf")] * channels
@@ -36,16 +34,19 @@ class SampleChecks:
 
     def is_duplicate(self, t: float) -> bool:
         """Whether a sample with this stamp came before; remembers it."""
-        if t < self._newest - RECENT:
-            return False  # far too late, or the clock has jumped back: others see to that
         if t in self._stamps:
             return True
-        self._newest = max(t, self._newest)
         self._stamps.add(t)
         self._order.append(t)
         if len(self._order) > STAMPS:
             self._stamps.discard(self._order.popleft())
         return False
+
+    def forget(self) -> None:
+        """Forgets all stamps: the clock was set."""
+        self._stamps.clear()
+        self._order.clear()
+        self._recent.clear()
 
     def stuck(self, values: list[float]) -> list[int]:
         """Channels that repeat one value although they have noise."""

@@ -26,6 +26,10 @@ class SampleJudge:
     def __init__(self, channels: Mapping[str, tuple[str, ...]]):
         self._channels, self._gate = channels, OutlierGate()
 
+    def forget(self) -> None:
+        """A new run begins."""
+        self._gate = OutlierGate()
+
     def judged(
         self, observations: Sequence[Observation], seen: ObservedRows, S: Array
     ) -> tuple[NDArray[np.bool_], list[Innovation]]:

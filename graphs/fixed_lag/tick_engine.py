@@ -9,6 +9,7 @@ then read from the window again.
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
@@ -23,12 +24,14 @@ from jointscope.graphs.fixed_lag.past_tick import PastTick
 from jointscope.graphs.fixed_lag.process_model import Prediction, ProcessModel
 from jointscope.graphs.fixed_lag.sample_judge import SampleJudge
 from jointscope.graphs.fixed_lag.smoother_window import Rows, SmootherWindow
+from jointscope.graphs.timeline import LONGEST_STEP
 from jointscope.robots.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 Acting = Callable[[float, float], tuple[Array, Array | None]]
+WALKED_TOO_FAR = 6.0  # [sigma of the prior] a bias that is further away is not kept when the estimator begins anew
 COMMITTED_TOGETHER = 5  # ticks that wait for iSAM2; the newest state does not need it
 
 
@@ -45,6 +48,10 @@ class TickEngine:
     def __init__(self, robot: Robot, lag: float, adapt: Mapping[str, float], bias_walk: float):
         self.layout = AugmentedLayout(robot.layout, tuple(g.name for g in robot.gyros), tuple(adapt))
         self._lag, self._scale = lag, self.layout.scale(robot)
+        self._bias_prior = (
+            np.concatenate([np.zeros(0), *(g.bias for g in robot.gyros)]),
+            np.repeat([g.bias_prior_sigma for g in robot.gyros], 3),
+        )
         self._process = ProcessModel(robot, self.layout, adapt, bias_walk)
         self._readings = ReadingsAtOneState(robot)
         self._judge = SampleJudge({name: sensor.channels for name, sensor in robot.sensors.items()})
@@ -63,10 +70,12 @@ class TickEngine:
 
     @property
     def kept(self) -> NewestState | None:
-        """The newest state if it can be gone on from, else None."""
+        """The newest state if its biases are worth keeping: possible, and near what was known of them before."""
         found = getattr(self, "newest", None)
-        good = found is not None and np.isfinite(found.mean).all() and np.isfinite(found.covariance).all()
-        return found if good else None
+        if found is None or not found.is_possible:
+            return None
+        far = np.abs(found.mean[self.layout.d : self.layout.adapted.start] - self._bias_prior[0])
+        return found if bool(np.all(far < WALKED_TOO_FAR * self._bias_prior[1])) else None
 
     def start(self, time: float, state: NewestState) -> None:
         """Begins with a Gaussian at a time."""
@@ -74,6 +83,7 @@ class TickEngine:
         self.past.clear()
         self._uncommitted.clear()
         self._process.begins_near(None)
+        self._judge.forget()
         self.past.append(PastTick(0, time, state.mean.copy()))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
@@ -146,11 +156,14 @@ class TickEngine:
                 self._uncommitted.append((tick, self.window.add_rows(self._process.rows(start, tick.step, T))))
         self._reread()
 
-    def ahead(self, time: float, u: Array) -> NewestState:
-        """The newest state, predicted to a later time with a mean command, shape (n,); nothing is kept."""
-        if time <= self.time:
-            return self.newest
-        return self._process.predicted(self.newest, time - self.time, u, None).state
+    def ahead(self, time: float, acting: Acting) -> NewestState:
+        """The newest state, predicted to a later time; `acting` as in `correct_commands`. Nothing is kept."""
+        state, begins = self.newest, self.time
+        steps = max(math.ceil((time - begins) / LONGEST_STEP - 1e-6), 1) if time > begins else 0
+        edges = [*(begins + (time - begins) * i / steps for i in range(steps)), time]
+        for t0, t1 in itertools.pairwise(edges):
+            state = self._process.predicted(state, t1 - t0, *acting(t0, t1)).state
+        return state
 
     def smoothed(self, covariance: bool) -> tuple[float, NewestState]:
         """Time [s] and state of the oldest tick of the window; its covariance is NaN if not wanted."""
@@ -199,8 +212,8 @@ class TickEngine:
         return tick.nominal + self.window.deviation(tick.number)
 
     def _reread(self) -> None:
-        self._commit()
         self.newest = self.from_window()
+        self._process.begins_near(None)
 
     def _commit(self) -> None:
         """Brings the window up to date."""
