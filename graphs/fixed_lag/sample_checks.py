@@ -75,9 +75,10 @@ class SampleChecks:
                 self._step[j] = change
         if t > before_t:
             self._recent.append((t, values))
-        threshold = COARSE * self._sigma
-        coarse = [threshold < step < float("inf") for step in self._step]
-        if len(self._recent) <= SMOOTHING or not any(coarse):
+        enough = len(self._recent) > SMOOTHING
+        # a reading that has never changed repeats one error, however large the encoder's step is
+        coarse = [step > COARSE * self._sigma and (enough or math.isinf(step)) for step in self._step]
+        if not any(coarse):
             return None
         first = self._recent[0][1]
         # samples that share one error: a step over the way from one sample to the next
