@@ -51,7 +51,7 @@ class ProcessModel:
     def __init__(self, robot: Robot, layout: AugmentedLayout, adapt: Mapping[str, float], bias_walk: float):
         self.layout, self._rule = layout, robot.choices.integrator
         self._adaptation = Adaptation(robot, tuple(adapt))
-        self._noise = StepNoise(robot, self._adaptation.model)
+        self._noise = StepNoise(robot)
         walk = [bias_walk] * (3 * len(layout.gyros)) + list(adapt.values())
         self._walk, self._ones = np.array(walk), np.ones(robot.n)
         self._walk_kept: tuple[float, tuple[Array, Array, Array, Array]] | None = None

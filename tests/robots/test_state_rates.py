@@ -74,10 +74,3 @@ def test_other_values_are_used_instead_of_the_robots_own():
     u = np.array([0.2, -0.3, 0.4])
     np.testing.assert_array_equal(given.command_torque(u), own.command_torque(u))
     np.testing.assert_array_equal(given.rates(x, given.command_torque(u)), own.rates(x, own.command_torque(u)))
-
-
-def test_mass_matrix_is_that_of_the_tree():
-    x = states(READY, 3)
-    expected = READY.kinematic_tree.mass_matrix(x[:, READY.layout.q_link])
-    for k in range(3):
-        np.testing.assert_allclose(StateRates(READY).mass_matrix(x[k]), expected[k], rtol=1e-12)
