@@ -104,7 +104,7 @@ def _consistent(result: ReplayResult) -> Check:
         worst = off[0]
         level = "bad" if nis_level(worst.nis) == "bad" else "warn"
         text += f" {worst.channel} stands out with {significant(worst.nis)}"
-        text += f" and raised {worst.alarms} alarm{'s' * (worst.alarms != 1)}." if worst.alarms else "."
+        text += f"; {worst.sensor} raised {worst.alarms} alarm{'s' * (worst.alarms != 1)}." if worst.alarms else "."
     elif level != "good" and np.isfinite(result.nis_mean):
         larger = "The noise is larger than stated, or the model misses something."
         text += f" {larger}" if result.nis_mean > 1.0 else " The sigmas are larger than they need be."

@@ -246,6 +246,33 @@ def test_live_sends_the_same_parts_piece_by_piece(doggy, bag, tmp_path, monkeypa
     assert PATHS - entity_paths(tmp_path / "live.rrd") == set()
 
 
+def test_live_without_a_screen_or_a_viewer_is_one_line(bag, capsys, monkeypatch):
+    from jointscope.tools.rerun_log import live_replay as module
+
+    monkeypatch.setattr(module, "_listens", lambda: False)
+    monkeypatch.setattr(module.sys, "platform", "linux")
+    for name in module.SCREENS:
+        monkeypatch.delenv(name, raising=False)
+    assert main(["replay", "doggy", str(bag), "--live"]) == 1
+    expected = "cannot show the replay live: there is no screen; write a file with --rrd and `jointscope view` it\n"
+    assert capsys.readouterr().err == f"jointscope: error: {expected}"
+
+
+def test_a_pace_waits_only_where_the_replay_is_ahead(monkeypatch):
+    from types import SimpleNamespace
+
+    from jointscope.tools import replay_listeners as module
+
+    clock, slept = [10.0], []
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(module.time, "sleep", slept.append)
+    pace = module.Pace(2.0)
+    for wall, recorded in ((10.0, 1.0), (10.1, 1.4), (11.0, 1.5), (11.0, 4.0)):
+        clock[0] = wall
+        pace(SimpleNamespace(state=SimpleNamespace(time=recorded)), None, ())
+    np.testing.assert_allclose(slept, [0.1, 0.5])
+
+
 def test_every_section_of_the_report_is_there_and_holds_only_numbers(result):
     page = ResultPage(replay_report(result))
     assert [i for i in page.ids if i != "theme"] == SECTIONS.split()

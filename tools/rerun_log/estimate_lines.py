@@ -12,6 +12,7 @@ from jointscope.graphs.fixed_lag.corrections import corrections
 from jointscope.graphs.fixed_lag.replay_result import StateSeries
 from jointscope.robots.robot import Robot
 from jointscope.robots.state_layout import StateLayout
+from jointscope.tools.report.settled import settled_reach
 from jointscope.tools.rerun_log.columns import GREY, JOINT_COLOURS, send_band, send_lines
 from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
 
@@ -111,7 +112,7 @@ def sigma_views(robot: Robot, states: StateSeries | None = None) -> rrb.Vertical
     for name, unit in SIGMAS:
         axis = None
         if states is not None and len(states.times):
-            top = 1.3 * float(np.quantile(_sigmas(robot, states)[name], 0.98))
+            top = settled_reach(states.times, _sigmas(robot, states)[name])
             axis = rrb.ScalarAxis(range=(0.0, top)) if top > 0.0 else None
         title = viewer_text(f"sigma of {name} [{unit}]")
         views.append(rrb.TimeSeriesView(origin="/" + entity("sigma", name), name=title, axis_y=axis))

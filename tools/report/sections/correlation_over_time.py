@@ -15,6 +15,7 @@ from jointscope.tools.report.page import Key, Section, figure
 from jointscope.tools.report.plot import Axes, Curve, plot
 from jointscope.tools.report.sections.correlation import heat_map
 from jointscope.tools.report.sensor_signals import COLOURS
+from jointscope.tools.report.settled import settled_reach
 from jointscope.tools.tip_ellipsoid import tip_half_axes
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ def _ellipsoid(result: ReplayResult) -> str:
     curves = [
         Curve(word, series.times, factor * half[:, i], COLOURS[i], points=800) for i, word in enumerate(words) if i
     ]
-    top = 1.2 * factor * float(np.quantile(half[:, -1], 0.995))
+    top = factor * settled_reach(series.times, half[:, -1])
     axes = Axes(f"half axes of the 2 sigma ellipsoid [{unit}]", height=200, y_range=(0.0, top or 1.0))
     caption = (
         "From the full covariance of all link coordinates. The tip moves on a sphere about the joints where their axes "

@@ -13,6 +13,7 @@ from jointscope.tools.report.numbers import prefixed, with_sigma
 from jointscope.tools.report.page import Key, Section, figure
 from jointscope.tools.report.plot import Axes, Band, Curve, Mark, plot
 from jointscope.tools.report.sensor_signals import COLOURS, liveliest
+from jointscope.tools.report.settled import settled_reach
 
 Array = NDArray[np.float64]
 Limits = tuple[float, float]
@@ -103,7 +104,7 @@ def _sigmas(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
             for i, joint in enumerate(result.robot.joints)
         ]
         last = k == len(rows) - 1
-        top = 1.3 * factor * float(np.quantile(sigma, 0.99))
+        top = factor * settled_reach(result.states.times, sigma)
         axes = Axes(
             f"sigma of {title} [{unit}]",
             "time [s]" if last else "",

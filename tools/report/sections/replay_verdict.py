@@ -23,8 +23,8 @@ def replay_verdict(result: ReplayResult) -> Section:
     off = suspects(result)
     if off:
         names = ", ".join(s.sensor for s in off)
-        text = f"The residuals of {names} are not what the model expects. Ask what is missing:"
-        body += f"<p>{escape(text)}</p><pre>{escape(diagnose_command(result))}</pre>"
+        text = f"The residuals of {names} are larger than the model expects. Ask what is missing:"
+        body += f'<p class="after">{escape(text)}</p><pre>{escape(diagnose_command(result))}</pre>'
     return Section("verdict", "Can this estimate be trusted?", body)
 
 
