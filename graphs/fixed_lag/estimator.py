@@ -274,8 +274,7 @@ class FixedLagEstimator:
         """Messages about times before the newest tick."""
         engine, found = self._engine, list[Innovation]()
         if self._late_command < math.inf:
-            engine.correct_commands(self._late_command, self._acting)
-            self._pending += self._books.readmitted(self._late_command)
+            self._books.reconsidered(engine.correct_commands(self._late_command, self._acting))
             self._late_command = math.inf
         late = [o for o in self._pending if o.taken <= engine.time + AT_TICK]
         if late:
@@ -284,13 +283,13 @@ class FixedLagEstimator:
                 if o.taken < engine.time - AT_TICK:
                     self._books.intake.is_late(o, engine.time)
             found = engine.late(late)
-            self._books.count(late, found)
+            self._books.count(found)
         return found
 
     def _finish(self, innovations: list[Innovation], fresh: int, used: list[Observation], seconds: float) -> None:
         """Counts, sanity, listener; the last `fresh` innovations were not counted yet."""
         began, engine = clock.perf_counter(), self._engine
-        self._books.count(used, innovations[len(innovations) - fresh :])
+        self._books.count(innovations[len(innovations) - fresh :])
         fits = self._books.updated(engine.time, innovations)
         if not (fits and engine.newest.is_possible):
             why = "became impossible" if fits else "contradicted the encoders for a tenth of a second"

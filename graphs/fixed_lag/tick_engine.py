@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -56,7 +56,8 @@ class TickEngine:
         self._readings = ReadingsAtOneState(robot)
         self._judge = SampleJudge({name: sensor.channels for name, sensor in robot.sensors.items()})
         self.past: deque[PastTick] = deque()
-        self._uncommitted: list[tuple[PastTick, int]] = []  # and the place of each step among the new factors
+        self._uncommitted: list[tuple[PastTick, int]] = []  # ticks and the places of their rows among the new factors
+        self._waiting = 0  # ticks that are not in the window yet
 
     @property
     def time(self) -> float:
@@ -82,9 +83,10 @@ class TickEngine:
         self.newest, self.window = state, SmootherWindow(self._lag, self._scale)
         self.past.clear()
         self._uncommitted.clear()
+        self._waiting = 0
         self._process.begins_near(None)
         self._judge.forget()
-        self.past.append(PastTick(0, time, state.mean.copy()))
+        self.past.append(PastTick(0, time, (), state.mean.copy(), state))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
         self.window.add_rows(Rows((0,), (root,), np.zeros(len(root))))
@@ -103,15 +105,12 @@ class TickEngine:
         """
         before, x0 = self.past[-1], self.newest
         found = self._process.predicted(x0, time - before.time, u, doubt)
-        self._process.begins_near(found.step.step.end)
-        here = PastTick(before.number + 1, time, found.state.mean.copy(), -1, found.step)
+        here = PastTick(before.number + 1, time, tuple(observations), found.state.mean.copy(), found.state)
         self.window.add_tick(here.number, time)
-        first_row = self.window.add_rows(self._process.rows(before, found.step, found.T))
-        innovations = self._take_in(observations, x0, found, before, here) if observations else []
-        self.newest = found.state
+        innovations = self._step(before, here, x0, found)
         self.past.append(here)
-        self._uncommitted.append((here, first_row))
-        if len(self._uncommitted) >= COMMITTED_TOGETHER:
+        self._waiting += 1
+        if self._waiting >= COMMITTED_TOGETHER:
             self._commit()
         while self.past[0].time < time - self._lag:
             self.past.popleft()
@@ -141,20 +140,36 @@ class TickEngine:
         self._reread()
         return innovations
 
-    def correct_commands(self, since: float, acting: Acting) -> None:
-        """Commands have come late: steps that end after a time get other torques and other doubts.
+    def correct_commands(self, since: float, acting: Acting) -> Counter[str]:
+        """Commands have come late: steps that end after a time are taken anew, from the state where they began.
+
+        A jump of the torque may let a motor start to slide, so nothing of these steps is kept: neither their
+        linearization nor what was taken for a glitch.
 
         Args:
             since: stamp of the oldest of these commands [s].
             acting: gives mean command and doubt between two times, as `advance` takes them.
+
+        Returns:
+            By sensor, how many samples more are taken for glitches now.
         """
         self._commit()
-        for start, tick in itertools.pairwise(self.past):
-            if tick.time > since and tick.step is not None:
-                T = self._process.corrected(tick.step, *acting(start.time, tick.time))
-                self.window.remove(tick.slot)
-                self._uncommitted.append((tick, self.window.add_rows(self._process.rows(start, tick.step, T))))
+        again = [(start, tick) for start, tick in itertools.pairwise(self.past) if tick.time > since]
+        change = Counter[str]()
+        if again:
+            self._judge.forget()
+            self._process.begins_near(None)
+            self.newest = again[0][0].filtered
+        for start, tick in again:
+            change.subtract(tick.glitches)
+            for slot in tick.slots:
+                self.window.remove(slot)
+            tick.slots.clear()
+            x0, h = self.newest, tick.time - start.time
+            self._step(start, tick, x0, self._process.predicted(x0, h, *acting(start.time, tick.time)))
+            change.update(tick.glitches)
         self._reread()
+        return change
 
     def ahead(self, time: float, acting: Acting) -> NewestState:
         """The newest state, predicted to a later time; `acting` as in `correct_commands`. Nothing is kept."""
@@ -179,16 +194,19 @@ class TickEngine:
         newest = self.past[-1]
         return NewestState(self._estimate(newest), self.window.covariance(newest.number))
 
-    def _take_in(
-        self,
-        observations: Sequence[Observation],
-        x0: NewestState,
-        found: Prediction,
-        before: PastTick,
-        here: PastTick,
-    ) -> list[Innovation]:
-        """Updates a prediction with samples of its step, and hands their rows to the window."""
-        x1, time = found.state, here.time
+    def _step(self, before: PastTick, here: PastTick, x0: NewestState, found: Prediction) -> list[Innovation]:
+        """Goes from one tick to the next, with the samples in between; the window is handed all rows."""
+        self._process.begins_near(found.end)
+        b = found.A0 @ (x0.mean - before.nominal) + found.A1 @ (found.state.mean - here.nominal)
+        self._add(here, Rows((before.number, here.number), (found.A0, found.A1), b))
+        innovations = self._take_in(x0, found, before, here) if here.observations else []
+        here.filtered = self.newest = found.state
+        here.glitches = tuple(i.sensor for i in innovations if not i.used)
+        return innovations
+
+    def _take_in(self, x0: NewestState, found: Prediction, before: PastTick, here: PastTick) -> list[Innovation]:
+        """Updates a prediction with samples of its step."""
+        x1, time, observations = found.state, here.time, here.observations
         start = None if all(o.taken >= time - AT_TICK for o in observations) else x0.mean
         seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, before.time, time)
         with_state = seen.by_end @ x1.covariance
@@ -204,23 +222,28 @@ class TickEngine:
         if not keep.all():
             seen, with_state, S = seen.chosen(keep), with_state[keep], S[np.ix_(keep, keep)]
         if len(seen.residual):
-            self.window.add_rows(self._sensor_rows(seen, before, here, x0.mean, x1.mean))
+            self._add(here, self._sensor_rows(seen, before, here, x0.mean, x1.mean))
             x1.update(with_state, S, seen.residual)
         return innovations
+
+    def _add(self, tick: PastTick, rows: Rows) -> None:
+        """Rows of the step that led to a tick."""
+        self._uncommitted.append((tick, self.window.add_rows(rows)))
 
     def _estimate(self, tick: PastTick) -> Array:
         return tick.nominal + self.window.deviation(tick.number)
 
     def _reread(self) -> None:
-        self.newest = self.from_window()
+        self.newest = self.past[-1].filtered = self.from_window()
         self._process.begins_near(None)
 
     def _commit(self) -> None:
         """Brings the window up to date."""
         slots = self.window.commit()
         for tick, index in self._uncommitted:
-            tick.slot = int(slots[index])
+            tick.slots.append(int(slots[index]))
         self._uncommitted.clear()
+        self._waiting = 0
 
     def _sensor_rows(self, seen: ObservedRows, first: PastTick, last: PastTick, x0: Array | None, x1: Array) -> Rows:
         """Whitened rows of samples that were linearised at x0 and x1."""

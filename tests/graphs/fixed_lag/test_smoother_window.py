@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The window against dense least squares over all ticks there ever were: late rows, rows taken out, ticks that leave."""
+"""The window against dense least squares over all ticks that ever were: late rows, rows taken out, ticks gone."""
 
 from __future__ import annotations
 
