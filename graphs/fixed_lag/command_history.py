@@ -122,16 +122,20 @@ class CommandHistory:
         moved, variance, complete = np.zeros_like(self.typical_change), np.zeros_like(self.typical_change), True
         for i in range(first, last):
             following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
-            missing = min(t1, following) - max(t0, self._times[i] + self.period)
+            begin = self._times[i] + self.period
+            missing = min(t1, following) - max(t0, begin)
             if missing < 0.5 * self.period:
                 continue
             complete, share = False, missing / (t1 - t0)
-            if following > t1 + SAME_TIME:
-                variance += (share * self.typical_change) ** 2
+            # one unknown command acts in all steps of the gap: their errors do not average out
+            together = max(min(following, t1) - begin, missing) / missing
+            if math.isinf(following):
+                variance += together * (share * self.typical_change) ** 2
             else:
                 change = self._u[i + 1] - self._u[i]
-                moved += 0.5 * share * change
-                variance += (share * change) ** 2 / 12.0
+                way = max(t0, begin) + 0.5 * missing - 0.5 * self.period - self._times[i]
+                moved += share * way / (following - self._times[i]) * change
+                variance += together * (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
     def acts_until(self, t: float) -> float:

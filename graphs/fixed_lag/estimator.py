@@ -43,6 +43,8 @@ Found = TypeVar("Found")
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
 GAP = 0.3  # [s] without a tick after which the estimator begins anew; so far it predicts
 BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and numpy raise where numbers are impossible
+FEW_MISSING = 0.02  # [s] within this every missing command gets its tick; longer gaps go in longer steps
+QUICKEST = 5e-4  # [s] shortest step that is made for a missing command
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
 
 
@@ -230,9 +232,8 @@ class FixedLagEstimator:
             self._restart(t, f"nothing came for {t - newest:.2f} s")
             return
         # commands that are slow or have stopped: ticks go on without them
-        while self.status.running and t - newest > 1.5 * LONGEST_STEP and self._wanted is None:
-            newest = newest + LONGEST_STEP if t - newest > 2.0 * LONGEST_STEP else t - SHORTEST_STEP
-            self._close(newest)
+        if t - newest > 1.5 * LONGEST_STEP and self._wanted is None:
+            self._close(t - SHORTEST_STEP)
 
     def _catch_up(self, t: float | None) -> None:
         """Closes what is open at the time for which a state is wanted."""
@@ -247,6 +248,21 @@ class FixedLagEstimator:
             self._late_ones.extend(self._unbroken(self._take_late_ones) or [])
 
     def _close(self, time: float) -> None:
+        """Goes on to a new tick; where commands are missing on the way, their ticks are made, too."""
+        parts = self._parts(time - self._engine.time)
+        begin = self._engine.time
+        for i in range(1, parts):
+            if self.status.running:
+                self._close_one(begin + (time - begin) * i / parts)
+        if self.status.running:
+            self._close_one(time)
+
+    def _parts(self, h: float) -> int:
+        """Ticks into which a step of length h [s] is divided: samples are best taken at a tick."""
+        usual = min(max(self._commands.period, QUICKEST), LONGEST_STEP)
+        return round(h / (usual if h < FEW_MISSING else LONGEST_STEP))
+
+    def _close_one(self, time: float) -> None:
         """One update: late messages, the step to a new tick, its samples."""
         began = clock.perf_counter()
         found = self._unbroken(lambda: self._update(time))

@@ -6,7 +6,9 @@ from __future__ import annotations
 import math
 from collections import deque
 
-STUCK_AFTER = 20  # equal samples in a row of a channel with noise: it is saturated or dead
+CERTAIN = 1e-6  # probability of as many equal samples in a row by chance, below which a channel is saturated or dead
+FEWEST_EQUAL, MOST_EQUAL = 2, 20  # samples that repeat the one before
+MEMORY = 0.01  # weight of a new sample in the share of those that repeat the one before
 COARSE = 1.0  # [sigma] an encoder whose smallest change is larger is quantized; see graphs/coarse_encoder.py
 SMOOTHING = 50  # samples over which its speed is averaged
 MOST = 100.0  # samples that may share one error
@@ -29,6 +31,8 @@ class SampleChecks:
         self._order: deque[float] = deque()
         self._last: list[float] = [float("nan")] * channels
         self._equal = [0] * channels
+        self._looked_at = 0
+        self._repeats, self._patience = [0.5] * channels, [float(MOST_EQUAL)] * channels
         self._step = [float("inf")] * channels
         self._recent: deque[tuple[float, list[float]]] = deque(maxlen=SMOOTHING + 1)
 
@@ -53,13 +57,20 @@ class SampleChecks:
         if not self._noisy:
             return []
         found = []
+        self._looked_at += 1
+        share = max(1.0 / (self._looked_at + 1), MEMORY)
         for j, value in enumerate(values):
             if value == self._last[j]:
                 self._equal[j] += 1
-                if self._equal[j] >= STUCK_AFTER:
+                if self._equal[j] <= FEWEST_EQUAL:
+                    self._repeats[j] += share * (1.0 - self._repeats[j])
+                if self._equal[j] >= self._patience[j]:
                     found.append(j)
-            else:
-                self._equal[j] = 0
+                continue
+            self._equal[j] = 0
+            self._repeats[j] -= share * self._repeats[j]
+            enough = math.log(CERTAIN) / math.log(min(max(self._repeats[j], 1e-3), 0.5))
+            self._patience[j] = min(max(enough, FEWEST_EQUAL), MOST_EQUAL)
         self._last = values
         return found
 
