@@ -242,7 +242,7 @@ class FixedLagEstimator:
         if not self.status.running:
             return
         newest = max((o.taken for o in self._pending), default=-math.inf)
-        if newest > self._engine.time + SHORTEST_STEP and (t is None or newest <= t + AT_TICK):
+        if newest > self._engine.time + AT_TICK and (t is None or newest <= t + AT_TICK):
             self._close(newest)
         elif (self._pending and self._wanted is None) or self._late_command < math.inf:
             self._late_ones.extend(self._unbroken(self._take_late_ones) or [])

@@ -34,7 +34,8 @@ class SampleChecks:
         self._looked_at = 0
         self._repeats, self._patience = [0.5] * channels, [float(MOST_EQUAL)] * channels
         self._step = [float("inf")] * channels
-        self._recent: deque[tuple[float, list[float]]] = deque(maxlen=SMOOTHING + 1)
+        self._recent: deque[tuple[float, list[float], int]] = deque(maxlen=SMOOTHING + 1)
+        self._samples = 0
 
     def is_duplicate(self, t: float) -> bool:
         """Whether a sample with this stamp came before; remembers it."""
@@ -76,24 +77,26 @@ class SampleChecks:
 
     def shared_error(self, t: float, values: list[float]) -> list[float] | None:
         """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""
+        self._samples += 1
         if not self._recent:
-            self._recent.append((t, values))
+            self._recent.append((t, values, self._samples))
             return None
-        before_t, before = self._recent[-1]
+        before_t, before, _ = self._recent[-1]
         for j, value in enumerate(values):
             change = abs(value - before[j])
             if SMALLEST_CHANGE < change < self._step[j]:
                 self._step[j] = change
         if t > before_t:
-            self._recent.append((t, values))
+            self._recent.append((t, values, self._samples))
         enough = len(self._recent) > SMOOTHING
         # a reading that has never changed repeats one error, however large the encoder's step is
         coarse = [step > COARSE * self._sigma and (enough or math.isinf(step)) for step in self._step]
         if not any(coarse):
             return None
-        first = self._recent[0][1]
+        _, first, begin = self._recent[0]
+        count = max(self._samples - begin, SMOOTHING)  # with those that came late
         # samples that share one error: a step over the way from one sample to the next
-        ways = [abs(value - start) / SMOOTHING for value, start in zip(values, first, strict=True)]
+        ways = [abs(value - start) / count for value, start in zip(values, first, strict=True)]
         return [
             math.sqrt(min(max(step / max(way, SMALLEST_CHANGE), 1.0), MOST)) if is_coarse else 1.0
             for step, way, is_coarse in zip(self._step, ways, coarse, strict=True)
