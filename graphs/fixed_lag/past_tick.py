@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.fixed_lag.newest_state import NewestState
 from jointscope.graphs.fixed_lag.observation import Observation
+from jointscope.graphs.fixed_lag.outlier_gate import Far
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,7 @@ class PastTick:
         filtered: the state here when it was the newest.
         slots: of the factors of the step that led here.
         glitches: sensor of each sample of it that was taken for a glitch.
+        far: channels that had been far away when the tick was closed.
     """
 
     number: int
@@ -35,3 +37,4 @@ class PastTick:
     filtered: NewestState
     slots: list[int] = field(default_factory=list)
     glitches: tuple[str, ...] = ()
+    far: Far = field(default_factory=dict)

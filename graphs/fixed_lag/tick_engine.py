@@ -85,7 +85,7 @@ class TickEngine:
         self._uncommitted.clear()
         self._waiting = 0
         self._process.begins_near(None)
-        self._judge.forget()
+        self._judge.go_back_to({})
         self.past.append(PastTick(0, time, (), state.mean.copy(), state))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
@@ -157,7 +157,7 @@ class TickEngine:
         again = [(start, tick) for start, tick in itertools.pairwise(self.past) if tick.time > since]
         change = Counter[str]()
         if again:
-            self._judge.forget()
+            self._judge.go_back_to(again[0][0].far)
             self._process.begins_near(None)
             self.newest = again[0][0].filtered
         for start, tick in again:
@@ -201,7 +201,7 @@ class TickEngine:
         self._add(here, Rows((before.number, here.number), (found.A0, found.A1), b))
         innovations = self._take_in(x0, found, before, here) if here.observations else []
         here.filtered = self.newest = found.state
-        here.glitches = tuple(i.sensor for i in innovations if not i.used)
+        here.glitches, here.far = tuple(i.sensor for i in innovations if not i.used), self._judge.memory
         return innovations
 
     def _take_in(self, x0: NewestState, found: Prediction, before: PastTick, here: PastTick) -> list[Innovation]:
