@@ -50,7 +50,8 @@ class CommandHistory:
         self._times: list[float] = []
         self._u: list[Array] = []
         self.period = float("inf")
-        self.typical_change, self._changes_seen = np.zeros(robot.n), 0
+        # as if one of two thousand commands so far had jumped to the full one
+        self.typical_change = np.full(robot.n, math.sqrt(CHANGE_SHARE) * _full_command(robot))
         self._added = 0
 
     def __len__(self) -> int:
@@ -138,6 +139,14 @@ class CommandHistory:
                 variance += together * (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
+    def unsure_since(self, t: float) -> float:
+        """From when on the command with stamp t [s] changes what acted: where the one before it was due to end."""
+        i = bisect_left(self._times, t)
+        if i == 0:
+            return t
+        due = self._times[i - 1] + self.period
+        return due if t - due > 0.5 * self.period else t
+
     def acts_until(self, t: float) -> float:
         """When the command that acts at a time is replaced by the next one [s]; infinity for the last."""
         i = bisect_right(self._times, t)
@@ -157,11 +166,9 @@ class CommandHistory:
             self.period = distances[(len(distances) - 1) // 2]
 
     def _learn(self, change: Array) -> None:
-        self._changes_seen += 1
-        share = max(1.0 / self._changes_seen, CHANGE_SHARE)
-        mean_square = self.typical_change**2
         # rare jumps dominate, and are what a missing command may have been
-        self.typical_change = np.sqrt(mean_square + share * (change**2 - mean_square))
+        mean_square = self.typical_change**2
+        self.typical_change = np.sqrt(mean_square + CHANGE_SHARE * (change**2 - mean_square))
 
     def _after_effects(self, t0: float, t1: float, last: int) -> Array:
         """As `mean`, with the effects on commands."""
@@ -179,3 +186,10 @@ class CommandHistory:
         u, h = path.acting(self._values)[0], np.diff(edges)
         own = edges[:-1] >= t0
         return h[own] @ u[own] / h[own].sum()
+
+
+def _full_command(robot: Robot) -> float:
+    """The largest command where it is known, else zero [unit of the command]."""
+    if robot.command.unit == "duty":
+        return 1.0
+    return float(robot.constants.get("motor.supply_voltage", 0.0)) if robot.command.unit == "V" else 0.0

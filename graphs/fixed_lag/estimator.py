@@ -87,7 +87,7 @@ class FixedLagEstimator:
         self._pending: list[Observation] = []
         self._late_ones: list[Innovation] = []  # of late samples since the last update
         self._wanted: float | None = None  # stamp of a command whose tick is not closed yet
-        self._late_command = math.inf  # stamp of the oldest late command
+        self._late_command = math.inf  # from when on late commands change what acted
         self._newest_sample = -math.inf
 
     @property
@@ -111,8 +111,11 @@ class FixedLagEstimator:
             self._books.intake.too_late("command", t, newest)
             return
         self.status.used["command"] += 1
+        since = self._commands.unsure_since(t)
+        if since < self._engine.time - AT_TICK:
+            # what happened in the gap before it is now seen differently
+            self._late_command = min(since, self._late_command)
         if t < newest - AT_TICK:
-            self._late_command = min(t, self._late_command)
             self.status.late["command"] += 1
         elif t - newest > min(NEAR * self._commands.period, LONGEST_STEP) or t - newest > LONGEST_STEP:
             self._wanted = t
