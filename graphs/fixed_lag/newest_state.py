@@ -7,6 +7,7 @@ rounding (a test), and this one costs a fifth; after late samples it is read fro
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,8 +32,9 @@ class NewestState:
     @property
     def is_possible(self) -> bool:
         """Whether all numbers are finite and no variance is negative."""
-        variance = self.covariance.diagonal()
-        return bool(np.isfinite(self.mean).all() and np.isfinite(self.covariance).all() and variance.min() >= 0.0)
+        # a sum is finite only if all its terms are
+        numbers = float(self.mean.sum()) + float(self.covariance.sum())
+        return math.isfinite(numbers) and float(self.covariance.diagonal().min()) >= 0.0
 
     def predicted(self, mean: Array, F: Array, Q: Array) -> NewestState:
         """After a step, with mean as integrated, transition F and covariance Q of the step, shapes (D,), (D, D)."""

@@ -32,7 +32,7 @@ class SampleChecks:
         self._last: list[float] = [float("nan")] * channels
         self._equal = [0] * channels
         self._looked_at = 0
-        self._repeats, self._patience = [0.5] * channels, [float(MOST_EQUAL)] * channels
+        self._repeats = [0.5] * channels
         self._step = [float("inf")] * channels
         self._recent: deque[tuple[float, list[float], int]] = deque(maxlen=SMOOTHING + 1)
         self._samples = 0
@@ -65,15 +65,18 @@ class SampleChecks:
                 self._equal[j] += 1
                 if self._equal[j] <= FEWEST_EQUAL:
                     self._repeats[j] += share * (1.0 - self._repeats[j])
-                if self._equal[j] >= self._patience[j]:
+                if self._equal[j] >= FEWEST_EQUAL and self._equal[j] >= self._patience(j):
                     found.append(j)
                 continue
             self._equal[j] = 0
             self._repeats[j] -= share * self._repeats[j]
-            enough = math.log(CERTAIN) / math.log(min(max(self._repeats[j], 1e-3), 0.5))
-            self._patience[j] = min(max(enough, FEWEST_EQUAL), MOST_EQUAL)
         self._last = values
         return found
+
+    def _patience(self, channel: int) -> float:
+        """How many equal samples in a row a channel may give, from how often it has repeated itself."""
+        enough = math.log(CERTAIN) / math.log(min(max(self._repeats[channel], 1e-3), 0.5))
+        return min(max(enough, FEWEST_EQUAL), MOST_EQUAL)
 
     def shared_error(self, t: float, values: list[float]) -> list[float] | None:
         """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""

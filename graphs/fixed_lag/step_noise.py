@@ -7,8 +7,11 @@ W = M(q) / (inertia alone), with standard deviations s sqrt(h) and s h sqrt(h/12
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from jointscope.robots.robot import Robot
 
@@ -32,6 +35,9 @@ class StepNoise:
         self._tree = robot.kinematic_tree
         M = self._mass_matrix(np.zeros(robot.layout.n_link))
         self._alone = 1.0 / np.diag(np.linalg.inv(M))
+        r, k = len(self._density), len(robot.layout.positions)
+        self._rate_rows, self._position_rows = np.arange(r), np.arange(r, r + k)
+        self._eye = np.eye(robot.layout.n_link)
         self._kept: tuple[Array, float, tuple[Array, Array]] | None = None
 
     def of_step(self, x: Array, h: float, extra: Array | None = None) -> tuple[Array, Array]:
@@ -56,25 +62,27 @@ class StepNoise:
         return found
 
     def _computed(self, x: Array, h: float, extra: Array | None) -> tuple[Array, Array]:
-        layout, n, k = self._layout, self._layout.n_link, len(self._layout.positions)
-        sigma = self._density * np.sqrt(h)
-        position = sigma[:k] * h / np.sqrt(12.0) if self._integrated else np.full(k, self._position * np.sqrt(h))
+        layout, k = self._layout, len(self._layout.positions)
+        sigma = self._density * math.sqrt(h)
+        position = sigma[:k] * (h / math.sqrt(12.0)) if self._integrated else np.full(k, self._position * math.sqrt(h))
         if extra is not None:
             sigma = np.sqrt(sigma**2 + extra**2)
-        r = len(sigma)
-        W, W_inverse = np.eye(r), np.eye(r)
-        if self._integrated:
-            M = self._mass_matrix(x[layout.q_link])
-            W[:n, :n] = M / self._alone[:, None]
-            W_inverse[:n, :n] = np.linalg.inv(W[:n, :n])
-        T, G = np.zeros((r + k, r + k)), np.zeros((r + k, r + k))
-        rates, positions = layout.rates, layout.positions
-        by_position = W[:k, :k] / position[:, None]
-        T[:r, rates], T[r:, positions] = W / sigma[:, None], by_position
-        G[rates, :r], G[positions, r:] = W_inverse * sigma, W_inverse[:k, :k] * position
-        if self._integrated:
-            T[r:, rates[:k]] = -0.5 * h * by_position
-            G[positions, :r] = 0.5 * h * G[rates[:k], :r]
+        T, G = np.zeros((2, layout.size, layout.size))
+        # as if every coordinate were alone; of the links only where inertia does not weigh
+        T[self._rate_rows, layout.rates], G[layout.rates, self._rate_rows] = 1.0 / sigma, sigma
+        T[self._position_rows, layout.positions], G[layout.positions, self._position_rows] = 1.0 / position, position
+        if not self._integrated:
+            return T, G
+        half, moved = 0.5 * h, layout.velocities
+        T[self._position_rows, moved], G[layout.positions, self._rate_rows[:k]] = -half / position, half * sigma[:k]
+        n, q, v = layout.n_link, layout.q_link, layout.v_link
+        W = self._mass_matrix(x[q]) / self._alone[:, None]
+        W_inverse = lapack.dgesv(W, self._eye)[2]
+        rates, positions = slice(0, n), slice(len(sigma), len(sigma) + n)
+        by_position = W / position[:n, None]
+        T[rates, v], T[positions, q], T[positions, v] = W / sigma[:n, None], by_position, -half * by_position
+        by_rate = W_inverse * sigma[:n]
+        G[v, rates], G[q, rates], G[q, positions] = by_rate, half * by_rate, W_inverse * position[:n]
         return T, G
 
     def _mass_matrix(self, q: Array) -> Array:
