@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 STEP = 1e-4  # relative change of a parameter for the difference quotient; laws are smooth in their parameters
 REBUILT = 0.1  # [sigma] of a parameter's own uncertainty after which the model is built anew
+WIDEST = 0.3  # share of a positive parameter's value that it may be wrong by at the beginning
 SMALLEST = 0.05  # share of the file's value below which a positive parameter is not followed
 
 
@@ -96,6 +97,12 @@ def checked_densities(robot: Robot, densities: Mapping[str, float]) -> dict[str,
 
 
 def prior_sigmas(robot: Robot, names: Sequence[str]) -> Array:
-    """Standard deviations with which adaptation begins, shape (p,): of the calibration, else of the prior."""
+    """Standard deviations with which adaptation begins, shape (p,): of the calibration, else of the prior.
+
+    Never wider than a share of the value where there is one: equations are linear in a parameter over some ten percent
+    only, and a stiffness that could be anything was thrown far away by its first samples and stayed there.
+    """
     found = [robot.parameters[name] for name in names]
-    return np.array([p.sigma if p.sigma is not None else p.prior_sigma for p in found], dtype=float)
+    sigmas = np.array([p.sigma if p.sigma is not None else p.prior_sigma for p in found], dtype=float)
+    widest = [WIDEST * abs(p.value) if p.positive else math.inf for p in found]
+    return np.minimum(sigmas, widest)

@@ -80,7 +80,7 @@ class SampleChecks:
 
     def shared_error(self, t: float, values: list[float]) -> list[float] | None:
         """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""
-        self._samples += 1
+        self._samples += not self._recent or t > self._recent[0][0]
         if not self._recent:
             self._recent.append((t, values, self._samples))
             return None
