@@ -130,10 +130,6 @@ class StateRates:
                 by_torque[layout.v_link, j] = M_inverse[:, row]
         return self._rate(x, tau, a), A, by_torque
 
-    def mass_matrix(self, x: Array) -> Array:
-        """M(q), shape (n_link, n_link) [kg m2]."""
-        return np.asarray(pin.crba(self._model, self._data, x[self.layout.q_link]))
-
     def _rigid(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
         """Accelerations of the links and their derivatives by q, v and tau."""
         found = [self._derivatives(q, v, tau)] if self._moving else []

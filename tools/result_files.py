@@ -139,6 +139,19 @@ def write_closed_loop(result: Any, files: ResultFiles) -> None:
         _write_views(stack, result, files, closed_loop_report, log_closed_loop)
 
 
+def write_replay(result: Any, files: ResultFiles) -> None:
+    """Writes a ReplayResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report.replay_report import replay_report
+        from jointscope.tools.rerun_log.log_replay import log_replay
+
+        _write_views(stack, result, files, replay_report, log_replay)
+
+
 def _write_views(
     stack: ExitStack,
     result: Any,

@@ -7,6 +7,7 @@ history of half a second holds all that a delay or a lag of the catalogue reache
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
@@ -20,11 +21,12 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 
 KEPT = 0.5  # [s] of history beyond the lag where effects need it
-PERIOD_SHARE = 0.02  # weight of a new distance between commands in the running estimate of their period
-CHANGE_SHARE = 5e-4  # the same for the mean square of changes: the last two thousand commands
+RECENT = 41  # commands whose distances tell the period
+EVERY = 10  # commands after which the period is measured again
+SHORTEST = 2e-5  # [s] two commands that are nearer are one that was sent twice
+CHANGE_SHARE = 5e-4  # weight of a new change in the mean square of changes: the last two thousand commands
 HELD_IN_DOUBT = 0.05  # [s] how long a wrong torque lasts where commands have stopped
 SAME_TIME = 1e-6  # [s]
-TYPICAL = 3.0  # distances up to this many periods count as one period with jitter
 
 
 class CommandHistory:
@@ -35,7 +37,7 @@ class CommandHistory:
         lag: length of the estimator's window [s].
 
     Attributes:
-        period: usual distance between two commands [s]; infinite before the third.
+        period: usual distance between two commands [s]; infinite before the second.
         typical_change: root mean square change from one command to the next, shape (n,) [unit of the command].
     """
 
@@ -48,7 +50,9 @@ class CommandHistory:
         self._times: list[float] = []
         self._u: list[Array] = []
         self.period = float("inf")
-        self.typical_change, self._changes_seen = np.zeros(robot.n), 0
+        # as if one of two thousand commands so far had jumped to the full one
+        self.typical_change = np.full(robot.n, math.sqrt(CHANGE_SHARE) * _full_command(robot))
+        self._added = 0
 
     def __len__(self) -> int:
         return len(self._times)
@@ -65,15 +69,14 @@ class CommandHistory:
 
     def add(self, t: float, u: Array) -> None:
         """Takes in a command; it may be older than others."""
-        if self._times and self._times[-1] - t > self._kept:
-            # stamps have jumped back; what was there belongs to another clock
-            self._times.clear()
-            self._u.clear()
         i = bisect_right(self._times, t)
         if i == len(self._times) and i:
-            self._learn(t - self._times[-1], u - self._u[-1])
+            self._learn(u - self._u[-1])
         self._times.insert(i, t)
         self._u.insert(i, u)
+        self._added += 1
+        if self._added <= RECENT or self._added % EVERY == 0:
+            self._measure_period()
         while len(self._times) > 2 and self._times[1] < self._times[-1] - self._kept:
             del self._times[0], self._u[0]
 
@@ -120,32 +123,52 @@ class CommandHistory:
         moved, variance, complete = np.zeros_like(self.typical_change), np.zeros_like(self.typical_change), True
         for i in range(first, last):
             following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
-            missing = min(t1, following) - max(t0, self._times[i] + self.period)
+            begin = self._times[i] + self.period
+            missing = min(t1, following) - max(t0, begin)
             if missing < 0.5 * self.period:
                 continue
             complete, share = False, missing / (t1 - t0)
-            if following > t1 + SAME_TIME:
-                variance += (share * self.typical_change) ** 2
+            # one unknown command acts in all steps of the gap: their errors do not average out
+            together = max(min(following, t1) - begin, missing) / missing
+            if math.isinf(following):
+                variance += together * (share * self.typical_change) ** 2
             else:
                 change = self._u[i + 1] - self._u[i]
-                moved += 0.5 * share * change
-                variance += (share * change) ** 2 / 12.0
+                way = max(t0, begin) + 0.5 * missing - 0.5 * self.period - self._times[i]
+                moved += share * way / (following - self._times[i]) * change
+                variance += together * (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
-    def _learn(self, distance: float, change: Array) -> None:
-        if distance > 0.0:
-            typical = distance < TYPICAL * self.period
-            if not np.isfinite(self.period):
-                self.period = distance
-            elif typical:
-                # the shortest usual distance: lost commands make distances longer, never shorter
-                share = PERIOD_SHARE if distance > self.period else 0.5
-                self.period += share * (min(distance, 1.2 * self.period) - self.period)
-        self._changes_seen += 1
-        share = max(1.0 / self._changes_seen, CHANGE_SHARE)
-        mean_square = self.typical_change**2
+    def unsure_since(self, t: float) -> float:
+        """From when on the command with stamp t [s] changes what acted: where the one before it was due to end."""
+        i = bisect_left(self._times, t)
+        if i == 0:
+            return t
+        due = self._times[i - 1] + self.period
+        return due if t - due > 0.5 * self.period else t
+
+    def acts_until(self, t: float) -> float:
+        """When the command that acts at a time is replaced by the next one [s]; infinity for the last."""
+        i = bisect_right(self._times, t)
+        reach = self._kept if self._changes else 0.0
+        return self._times[i] + reach if i < len(self._times) else float("inf")
+
+    def forget_after(self, t: float) -> None:
+        """Forgets commands with later stamps, which cannot be right."""
+        i = bisect_right(self._times, t)
+        del self._times[i:], self._u[i:]
+
+    def _measure_period(self) -> None:
+        """The median distance; lost commands make some distances longer, and the newest may not have come yet."""
+        recent = self._times[-RECENT:]
+        distances = sorted(b - a for a, b in itertools.pairwise(recent) if b - a > SHORTEST)
+        if distances:
+            self.period = distances[(len(distances) - 1) // 2]
+
+    def _learn(self, change: Array) -> None:
         # rare jumps dominate, and are what a missing command may have been
-        self.typical_change = np.sqrt(mean_square + share * (change**2 - mean_square))
+        mean_square = self.typical_change**2
+        self.typical_change = np.sqrt(mean_square + CHANGE_SHARE * (change**2 - mean_square))
 
     def _after_effects(self, t0: float, t1: float, last: int) -> Array:
         """As `mean`, with the effects on commands."""
@@ -163,3 +186,10 @@ class CommandHistory:
         u, h = path.acting(self._values)[0], np.diff(edges)
         own = edges[:-1] >= t0
         return h[own] @ u[own] / h[own].sum()
+
+
+def _full_command(robot: Robot) -> float:
+    """The largest command where it is known, else zero [unit of the command]."""
+    if robot.command.unit == "duty":
+        return 1.0
+    return float(robot.constants.get("motor.supply_voltage", 0.0)) if robot.command.unit == "V" else 0.0

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,11 +38,14 @@ from jointscope.robots.errors import EstimatorError
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
+Found = TypeVar("Found")
 
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
-GAP = 0.3  # [s] without a tick after which the estimator begins anew
+GAP = 0.3  # [s] without a tick after which the estimator begins anew; so far it predicts
+BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and numpy raise where numbers are impossible
+FEW_MISSING = 0.02  # [s] within this every missing command gets its tick; longer gaps go in longer steps
+QUICKEST = 5e-4  # [s] shortest step that is made for a missing command
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
-MOST_STALE = 100  # messages in a row from before the window after which the clock is taken to have jumped back
 
 
 class FixedLagEstimator:
@@ -76,15 +80,14 @@ class FixedLagEstimator:
         self.robot = with_full_gyros(robot)
         self.layout, self.lag, self._listener = self.robot.layout, lag, listener
         self._engine = TickEngine(self.robot, lag, checked_densities(self.robot, adapt or {}), BIAS_WALK)
-        self._books = Bookkeeping(self.robot)
+        self._books = Bookkeeping(self.robot, lag)
         self.status = self._books.status
         self._commands = CommandHistory(self.robot, lag)
         self._first = FirstSamples(self.robot)
         self._pending: list[Observation] = []
         self._late_ones: list[Innovation] = []  # of late samples since the last update
         self._wanted: float | None = None  # stamp of a command whose tick is not closed yet
-        self._late_command = math.inf  # stamp of the oldest late command
-        self._stale = 0  # stamps in a row that lay before the window
+        self._late_command = math.inf  # from when on late commands change what acted
         self._newest_sample = -math.inf
 
     @property
@@ -94,22 +97,25 @@ class FixedLagEstimator:
 
     def command(self, t: float, u: ArrayLike) -> None:
         """A command that acts from t [s] on, shape (n,), SI unit of the robot's command."""
-        values = self._books.intake.command(t, u)
+        values = self._books.intake.command(t, u, self._now)
         if values is None:
-            return
-        self._books.watch.seen("command", t)
-        if self.status.running and self._is_stale(t):
-            self._books.intake.too_late("command", t, self._engine.time)
             return
         if self.status.running:
             self._close_before(t)
         self._commands.add(t, values)
-        if not self.status.running:
+        newest = self._now
+        if newest is None:
+            return
+        self._books.watch.seen("command", t)
+        if self._commands.acts_until(t) <= self._engine.past[0].time:
+            self._books.intake.too_late("command", t, newest)
             return
         self.status.used["command"] += 1
-        newest = self._engine.time if self._wanted is None else self._wanted
+        since = self._commands.unsure_since(t)
+        if since < self._engine.time - AT_TICK:
+            # what happened in the gap before it is now seen differently
+            self._late_command = min(since, self._late_command)
         if t < newest - AT_TICK:
-            self._late_command = min(t, self._late_command)
             self.status.late["command"] += 1
         elif t - newest > min(NEAR * self._commands.period, LONGEST_STEP) or t - newest > LONGEST_STEP:
             self._wanted = t
@@ -136,19 +142,22 @@ class FixedLagEstimator:
         if name == "command":
             self.command(t, values)
             return
-        observations = self._books.intake.sample(name, t, values)
+        observations = self._books.intake.sample(name, t, values, self._now)
+        if self._books.clock.was_set:
+            self._go_to(t)
         if not observations:
             return
-        self._books.watch.seen(name, t)
-        self._newest_sample = max(self._newest_sample, observations[0].taken)
         if not self.status.running:
             if self._first.add(observations):
                 self._start()
             return
-        fresh = [o for o in observations if not self._is_stale(o.taken)]
+        self._books.watch.seen(name, t)
+        oldest = self._engine.past[0].time
+        fresh = [o for o in observations if o.taken >= oldest]
         if len(fresh) < len(observations):
             self._books.intake.too_late(name, t, self._engine.time)
         if fresh:
+            self._newest_sample = max(self._newest_sample, fresh[0].taken)
             self._close_before(max(o.taken for o in fresh))
             self._pending += fresh if self.status.running else []
 
@@ -156,15 +165,21 @@ class FixedLagEstimator:
         """The robot's state with all that is known by now.
 
         Args:
-            t: when [s]; the newest tick or sample if left out. Later times are predicted with the last command.
+            t: when [s]; the newest tick or sample if left out. Later times are predicted with the last command, up to
+                0.3 s ahead; beyond that nothing is known and the covariance infinite.
+
+        Raises:
+            EstimatorError: a time that is not finite.
         """
-        if not self.status.running:
+        if t is not None and not math.isfinite(t):
+            raise EstimatorError(f"state at {t} s: expected a finite time, or None for the newest")
+        if self.status.running:
+            self._catch_up(t)
+        if not self.status.running or (t is not None and t > self._engine.time + GAP):
             time = t if t is not None else max(self._newest_sample, 0.0)
             return unknown_state(self.layout, time, self._first.newest, time - self._newest_sample)
-        self._catch_up(t)
         when = self._engine.time if t is None else max(t, self._engine.time)
-        u = self._commands.mean(self._engine.time, when) if when > self._engine.time else np.zeros(self.robot.n)
-        return self._state_of(when, self._engine.ahead(when, u))
+        return self._state_of(when, self._engine.ahead(when, self._acting))
 
     def smoothed(self, covariance: bool = True) -> EstimatedState | None:
         """The state at the lag, smoothed with everything since; None until the window is full.
@@ -174,19 +189,38 @@ class FixedLagEstimator:
         """
         if not self.status.running or self._engine.time - self._engine.past[0].time < 0.9 * self.lag:
             return None
-        return self._state_of(*self._engine.smoothed(covariance))
+        found = self._unbroken(lambda: self._engine.smoothed(covariance))
+        return None if found is None else self._state_of(*found)
 
     def newest_of_window(self) -> EstimatedState | None:
         """The newest tick as GTSAM's window has it: `state()` up to rounding, and slower; None before the start."""
         if not self.status.running:
             return None
-        return self._state_of(self._engine.time, self._engine.from_window())
+        found = self._unbroken(self._engine.from_window)
+        return None if found is None else self._state_of(self._engine.time, found)
+
+    @property
+    def _now(self) -> float | None:
+        """Time of the newest tick, closed or not [s]; None before there is one."""
+        if not self.status.running:
+            return None
+        return self._engine.time if self._wanted is None else self._wanted
+
+    def _unbroken(self, work: Callable[[], Found]) -> Found | None:
+        """What some work of the engine finds; None, and a new beginning, where its numbers are impossible."""
+        try:
+            return work()
+        except BROKEN as err:
+            self._restart(self._engine.time, f"the numbers of an update broke down ({type(err).__name__})")
+            return None
 
     def _start(self) -> None:
         layout, before = self._engine.layout, self._engine.kept if self.status.restarts else None
         time, state = first_state(self.robot, layout, self._first.samples, before)
         self._engine.start(time, state)
         self._forget()
+        self._commands.forget_after(time + GAP)
+        self._newest_sample = time
         self.status.running = True
         self._books.log.tell(time, "started", "estimator", f"states are estimated from {time:.3f} s on")
 
@@ -194,25 +228,15 @@ class FixedLagEstimator:
         """Closes all ticks that a message with stamp t shows to be complete."""
         if self._wanted is not None and t > self._wanted + AT_TICK:
             self._close(self._wanted)
-        newest = self._engine.time if self._wanted is None else self._wanted
+        newest = self._now
+        if newest is None:
+            return
         if t - newest > GAP:
             self._restart(t, f"nothing came for {t - newest:.2f} s")
             return
         # commands that are slow or have stopped: ticks go on without them
-        step = min(self._commands.period, LONGEST_STEP)
-        while self.status.running and t - newest > 1.5 * LONGEST_STEP and self._wanted is None:
-            newest = newest + step if t - newest > 2.0 * step else t - SHORTEST_STEP
-            self._close(newest)
-
-    def _is_stale(self, t: float) -> bool:
-        """Whether a stamp lies before the window; many in a row mean that the clock has jumped back."""
-        if not self.status.running or t >= self._engine.past[0].time:
-            self._stale = 0
-            return False
-        self._stale += 1
-        if self._stale > MOST_STALE:
-            self._restart(t, f"the last {self._stale} stamps lie before the window, {self._engine.time - t:.2f} s back")
-        return True
+        if t - newest > 1.5 * LONGEST_STEP and self._wanted is None:
+            self._close(t - SHORTEST_STEP)
 
     def _catch_up(self, t: float | None) -> None:
         """Closes what is open at the time for which a state is wanted."""
@@ -221,14 +245,37 @@ class FixedLagEstimator:
         if not self.status.running:
             return
         newest = max((o.taken for o in self._pending), default=-math.inf)
-        if newest > self._engine.time + SHORTEST_STEP and (t is None or newest <= t + AT_TICK):
+        if newest > self._engine.time + AT_TICK and (t is None or newest <= t + AT_TICK):
             self._close(newest)
         elif (self._pending and self._wanted is None) or self._late_command < math.inf:
-            self._late_ones.extend(self._take_late_ones())
+            self._late_ones.extend(self._unbroken(self._take_late_ones) or [])
 
     def _close(self, time: float) -> None:
+        """Goes on to a new tick; where commands are missing on the way, their ticks are made, too."""
+        parts = self._parts(time - self._engine.time)
+        begin = self._engine.time
+        for i in range(1, parts):
+            if self.status.running:
+                self._close_one(begin + (time - begin) * i / parts)
+        if self.status.running:
+            self._close_one(time)
+
+    def _parts(self, h: float) -> int:
+        """Ticks into which a step of length h [s] is divided: samples are best taken at a tick."""
+        usual = min(max(self._commands.period, QUICKEST), LONGEST_STEP)
+        return round(h / (usual if h < FEW_MISSING else LONGEST_STEP))
+
+    def _close_one(self, time: float) -> None:
         """One update: late messages, the step to a new tick, its samples."""
         began = clock.perf_counter()
+        found = self._unbroken(lambda: self._update(time))
+        if self._wanted is not None and time >= self._wanted - AT_TICK:
+            self._wanted = None
+        if found is not None:
+            self._finish(*found, clock.perf_counter() - began)
+
+    def _update(self, time: float) -> tuple[list[Innovation], int, list[Observation]]:
+        """Takes in what came up to a time; all innovations, how many of the last are new, and the new samples."""
         innovations = [*self._late_ones, *self._take_late_ones()]
         self._late_ones.clear()
         engine, now, found = self._engine, list[Observation](), list[Innovation]()
@@ -240,16 +287,13 @@ class FixedLagEstimator:
             u, doubt = self._acting(engine.time, time)
             found = engine.advance(time, u, doubt, now)
             innovations += found
-        if self._wanted is not None and time >= self._wanted - AT_TICK:
-            self._wanted = None
-        self._finish(innovations, len(found), now, clock.perf_counter() - began)
+        return innovations, len(found), now
 
     def _take_late_ones(self) -> list[Innovation]:
         """Messages about times before the newest tick."""
         engine, found = self._engine, list[Innovation]()
         if self._late_command < math.inf:
-            engine.correct_commands(self._late_command, self._acting)
-            self._pending += self._books.readmitted(self._late_command)
+            self._books.reconsidered(engine.correct_commands(self._late_command, self._acting))
             self._late_command = math.inf
         late = [o for o in self._pending if o.taken <= engine.time + AT_TICK]
         if late:
@@ -258,16 +302,17 @@ class FixedLagEstimator:
                 if o.taken < engine.time - AT_TICK:
                     self._books.intake.is_late(o, engine.time)
             found = engine.late(late)
-            self._books.count(late, found)
+            self._books.count(found)
         return found
 
     def _finish(self, innovations: list[Innovation], fresh: int, used: list[Observation], seconds: float) -> None:
         """Counts, sanity, listener; the last `fresh` innovations were not counted yet."""
         began, engine = clock.perf_counter(), self._engine
-        self._books.count(used, innovations[len(innovations) - fresh :])
+        self._books.count(innovations[len(innovations) - fresh :])
         fits = self._books.updated(engine.time, innovations)
-        if not (fits and math.isfinite(float(engine.newest.mean.sum()))):
-            self._restart(engine.time, "the estimate contradicted the encoders for a tenth of a second")
+        if not (fits and engine.newest.is_possible):
+            why = "became impossible" if fits else "contradicted the encoders for a tenth of a second"
+            self._restart(engine.time, f"the estimate {why}")
             return
         if self._listener is not None:
             state = self._state_of(engine.time, engine.newest)
@@ -277,15 +322,23 @@ class FixedLagEstimator:
     def _restart(self, t: float, reason: str) -> None:
         self.status.running, self.status.restarts = False, self.status.restarts + 1
         self._forget()
-        self._books.log.tell(t, "restarted", "estimator", f"{reason}; the estimator begins anew, biases are kept")
+        kept = "biases are kept" if self._engine.kept is not None else "with biases as in the robot file"
+        self._books.log.tell(t, "restarted", "estimator", f"{reason}; the estimator begins anew, {kept}")
+
+    def _go_to(self, t: float) -> None:
+        """Begins anew where the encoders' stamps are now."""
+        if self.status.running:
+            self._restart(t, f"the stamps of the encoders went from {self._engine.time:.3f} s to {t:.3f} s")
+        self._books.clock_was_set()
+        self._commands, self._newest_sample = CommandHistory(self.robot, self.lag), -math.inf
 
     def _forget(self) -> None:
         """Nothing of what waits is used any more."""
         self._first.samples.clear()
         self._pending.clear()
         self._late_ones.clear()
-        self._books.forget_glitches()
-        self._wanted, self._late_command, self._stale = None, math.inf, 0
+        self._books.begins_anew()
+        self._wanted, self._late_command = None, math.inf
 
     def _acting(self, t0: float, t1: float) -> tuple[Array, Array | None]:
         """Mean command over a step, and the standard deviation of the torques that missing commands leave open."""

@@ -9,6 +9,7 @@ KINDS = (
     "started",
     "late",
     "too_late",
+    "too_early",
     "duplicate",
     "not_finite",
     "stuck",

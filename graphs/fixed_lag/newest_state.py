@@ -28,6 +28,12 @@ class NewestState:
     mean: Array
     covariance: Array
 
+    @property
+    def is_possible(self) -> bool:
+        """Whether all numbers are finite and no variance is negative."""
+        variance = self.covariance.diagonal()
+        return bool(np.isfinite(self.mean).all() and np.isfinite(self.covariance).all() and variance.min() >= 0.0)
+
     def predicted(self, mean: Array, F: Array, Q: Array) -> NewestState:
         """After a step, with mean as integrated, transition F and covariance Q of the step, shapes (D,), (D, D)."""
         return NewestState(mean, F @ self.covariance @ F.T + Q)

@@ -21,11 +21,19 @@ LONGEST_GLITCH = 0.005  # [s] and
 MOST_IN_A_ROW = 5  # samples of a channel that may be refused before it is believed again
 
 
+Far = dict[tuple[str, int], tuple[float, int]]
+"""By sensor and channel: since when it has been far away [s], and for how many samples."""
+
+
 class OutlierGate:
-    """Remembers for each channel since when it has been far away."""
+    """Remembers for each channel since when it has been far away.
+
+    Attributes:
+        far: channels that are far away now.
+    """
 
     def __init__(self) -> None:
-        self._far: dict[tuple[str, int], tuple[float, int]] = {}
+        self.far: Far = {}
 
     def believed(self, observations: Sequence[Observation], residual: Array, sigma: Array) -> NDArray[np.bool_]:
         """Rows to use, shape (r,).
@@ -36,17 +44,17 @@ class OutlierGate:
             sigma: expected standard deviation of the innovation, shape (r,).
         """
         near = np.abs(residual) < FAR * sigma
-        if near.all() and not self._far:
+        if near.all() and not self.far:
             return near
         keep, row = near.copy(), 0
         for o in observations:
             for channel in o.channels.tolist():
                 seat = o.sensor, channel
                 if near[row]:
-                    self._far.pop(seat, None)
+                    self.far.pop(seat, None)
                 else:
-                    since, count = self._far.get(seat, (o.stamp, 0))
-                    self._far[seat] = since, count + 1
+                    since, count = self.far.get(seat, (o.stamp, 0))
+                    self.far[seat] = since, count + 1
                     keep[row] = count >= MOST_IN_A_ROW and o.stamp - since > LONGEST_GLITCH
                 row += 1
         return keep

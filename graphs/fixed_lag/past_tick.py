@@ -1,37 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ticks in the window and the steps between them, kept for what comes late."""
+"""The ticks in the window, with all that is needed to take the steps between them anew."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.fixed_lag.tick_step import TickStep
+from jointscope.graphs.fixed_lag.newest_state import NewestState
+from jointscope.graphs.fixed_lag.observation import Observation
+from jointscope.graphs.fixed_lag.outlier_gate import Far
 
 Array = NDArray[np.float64]
-
-
-@dataclass
-class PastStep:
-    """A step that may be weighed anew when commands come late.
-
-    Attributes:
-        start: state in which it was linearised, shape (D,).
-        h: length [s].
-        u: mean command, shape (n,).
-        step: its linearization.
-        by_parameters: change of its end per adapted parameter, before the dynamics of the end, shape (d, p).
-        moved: how the defect has changed by other commands since, shape (d,).
-    """
-
-    start: Array
-    h: float
-    u: Array
-    step: TickStep
-    by_parameters: Array
-    moved: Array
 
 
 @dataclass
@@ -41,13 +22,19 @@ class PastTick:
     Attributes:
         number: of the tick.
         time: [s].
+        observations: samples of the step that led here, those taken for glitches included.
         nominal: state from which deviations count, shape (D,).
-        slot: of the factor of the step that led here; -1 for the first tick.
-        step: that led here; None for the first tick.
+        filtered: the state here when it was the newest.
+        slots: of the factors of the step that led here.
+        glitches: sensor of each sample of it that was taken for a glitch.
+        far: channels that had been far away when the tick was closed.
     """
 
     number: int
     time: float
+    observations: tuple[Observation, ...]
     nominal: Array
-    slot: int = -1
-    step: PastStep | None = None
+    filtered: NewestState
+    slots: list[int] = field(default_factory=list)
+    glitches: tuple[str, ...] = ()
+    far: Far = field(default_factory=dict)

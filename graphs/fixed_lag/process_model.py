@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from jointscope.graphs.fixed_lag.adaptation import Adaptation
 from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.newest_state import NewestState
-from jointscope.graphs.fixed_lag.past_tick import PastStep, PastTick
-from jointscope.graphs.fixed_lag.smoother_window import Rows
 from jointscope.graphs.fixed_lag.step_noise import StepNoise
 from jointscope.graphs.fixed_lag.tick_step import RatesAt, TickStep, take_step
 from jointscope.robots.robot import Robot
@@ -28,14 +26,16 @@ class Prediction:
     Attributes:
         state: at the end.
         F: transition, shape (D, D).
-        T: whitens the defect of the robot's own state, shape (d, d).
-        step: for the window.
+        A0: whitened rows of the step by its beginning, shape (D, D).
+        A1: by its end.
+        end: rates of the robot near the end; None where they are not known.
     """
 
     state: NewestState
     F: Array
-    T: Array
-    step: PastStep
+    A0: Array
+    A1: Array
+    end: RatesAt | None
 
 
 class ProcessModel:
@@ -51,7 +51,7 @@ class ProcessModel:
     def __init__(self, robot: Robot, layout: AugmentedLayout, adapt: Mapping[str, float], bias_walk: float):
         self.layout, self._rule = layout, robot.choices.integrator
         self._adaptation = Adaptation(robot, tuple(adapt))
-        self._noise = StepNoise(robot, self._adaptation.model)
+        self._noise = StepNoise(robot)
         walk = [bias_walk] * (3 * len(layout.gyros)) + list(adapt.values())
         self._walk, self._ones = np.array(walk), np.ones(robot.n)
         self._walk_kept: tuple[float, tuple[Array, Array, Array, Array]] | None = None
@@ -82,34 +82,19 @@ class ProcessModel:
         model = self._adaptation.model
         step = take_step(model, self._rule, own, model.command_torque(u), h, self._near)
         T, G = self._noise.of_step(own, h, self._extra(step, doubt))
-        F, Q = (part.copy() for part in self._walked(h)[:2])
+        F, Q, A0, A1 = (part.copy() for part in self._walked(h))
         F[:d, :d] = step.transition
+        A0[:d, :d], A1[:d, :d] = T @ step.by_start, T @ step.by_end
         spread = step.by_end_inverse @ G
         Q[:d, :d] = spread @ spread.T
-        mean, slopes = x0.mean.copy(), np.zeros((d, 0))
+        mean = x0.mean.copy()
         mean[:d] = step.x1
         if layout.parameters:
             slopes = h * self._adaptation.slopes(own, u)
+            A0[:d, layout.adapted] = -T @ slopes
             F[:d, layout.adapted] = step.by_end_inverse @ slopes
             mean[:d] += F[:d, layout.adapted] @ (x0.mean[layout.adapted] - self._adaptation.at)
-        return Prediction(x0.predicted(mean, F, Q), F, T, PastStep(x0.mean, h, u, step, slopes, np.zeros(d)))
-
-    def corrected(self, past: PastStep, u: Array, doubt: Array | None) -> Array:
-        """Changes the mean command of a step, shape (n,); returns the whitening of its defect, shape (d, d)."""
-        past.moved = past.moved + past.step.by_torque @ (self.torque_gain * (u - past.u))
-        past.u = u
-        return self._noise.of_step(past.start[: self.layout.d], past.h, self._extra(past.step, doubt))[0]
-
-    def rows(self, before: PastTick, past: PastStep, T: Array) -> Rows:
-        """Whitened rows of a step from a tick; T whitens its defect, shape (d, d)."""
-        d, adapted = self.layout.d, self.layout.adapted
-        A0, A1 = (part.copy() for part in self._walked(past.h)[2:])
-        A0[:d, :d], A1[:d, :d] = T @ past.step.by_start, T @ past.step.by_end
-        if self.layout.parameters:
-            A0[:d, adapted] = -T @ past.by_parameters
-        b = A0 @ (past.start - before.nominal)
-        b[:d] += T @ past.moved
-        return Rows((before.number, before.number + 1), (A0, A1), b)
+        return Prediction(x0.predicted(mean, F, Q), F, A0, A1, step.end)
 
     def _extra(self, step: TickStep, doubt: Array | None) -> Array | None:
         """Standard deviation of velocities and memories over a step from that of the motors' torques, shape (r,)."""

@@ -6,12 +6,13 @@ from __future__ import annotations
 import math
 from collections import deque
 
-STUCK_AFTER = 20  # equal samples in a row of a channel with noise: it is saturated or dead
+CERTAIN = 1e-6  # probability of as many equal samples in a row by chance, below which a channel is saturated or dead
+FEWEST_EQUAL, MOST_EQUAL = 2, 20  # samples that repeat the one before
+MEMORY = 0.01  # weight of a new sample in the share of those that repeat the one before
 COARSE = 1.0  # [sigma] an encoder whose smallest change is larger is quantized; see graphs/coarse_encoder.py
 SMOOTHING = 50  # samples over which its speed is averaged
 MOST = 100.0  # samples that may share one error
 SMALLEST_CHANGE = 1e-12  # [unit] differences below this are rounding
-RECENT = 1.0  # [s] within which stamps are compared
 STAMPS = 4096  # stamps remembered against repetitions
 
 
@@ -28,59 +29,74 @@ class SampleChecks:
         self._sigma, self._noisy = sigma, noisy
         self._stamps: set[float] = set()
         self._order: deque[float] = deque()
-        self._newest = -math.inf
         self._last: list[float] = [float("nan")] * channels
         self._equal = [0] * channels
+        self._looked_at = 0
+        self._repeats, self._patience = [0.5] * channels, [float(MOST_EQUAL)] * channels
         self._step = [float("inf")] * channels
-        self._recent: deque[tuple[float, list[float]]] = deque(maxlen=SMOOTHING + 1)
+        self._recent: deque[tuple[float, list[float], int]] = deque(maxlen=SMOOTHING + 1)
+        self._samples = 0
 
     def is_duplicate(self, t: float) -> bool:
         """Whether a sample with this stamp came before; remembers it."""
-        if t < self._newest - RECENT:
-            return False  # far too late, or the clock has jumped back: others see to that
         if t in self._stamps:
             return True
-        self._newest = max(t, self._newest)
         self._stamps.add(t)
         self._order.append(t)
         if len(self._order) > STAMPS:
             self._stamps.discard(self._order.popleft())
         return False
 
+    def forget(self) -> None:
+        """Forgets all stamps: the clock was set."""
+        self._stamps.clear()
+        self._order.clear()
+        self._recent.clear()
+
     def stuck(self, values: list[float]) -> list[int]:
         """Channels that repeat one value although they have noise."""
         if not self._noisy:
             return []
         found = []
+        self._looked_at += 1
+        share = max(1.0 / (self._looked_at + 1), MEMORY)
         for j, value in enumerate(values):
             if value == self._last[j]:
                 self._equal[j] += 1
-                if self._equal[j] >= STUCK_AFTER:
+                if self._equal[j] <= FEWEST_EQUAL:
+                    self._repeats[j] += share * (1.0 - self._repeats[j])
+                if self._equal[j] >= self._patience[j]:
                     found.append(j)
-            else:
-                self._equal[j] = 0
+                continue
+            self._equal[j] = 0
+            self._repeats[j] -= share * self._repeats[j]
+            enough = math.log(CERTAIN) / math.log(min(max(self._repeats[j], 1e-3), 0.5))
+            self._patience[j] = min(max(enough, FEWEST_EQUAL), MOST_EQUAL)
         self._last = values
         return found
 
     def shared_error(self, t: float, values: list[float]) -> list[float] | None:
         """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""
+        self._samples += 1
         if not self._recent:
-            self._recent.append((t, values))
+            self._recent.append((t, values, self._samples))
             return None
-        before_t, before = self._recent[-1]
+        before_t, before, _ = self._recent[-1]
         for j, value in enumerate(values):
             change = abs(value - before[j])
             if SMALLEST_CHANGE < change < self._step[j]:
                 self._step[j] = change
         if t > before_t:
-            self._recent.append((t, values))
-        threshold = COARSE * self._sigma
-        coarse = [threshold < step < float("inf") for step in self._step]
-        if len(self._recent) <= SMOOTHING or not any(coarse):
+            self._recent.append((t, values, self._samples))
+        enough = len(self._recent) > SMOOTHING
+        # a reading that has never changed repeats one error, however large the encoder's step is
+        coarse = [step > COARSE * self._sigma and (enough or math.isinf(step)) for step in self._step]
+        if not any(coarse):
             return None
-        first = self._recent[0][1]
+        _, first, begin = self._recent[0]
+        count = max(self._samples - begin, SMOOTHING)  # with those that came late
         # samples that share one error: a step over the way from one sample to the next
-        ways = [abs(value - start) / SMOOTHING for value, start in zip(values, first, strict=True)]
+        ways = [abs(value - start) / count for value, start in zip(values, first, strict=True)]
         return [
             math.sqrt(min(max(step / max(way, SMALLEST_CHANGE), 1.0), MOST)) if is_coarse else 1.0
             for step, way, is_coarse in zip(self._step, ways, coarse, strict=True)

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jointscope.graphs.fixed_lag.clock_watch import ClockWatch
 from jointscope.graphs.fixed_lag.innovation import Innovation
 from jointscope.graphs.fixed_lag.observation import Observation
 from jointscope.graphs.fixed_lag.sample_checks import SampleChecks
@@ -21,6 +22,8 @@ from jointscope.robots.sensors import Gyro
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e6  # [SI] no angle, rate or command is larger; beyond it a number is as good as none
+
 
 class SampleIntake:
     """The way into the estimator.
@@ -29,10 +32,11 @@ class SampleIntake:
         robot: sensors and effects on their stamps.
         status: counts what comes and what is dropped.
         log: receives events.
+        clock: tells stamps that cannot be.
     """
 
-    def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog):
-        self._robot, self._status, self._log = robot, status, log
+    def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
+        self._robot, self._status, self._log, self._clock = robot, status, log, clock
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
         self._checks = {"command": SampleChecks(robot.n, 0.0, False)}
         self._sigmas = {name: np.full(len(s.channels), s.sigma) for name, s in robot.sensors.items()}
@@ -40,27 +44,27 @@ class SampleIntake:
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(len(sensor.channels), sensor.sigma, isinstance(sensor, Gyro))
 
-    def command(self, t: float, u: ArrayLike) -> Array | None:
-        """A command if it can be used, shape (n,)."""
-        values = self._shaped("command", t, u, self._robot.n)
+    def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
+        """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one."""
+        values = self._shaped("command", t, u, self._robot.n, now)
         if values is None:
             return None
-        if not math.isfinite(sum(values.tolist())):
+        if _useless(values.tolist()):
             self._drop("command", t, "not_finite", "a command that is not finite was left out")
             return None
         return values
 
-    def sample(self, name: str, t: float, values: ArrayLike) -> list[Observation]:
-        """The channels of a sample that can be used, in groups that were taken at the same time."""
+    def sample(self, name: str, t: float, values: ArrayLike, now: float | None) -> list[Observation]:
+        """The channels of a sample that can be used, in groups taken at the same time; now as in `command`."""
         if name not in self._groups:
             known = ", ".join(["command", *self._groups])
             raise EstimatorError(f"no sensor {name!r}; robot {self._robot.name!r} has {known}")
         sensor, checks = self._robot.sensors[name], self._checks[name]
-        found = self._shaped(name, t, values, len(sensor.channels))
+        found = self._shaped(name, t, values, len(sensor.channels), now)
         if found is None:
             return []
         numbers = found.tolist()
-        bad = [] if math.isfinite(sum(numbers)) else [j for j, value in enumerate(numbers) if not math.isfinite(value)]
+        bad = _useless(numbers)
         if bad:
             self._drop(name, t, "not_finite", f"{name} gave values that are not finite; they are left out")
         stuck = checks.stuck(numbers)
@@ -81,6 +85,11 @@ class SampleIntake:
                 result.append(Observation(name, t, taken, channels, *chosen))
         return result
 
+    def forget_stamps(self) -> None:
+        """Stamps may come again: the clock was set."""
+        for checks in self._checks.values():
+            checks.forget()
+
     def too_late(self, name: str, t: float, now: float) -> None:
         """Counts a message from before the window."""
         self._drop(name, now, "too_late", f"{name}: a message came {now - t:.3f} s late, after its window")
@@ -96,14 +105,21 @@ class SampleIntake:
         names = ", ".join(innovation.channels)
         self._drop(innovation.sensor, innovation.time, "outlier", f"{names}: {far:.0f} sigma off, taken for a glitch")
 
-    def _shaped(self, name: str, t: float, values: ArrayLike, size: int) -> Array | None:
+    def _shaped(self, name: str, t: float, values: ArrayLike, size: int, now: float | None) -> Array | None:
         """Values of the right shape; None if the stamp makes them useless."""
-        found = np.asarray(values, dtype=float)
+        try:
+            found, finite = np.asarray(values, dtype=float), math.isfinite(t)
+        except (TypeError, ValueError) as err:
+            raise EstimatorError(f"{name}: expected a stamp [s] and {size} numbers, got {t!r} and {values!r}") from err
         if found.shape != (size,):
             raise EstimatorError(f"{name}: expected {size} values, got an array of shape {found.shape}")
         self._status.received[name] += 1
-        if not math.isfinite(t):
-            self._drop(name, 0.0, "not_finite", f"{name}: a stamp that is not finite was left out")
+        if not finite:
+            self._drop(name, now or 0.0, "not_finite", f"{name}: a stamp that is not finite was left out")
+            return None
+        misplaced = None if now is None else self._clock.misplaces(name, t, now)
+        if misplaced is not None:
+            self._drop(name, now or 0.0, misplaced, f"{name}: stamp {t:.3f} s does not belong to the present run")
             return None
         if self._checks[name].is_duplicate(t):
             self._drop(name, t, "duplicate", f"{name}: two messages with one stamp; the first counts")
@@ -113,6 +129,13 @@ class SampleIntake:
     def _drop(self, name: str, t: float, kind: str, text: str) -> None:
         self._status.drop(name, kind)
         self._log.tell(t, kind, name, text)
+
+
+def _useless(numbers: list[float]) -> list[int]:
+    """Places of numbers that are not finite or impossibly large."""
+    if all(-LARGEST <= number <= LARGEST for number in numbers):
+        return []
+    return [j for j, number in enumerate(numbers) if not -LARGEST <= number <= LARGEST]
 
 
 def _lateness(effects: tuple[EffectAt, ...], t: float, values: dict[str, float]) -> float:

@@ -11,7 +11,7 @@ from scipy.linalg import lapack
 
 from jointscope.graphs.fixed_lag.innovation import Innovation
 from jointscope.graphs.fixed_lag.observation import Observation, ObservedRows
-from jointscope.graphs.fixed_lag.outlier_gate import OutlierGate
+from jointscope.graphs.fixed_lag.outlier_gate import Far, OutlierGate
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,15 @@ class SampleJudge:
 
     def __init__(self, channels: Mapping[str, tuple[str, ...]]):
         self._channels, self._gate = channels, OutlierGate()
+
+    @property
+    def memory(self) -> Far:
+        """Channels that are far away now."""
+        return dict(self._gate.far)
+
+    def go_back_to(self, memory: Far) -> None:
+        """Forgets what was judged since `memory` was told."""
+        self._gate.far = dict(memory)
 
     def judged(
         self, observations: Sequence[Observation], seen: ObservedRows, S: Array

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.robot import Robot
-from jointscope.robots.state_rates import StateRates
 
 Array = NDArray[np.float64]
 
@@ -23,16 +22,16 @@ class StepNoise:
 
     Args:
         robot: its noise and layout.
-        model: for the mass matrix.
     """
 
-    def __init__(self, robot: Robot, model: StateRates):
+    def __init__(self, robot: Robot):
         self._layout, noise = robot.layout, robot.noise
         self._integrated, self._position = noise.model == "integrated", noise.position
         self._density = np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
-        M = model.mass_matrix(np.zeros(robot.layout.size))
+        # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
+        self._tree = robot.kinematic_tree
+        M = self._mass_matrix(np.zeros(robot.layout.n_link))
         self._alone = 1.0 / np.diag(np.linalg.inv(M))
-        self._model = model
         self._kept: tuple[Array, float, tuple[Array, Array]] | None = None
 
     def of_step(self, x: Array, h: float, extra: Array | None = None) -> tuple[Array, Array]:
@@ -65,7 +64,7 @@ class StepNoise:
         r = len(sigma)
         W, W_inverse = np.eye(r), np.eye(r)
         if self._integrated:
-            M = self._model.mass_matrix(x)
+            M = self._mass_matrix(x[layout.q_link])
             W[:n, :n] = M / self._alone[:, None]
             W_inverse[:n, :n] = np.linalg.inv(W[:n, :n])
         T, G = np.zeros((r + k, r + k)), np.zeros((r + k, r + k))
@@ -77,3 +76,6 @@ class StepNoise:
             T[r:, rates[:k]] = -0.5 * h * by_position
             G[positions, :r] = 0.5 * h * G[rates[:k], :r]
         return T, G
+
+    def _mass_matrix(self, q: Array) -> Array:
+        return self._tree.mass_matrix(q[None])[0]

@@ -9,7 +9,8 @@ then read from the window again.
 from __future__ import annotations
 
 import itertools
-from collections import deque
+import math
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -23,12 +24,14 @@ from jointscope.graphs.fixed_lag.past_tick import PastTick
 from jointscope.graphs.fixed_lag.process_model import Prediction, ProcessModel
 from jointscope.graphs.fixed_lag.sample_judge import SampleJudge
 from jointscope.graphs.fixed_lag.smoother_window import Rows, SmootherWindow
+from jointscope.graphs.timeline import LONGEST_STEP
 from jointscope.robots.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 Acting = Callable[[float, float], tuple[Array, Array | None]]
+WALKED_TOO_FAR = 6.0  # [sigma of the prior] a bias that is further away is not kept when the estimator begins anew
 COMMITTED_TOGETHER = 5  # ticks that wait for iSAM2; the newest state does not need it
 
 
@@ -45,11 +48,16 @@ class TickEngine:
     def __init__(self, robot: Robot, lag: float, adapt: Mapping[str, float], bias_walk: float):
         self.layout = AugmentedLayout(robot.layout, tuple(g.name for g in robot.gyros), tuple(adapt))
         self._lag, self._scale = lag, self.layout.scale(robot)
+        self._bias_prior = (
+            np.concatenate([np.zeros(0), *(g.bias for g in robot.gyros)]),
+            np.repeat([g.bias_prior_sigma for g in robot.gyros], 3),
+        )
         self._process = ProcessModel(robot, self.layout, adapt, bias_walk)
         self._readings = ReadingsAtOneState(robot)
         self._judge = SampleJudge({name: sensor.channels for name, sensor in robot.sensors.items()})
         self.past: deque[PastTick] = deque()
-        self._uncommitted: list[tuple[PastTick, int]] = []  # and the place of each step among the new factors
+        self._uncommitted: list[tuple[PastTick, int]] = []  # ticks and the places of their rows among the new factors
+        self._waiting = 0  # ticks that are not in the window yet
 
     @property
     def time(self) -> float:
@@ -63,18 +71,22 @@ class TickEngine:
 
     @property
     def kept(self) -> NewestState | None:
-        """The newest state if it can be gone on from, else None."""
+        """The newest state if its biases are worth keeping: possible, and near what was known of them before."""
         found = getattr(self, "newest", None)
-        good = found is not None and np.isfinite(found.mean).all() and np.isfinite(found.covariance).all()
-        return found if good else None
+        if found is None or not found.is_possible:
+            return None
+        far = np.abs(found.mean[self.layout.d : self.layout.adapted.start] - self._bias_prior[0])
+        return found if bool(np.all(far < WALKED_TOO_FAR * self._bias_prior[1])) else None
 
     def start(self, time: float, state: NewestState) -> None:
         """Begins with a Gaussian at a time."""
         self.newest, self.window = state, SmootherWindow(self._lag, self._scale)
         self.past.clear()
         self._uncommitted.clear()
+        self._waiting = 0
         self._process.begins_near(None)
-        self.past.append(PastTick(0, time, state.mean.copy()))
+        self._judge.go_back_to({})
+        self.past.append(PastTick(0, time, (), state.mean.copy(), state))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
         self.window.add_rows(Rows((0,), (root,), np.zeros(len(root))))
@@ -93,15 +105,12 @@ class TickEngine:
         """
         before, x0 = self.past[-1], self.newest
         found = self._process.predicted(x0, time - before.time, u, doubt)
-        self._process.begins_near(found.step.step.end)
-        here = PastTick(before.number + 1, time, found.state.mean.copy(), -1, found.step)
+        here = PastTick(before.number + 1, time, tuple(observations), found.state.mean.copy(), found.state)
         self.window.add_tick(here.number, time)
-        first_row = self.window.add_rows(self._process.rows(before, found.step, found.T))
-        innovations = self._take_in(observations, x0, found, before, here) if observations else []
-        self.newest = found.state
+        innovations = self._step(before, here, x0, found)
         self.past.append(here)
-        self._uncommitted.append((here, first_row))
-        if len(self._uncommitted) >= COMMITTED_TOGETHER:
+        self._waiting += 1
+        if self._waiting >= COMMITTED_TOGETHER:
             self._commit()
         while self.past[0].time < time - self._lag:
             self.past.popleft()
@@ -131,26 +140,45 @@ class TickEngine:
         self._reread()
         return innovations
 
-    def correct_commands(self, since: float, acting: Acting) -> None:
-        """Commands have come late: steps that end after a time get other torques and other doubts.
+    def correct_commands(self, since: float, acting: Acting) -> Counter[str]:
+        """Commands have come late: steps that end after a time are taken anew, from the state where they began.
+
+        A jump of the torque may let a motor start to slide, so nothing of these steps is kept: neither their
+        linearization nor what was taken for a glitch.
 
         Args:
             since: stamp of the oldest of these commands [s].
             acting: gives mean command and doubt between two times, as `advance` takes them.
+
+        Returns:
+            By sensor, how many samples more are taken for glitches now.
         """
         self._commit()
-        for start, tick in itertools.pairwise(self.past):
-            if tick.time > since and tick.step is not None:
-                T = self._process.corrected(tick.step, *acting(start.time, tick.time))
-                self.window.remove(tick.slot)
-                self._uncommitted.append((tick, self.window.add_rows(self._process.rows(start, tick.step, T))))
+        again = [(start, tick) for start, tick in itertools.pairwise(self.past) if tick.time > since]
+        change = Counter[str]()
+        if again:
+            self._judge.go_back_to(again[0][0].far)
+            self._process.begins_near(None)
+            self.newest = again[0][0].filtered
+        for start, tick in again:
+            change.subtract(tick.glitches)
+            for slot in tick.slots:
+                self.window.remove(slot)
+            tick.slots.clear()
+            x0, h = self.newest, tick.time - start.time
+            self._step(start, tick, x0, self._process.predicted(x0, h, *acting(start.time, tick.time)))
+            change.update(tick.glitches)
         self._reread()
+        return change
 
-    def ahead(self, time: float, u: Array) -> NewestState:
-        """The newest state, predicted to a later time with a mean command, shape (n,); nothing is kept."""
-        if time <= self.time:
-            return self.newest
-        return self._process.predicted(self.newest, time - self.time, u, None).state
+    def ahead(self, time: float, acting: Acting) -> NewestState:
+        """The newest state, predicted to a later time; `acting` as in `correct_commands`. Nothing is kept."""
+        state, begins = self.newest, self.time
+        steps = max(math.ceil((time - begins) / LONGEST_STEP - 1e-6), 1) if time > begins else 0
+        edges = [*(begins + (time - begins) * i / steps for i in range(steps)), time]
+        for t0, t1 in itertools.pairwise(edges):
+            state = self._process.predicted(state, t1 - t0, *acting(t0, t1)).state
+        return state
 
     def smoothed(self, covariance: bool) -> tuple[float, NewestState]:
         """Time [s] and state of the oldest tick of the window; its covariance is NaN if not wanted."""
@@ -166,16 +194,19 @@ class TickEngine:
         newest = self.past[-1]
         return NewestState(self._estimate(newest), self.window.covariance(newest.number))
 
-    def _take_in(
-        self,
-        observations: Sequence[Observation],
-        x0: NewestState,
-        found: Prediction,
-        before: PastTick,
-        here: PastTick,
-    ) -> list[Innovation]:
-        """Updates a prediction with samples of its step, and hands their rows to the window."""
-        x1, time = found.state, here.time
+    def _step(self, before: PastTick, here: PastTick, x0: NewestState, found: Prediction) -> list[Innovation]:
+        """Goes from one tick to the next, with the samples in between; the window is handed all rows."""
+        self._process.begins_near(found.end)
+        b = found.A0 @ (x0.mean - before.nominal) + found.A1 @ (found.state.mean - here.nominal)
+        self._add(here, Rows((before.number, here.number), (found.A0, found.A1), b))
+        innovations = self._take_in(x0, found, before, here) if here.observations else []
+        here.filtered = self.newest = found.state
+        here.glitches, here.far = tuple(i.sensor for i in innovations if not i.used), self._judge.memory
+        return innovations
+
+    def _take_in(self, x0: NewestState, found: Prediction, before: PastTick, here: PastTick) -> list[Innovation]:
+        """Updates a prediction with samples of its step."""
+        x1, time, observations = found.state, here.time, here.observations
         start = None if all(o.taken >= time - AT_TICK for o in observations) else x0.mean
         seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, before.time, time)
         with_state = seen.by_end @ x1.covariance
@@ -191,23 +222,28 @@ class TickEngine:
         if not keep.all():
             seen, with_state, S = seen.chosen(keep), with_state[keep], S[np.ix_(keep, keep)]
         if len(seen.residual):
-            self.window.add_rows(self._sensor_rows(seen, before, here, x0.mean, x1.mean))
+            self._add(here, self._sensor_rows(seen, before, here, x0.mean, x1.mean))
             x1.update(with_state, S, seen.residual)
         return innovations
+
+    def _add(self, tick: PastTick, rows: Rows) -> None:
+        """Rows of the step that led to a tick."""
+        self._uncommitted.append((tick, self.window.add_rows(rows)))
 
     def _estimate(self, tick: PastTick) -> Array:
         return tick.nominal + self.window.deviation(tick.number)
 
     def _reread(self) -> None:
-        self._commit()
-        self.newest = self.from_window()
+        self.newest = self.past[-1].filtered = self.from_window()
+        self._process.begins_near(None)
 
     def _commit(self) -> None:
         """Brings the window up to date."""
         slots = self.window.commit()
         for tick, index in self._uncommitted:
-            tick.slot = int(slots[index])
+            tick.slots.append(int(slots[index]))
         self._uncommitted.clear()
+        self._waiting = 0
 
     def _sensor_rows(self, seen: ObservedRows, first: PastTick, last: PastTick, x0: Array | None, x1: Array) -> Rows:
         """Whitened rows of samples that were linearised at x0 and x1."""

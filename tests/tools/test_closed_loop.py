@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_estimator import FakeEstimator
+from holding_estimator import HoldingEstimator
 
 from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.elastic_joints import ElasticJoints
@@ -45,7 +45,7 @@ def loops():
     made = []
 
     def make(robot, lag):
-        made.append(FakeEstimator(robot, lag))
+        made.append(HoldingEstimator(robot, lag))
         return made[-1]
 
     result = run_closed_loop(load_robot("doggy"), None, SECONDS, 3, options=LoopOptions(make_estimator=make))

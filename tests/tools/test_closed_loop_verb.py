@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from fake_estimator import FakeEstimator
+from holding_estimator import HoldingEstimator
 from result_page import ResultPage
 
 from jointscope.graphs.fixed_lag import estimator as estimator_module
@@ -27,7 +27,7 @@ def written(tmp_path_factory):
 
     folder, screen = tmp_path_factory.mktemp("loop"), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(screen):
-        patch.setattr(estimator_module, "FixedLagEstimator", FakeEstimator)
+        patch.setattr(estimator_module, "FixedLagEstimator", HoldingEstimator)
         files = [f"--{name}={folder / f'loop.{name}'}" for name in ("json", "rrd")]
         arguments = [*SHORT, *files, f"--report={folder / 'loop.html'}", "-o", str(folder / "loop.mcap")]
         assert main([*arguments, "--effect", "bearing_flexibility@joint1"]) == 0
@@ -152,7 +152,7 @@ def test_where_the_true_state_does_not_help_the_model_is_blamed(doggy):
 
     truth = true_robot(doggy, {})
     wrong = truth.with_values({"motor.k_mi": 0.3 * truth.parameter("motor.k_mi").value})
-    options = LoopOptions(("state_feedback",), make_estimator=FakeEstimator)
+    options = LoopOptions(("state_feedback",), make_estimator=HoldingEstimator)
     answer = loop_judgement(run_closed_loop(doggy, wrong, 3.0, 3, options=options))
     assert answer.headline.startswith("The state is not the limit: even with the true state the head is ")
     assert answer.level == "bad"

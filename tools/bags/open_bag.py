@@ -91,8 +91,45 @@ class Bag:
                 f"{self.path}, topic {topic}: the definition of {connection.msgtype} is damaged: {one_line(err)}"
             ) from err
 
+    def messages(self, topics: Sequence[str], progress: Progress | None = None) -> Iterator[tuple[str, int, bytes]]:
+        """All messages of some topics, one by one in the order of the bag.
+
+        Args:
+            topics: their names.
+            progress: called with the number of messages read and expected.
+
+        Yields:
+            Topic, time of writing [ns] and bytes.
+
+        Raises:
+            RecordingError: the bag is damaged or holds fewer messages than it promises.
+        """
+        connections = [connection for topic in topics for connection in self._infos[topic].connections]
+        found = dict.fromkeys(topics, 0)
+        expected, k = sum(self.count(topic) for topic in found), 0
+        try:
+            # without connections the reader would deliver everything
+            for connection, time, data in self._reader.messages(connections=connections) if connections else ():
+                found[connection.topic] += 1
+                k += 1
+                if progress and k % PROGRESS_STEP == 0:
+                    progress(k, expected)
+                yield connection.topic, time, data
+        except Exception as err:  # damaged bags raise errors of every kind
+            raise RecordingError(
+                f"{self.path} is damaged after {k} of {expected} messages: {one_line(err)}; {repair(self.path)}"
+            ) from err
+        for topic, count in found.items():
+            if count < self.count(topic):
+                raise RecordingError(
+                    f"{self.path} is truncated: topic {topic} holds {count} messages, "
+                    f"expected {self.count(topic)}; {repair(self.path)}"
+                )
+        if progress:
+            progress(k, max(expected, k))
+
     def read(self, topics: Sequence[str], progress: Progress | None = None) -> dict[str, RawTopic]:
-        """All messages of some topics.
+        """All messages of some topics, by topic.
 
         Args:
             topics: their names.
@@ -101,30 +138,11 @@ class Bag:
         Raises:
             RecordingError: the bag is damaged or holds fewer messages than it promises.
         """
-        connections = [connection for topic in topics for connection in self._infos[topic].connections]
         found = {topic: RawTopic(topic) for topic in topics}
-        expected, k = sum(self.count(topic) for topic in found), 0
-        try:
-            # without connections the reader would deliver everything
-            for connection, time, data in self._reader.messages(connections=connections) if connections else ():
-                topic = found[connection.topic]
-                topic.received.append(time)
-                topic.data.append(data)
-                k += 1
-                if progress and k % PROGRESS_STEP == 0:
-                    progress(k, expected)
-        except Exception as err:  # damaged bags raise errors of every kind
-            raise RecordingError(
-                f"{self.path} is damaged after {k} of {expected} messages: {one_line(err)}; {repair(self.path)}"
-            ) from err
-        for topic in found.values():
-            if len(topic.data) < self.count(topic.name):
-                raise RecordingError(
-                    f"{self.path} is truncated: topic {topic.name} holds {len(topic.data)} messages, "
-                    f"expected {self.count(topic.name)}; {repair(self.path)}"
-                )
-        if progress:
-            progress(k, max(expected, k))
+        for topic, time, data in self.messages(topics, progress):
+            raw = found[topic]
+            raw.received.append(time)
+            raw.data.append(data)
         return found
 
 

@@ -110,10 +110,15 @@ def full_type_name(name: str) -> str:
     return name if "/" in rest else f"{package}/msg/{rest}"
 
 
-def read_columns(topic: RawTopic, message_type: MessageType, field: str, decode_all: bool = False) -> Columns:
-    """One field of a topic: on the fast path where all messages are laid out alike, else by full decoding."""
+def read_columns(
+    topic: RawTopic, message_type: MessageType, field: str, decode_all: bool = False, first: int = 0
+) -> Columns:
+    """One field of a topic: on the fast path where all messages are laid out alike, else by full decoding.
+
+    `first` is the number of the first message in its topic.
+    """
     columns = None if decode_all else fast_columns(topic.data, message_type, field)
-    return columns or slow_columns(topic.data, message_type, field, topic.name)
+    return columns or slow_columns(topic.data, message_type, field, topic.name, first)
 
 
 def _samples(
@@ -121,7 +126,7 @@ def _samples(
 ) -> tuple[TimedSamples, list[Notice]]:
     """The samples of one stream in SI units and in the order of their stamps."""
     columns = read_columns(topic, message_type, need.source.field, decode_all)
-    order, notices = _column_order(need, columns)
+    order, notices = column_order(need, columns)
     stamps = columns.stamps
     if stamps is None:
         stamps = topic.received_ns
@@ -132,7 +137,7 @@ def _samples(
     return samples, notices + found
 
 
-def _column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp], list[Notice]]:
+def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp], list[Notice]]:
     """Which column of the message belongs to which channel."""
     place = f"topic {need.source.topic}, field {need.source.field!r}"
     width, wanted = columns.values.shape[1], need.source.names

@@ -13,7 +13,7 @@ from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.message_type import MessageType
 
 
-def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, topic: str) -> Columns:
+def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, topic: str, first: int = 0) -> Columns:
     """One field over all messages.
 
     Args:
@@ -21,6 +21,7 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
         message_type: their type.
         field: dotted path of the numbers.
         topic: name of the topic, for messages to the user.
+        first: number of the first message in its topic, for messages to the user.
 
     Returns:
         The columns.
@@ -32,10 +33,11 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
     rows: list[list[float]] = []
     stamps = np.zeros(len(raw), dtype=np.int64)
     names: tuple[str, ...] | None = None
-    for k, data in enumerate(raw):
+    for row_number, data in enumerate(raw):
+        k = first + row_number
         message = _decode(data, message_type, topic, k)
         if message_type.has_header:
-            stamps[k] = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+            stamps[row_number] = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         if message_type.has_names:
             names = _same_names(names, tuple(message.name), topic, k)
         row: list[float] = []
@@ -46,7 +48,7 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
         if rows and len(row) != len(rows[0]):
             raise RecordingError(
                 f"topic {topic}, message {k}: the field {field!r} holds {len(row)} values; "
-                f"expected {len(rows[0])} as in message 0"
+                f"expected {len(rows[0])} as in message {first}"
             )
         rows.append(row)
     values = np.array(rows, dtype=np.float64).reshape(len(raw), len(rows[0]) if rows else 0)

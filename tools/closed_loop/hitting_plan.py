@@ -121,7 +121,7 @@ def head_jacobian(robot: Robot, q: Array) -> Array:
 
 def _can_hold(robot: Robot, q: Array) -> bool:
     """Whether the drives can hold the robot at angles of shape (n_joints,) against its weight."""
-    still, times = np.tile(q, (3, 1)), STEP * np.arange(3, dtype=np.float64)
+    still, times = np.tile(q, (3, 1)), np.array([0.0, STEP, 2.0 * STEP])
     u = model_reference(robot, times, still, 0.0 * still, 0.0 * still).u
     return bool(np.all(np.abs(u) <= COMMAND_SHARE * full_command(robot)))
 

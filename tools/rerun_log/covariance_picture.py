@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,14 +45,19 @@ def covariance_views() -> rrb.Horizontal:
 
 
 def correlation_picture(result: CalibrationResult) -> NDArray[np.uint8]:
-    """Heat map as pixels, shape (height, width, 3); rows are named, columns numbered like the rows."""
+    """Heat map of a calibration as pixels, shape (height, width, 3)."""
+    return heat_map_pixels(result.names, result.correlation)
+
+
+def heat_map_pixels(names: Sequence[str], correlation: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Correlations, shape (s, s), as pixels, shape (height, width, 3); rows are named, columns numbered alike."""
     from PIL import Image, ImageDraw, ImageFont
 
-    s = len(result.names)
-    labels = [f"{name}  {i + 1}" for i, name in enumerate(result.names)]
+    s = len(names)
+    labels = [f"{name}  {i + 1}" for i, name in enumerate(names)]
     left, top = LETTER * max(map(len, labels)) + 16, CELL
-    strength = np.clip(np.abs(result.correlation), 0.0, 1.0)[..., None]
-    hue = np.where(result.correlation[..., None] >= 0.0, POSITIVE, NEGATIVE)
+    strength = np.clip(np.abs(correlation), 0.0, 1.0)[..., None]
+    hue = np.where(correlation[..., None] >= 0.0, POSITIVE, NEGATIVE)
     cells = np.repeat(np.repeat(PAPER + strength * (hue - PAPER), CELL, axis=0), CELL, axis=1)
     pixels = np.full((top + s * CELL + 8, left + s * CELL + 8, 3), PAPER)
     pixels[top : top + s * CELL, left : left + s * CELL] = cells
@@ -62,8 +68,8 @@ def correlation_picture(result: CalibrationResult) -> NDArray[np.uint8]:
         draw.text((left - 8, middle), label, fill=(220, 224, 228), font=font, anchor="rm")
         draw.text((left + i * CELL + CELL // 2, top - 8), str(i + 1), fill=(160, 168, 176), font=font, anchor="ms")
         for j in range(s):
-            if i != j and abs(result.correlation[i, j]) >= 0.1:
-                number = f"{result.correlation[i, j]:.2f}".replace("0.", ".")
+            if i != j and abs(correlation[i, j]) >= 0.1:
+                number = f"{correlation[i, j]:.2f}".replace("0.", ".")
                 at = (left + j * CELL + CELL // 2, middle)
                 draw.text(at, number, fill=(245, 247, 249), font=small, anchor="mm")
     return np.asarray(image)

@@ -14,6 +14,7 @@ from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import Robot
 from jointscope.tools.rerun_log.columns import JOINT_COLOURS, WHITE, thinned, time_column
 from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
+from jointscope.tools.tip_ellipsoid import position_jacobian, tip_covariance
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -22,9 +23,48 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FRAMES = 50.0  # [1/s]
-STEP = 1e-6  # [rad] of the central difference
 VISIBLE = 0.06  # [m] half axis that an ellipsoid should have to be seen
 FLATTEST = 2e-3  # [m] an ellipsoid without thickness would not be drawn
+
+
+def send_estimate(
+    stream: rr.RecordingStream,
+    robot: Robot,
+    times: Array,
+    q: Array,
+    covariance: Array,
+    magnified: float | None = None,
+) -> float:
+    """The robot as a filter sees it, with the full covariance of its pose.
+
+    Args:
+        stream: where to.
+        robot: the model.
+        times: shape (m,) [s].
+        q: link coordinates, hinges of soft bearings included, shape (m, n_link) [rad].
+        covariance: of q, shape (m, n_link, n_link) [rad^2].
+        magnified: of the ellipsoid; None chooses a power of ten.
+
+    Returns:
+        The magnification.
+    """
+    tree, tip = robot.kinematic_tree, robot.tree.bodies[-1]
+    send_bodies(stream, robot, times, q, "", tree)
+    _, p_base_tip = tree.body_poses(tip, q)
+    _send_trail(stream, times, p_base_tip, "")
+    of_tip = tip_covariance(robot, q, covariance)
+    if magnified is None:
+        magnified = _readable(2.0 * np.sqrt(float(np.median(np.linalg.eigvalsh(of_tip)[:, -1]))))
+    return _send_ellipsoid(stream, times, p_base_tip, of_tip, "", magnified)
+
+
+def _readable(half_axis: float) -> float:
+    """Magnification 1, 2 or 5 times a power of ten that makes a half axis [m] about twice VISIBLE."""
+    if not half_axis > 0.0:
+        return 1.0
+    wanted = 2.0 * VISIBLE / half_axis
+    steps = [m * 10.0 ** np.floor(np.log10(wanted)) for m in (1.0, 2.0, 5.0)]
+    return max(max(step for step in steps if step <= wanted * 1.001), 1.0)
 
 
 def send_robot(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str) -> None:
@@ -63,26 +103,25 @@ def position_covariance(tree: RigidTree, body: str, q: Array, sigma_q: Array) ->
     Returns:
         Shape (m, 3, 3) [m^2], in the base frame.
     """
-    J = np.empty((len(q), 3, tree.n))
-    for i in range(tree.n):
-        step = STEP * np.eye(tree.n)[i]
-        _, p_plus = tree.body_poses(body, q + step)
-        _, p_minus = tree.body_poses(body, q - step)
-        J[:, :, i] = (p_plus - p_minus) / (2.0 * STEP)
-    spread = J * sigma_q[:, None, :]
+    spread = position_jacobian(tree, body, q) * sigma_q[:, None, :]
     return spread @ spread.transpose(0, 2, 1)
 
 
-def send_bodies(stream: rr.RecordingStream, robot: Robot, times: Array, q: Array, root: str) -> None:
-    """Entities robot/BODY below `root`: the links at angles of shape (m, n) [rad], with rods and joint axes."""
+def send_bodies(
+    stream: rr.RecordingStream, robot: Robot, times: Array, q: Array, root: str, moving: RigidTree | None = None
+) -> None:
+    """Entities robot/BODY below `root`: the links at angles of shape (m, n) [rad], with rods and joint axes.
+
+    Rods and drums are those at rest, moved with the poses of `moving`, which may have further hinges.
+    """
     import rerun as rr
 
-    tree = robot.tree
+    tree, moving = robot.tree, moving or robot.tree
     stream.log(entity(root, "robot"), rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     zero = np.zeros((1, tree.n))
     rest = {body: tree.body_poses(body, zero) for body in tree.bodies}
     for k, body in enumerate(tree.bodies):
-        R, p = tree.body_poses(body, q)
+        R, p = moving.body_poses(body, q)
         quaternions = Rotation.from_matrix(R).as_quat()
         stream.send_columns(
             entity(root, "robot", body),
@@ -149,15 +188,18 @@ def _send_trail(stream: rr.RecordingStream, times: Array, p: Array, root: str) -
     )
 
 
-def _send_ellipsoid(stream: rr.RecordingStream, times: Array, p: Array, covariance: Array, root: str) -> None:
-    """The 2 sigma ellipsoid, magnified by a power of ten that its label names."""
+def _send_ellipsoid(
+    stream: rr.RecordingStream, times: Array, p: Array, covariance: Array, root: str, magnified: float | None = None
+) -> float:
+    """The 2 sigma ellipsoid, magnified by a power of ten that its label names; returns the magnification."""
     import rerun as rr
 
     variances, axes = np.linalg.eigh(covariance)
     axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
     half = 2.0 * np.sqrt(np.maximum(variances, 0.0))
     largest = float(np.median(half[:, -1]))
-    magnified = 10.0 ** max(round(np.log10(VISIBLE / largest)), 0) if largest > 0.0 else 1.0
+    if magnified is None:
+        magnified = 10.0 ** max(round(np.log10(VISIBLE / largest)), 0) if largest > 0.0 else 1.0
     path, m = entity(root, "robot", "position_2_sigma"), len(p)
     stream.send_columns(
         path,
@@ -171,3 +213,4 @@ def _send_ellipsoid(stream: rr.RecordingStream, times: Array, p: Array, covarian
         ),
     )
     stream.log(path, rr.Ellipsoids3D.from_fields(fill_mode="solid", show_labels=True), static=True)
+    return magnified

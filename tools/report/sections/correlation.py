@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.tools.report.numbers import minus
 from jointscope.tools.report.page import Section, figure, table
+
+Array = NDArray[np.float64]
 
 LEFT = 190  # [px] for the names of the rows
 PRINTED = 0.3  # smaller correlations show their colour only
@@ -24,36 +28,36 @@ def correlation(result: CalibrationResult) -> Section:
     )
     if not len(result.names):
         return Section("correlation", "Correlation", "<p>There is nothing to correlate.</p>", lead)
-    body = '<div class="pair">' + figure([heat_map(result)]) + _strongest(result) + "</div>"
+    body = '<div class="pair">' + figure([heat_map(result.names, result.correlation)]) + _strongest(result) + "</div>"
     return Section("correlation", "Correlation", body, lead)
 
 
-def heat_map(result: CalibrationResult) -> str:
+def heat_map(names: Sequence[str], correlation: Array) -> str:
     """Lower triangle; names at the left, and along the diagonal where the upper triangle leaves room."""
-    s = len(result.names)
+    s = len(names)
     size = max(min(560 // s, 34), 12)
     top, width = 92, LEFT + s * size + 120
     parts = []
-    for i, name in enumerate(result.names):
+    for i, name in enumerate(names):
         y = top + i * size
         parts.append(f'<text class="end" x="{LEFT - 6}" y="{y + size / 2:.1f}">{escape(name)}</text>')
         x = LEFT + i * size + size / 2
         parts.append(
             f'<text x="{x:.1f}" y="{y - 5}" transform="rotate(-45 {x:.1f} {y - 5})">{escape(_short(name))}</text>'
         )
-        parts += [_cell(result, i, j, size, top) for j in range(i + 1)]
+        parts += [_cell(names, correlation, i, j, size, top) for j in range(i + 1)]
     return (
         f'<svg viewBox="0 0 {width} {top + s * size + 6}" role="img" aria-label="correlation matrix">'
         f"{''.join(parts)}</svg>"
     )
 
 
-def _cell(result: CalibrationResult, i: int, j: int, size: int, top: int) -> str:
-    r = float(result.correlation[i, j])
+def _cell(names: Sequence[str], correlation: Array, i: int, j: int, size: int, top: int) -> str:
+    r = float(correlation[i, j])
     x, y = LEFT + j * size, top + i * size
     if i == j:
         return f'<rect class="faint soft" x="{x}" y="{y}" width="{size - 1}" height="{size - 1}"/>'
-    tip = f"{result.names[i]} and {result.names[j]}: {minus(f'{r:+.3f}')}"
+    tip = f"{names[i]} and {names[j]}: {minus(f'{r:+.3f}')}"
     printed = abs(r) >= PRINTED and size >= 20
     number = minus(f"{r:.1f}").replace("0.", ".")
     label = f'<text class="mid" x="{x + size / 2 - 0.5:.1f}" y="{y + size / 2:.1f}">{number}</text>' if printed else ""

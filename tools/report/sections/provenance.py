@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from html import escape
 
 import jointscope
+from jointscope.graphs.fixed_lag.replay_result import ReplaySource
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 from jointscope.tools.report.numbers import significant
 from jointscope.tools.report.page import Section
 
 
-def provenance(recordings: list[Recording], robots: list[Robot], seconds: float | None = None) -> Section:
+def provenance(
+    recordings: Sequence[Recording | ReplaySource], robots: list[Robot], seconds: float | None = None
+) -> Section:
     """Recordings with their hashes, robot files, versions, date."""
     entries: list[tuple[str, str]] = []
     for recording in recordings:

@@ -40,7 +40,7 @@ def residuals(result: CalibrationResult) -> Section:
 
     def draw(bag: BagFit, group: str) -> str:
         rows = [
-            f'<div class="row">{_over_time(series, i, points)}{_histogram(series, i)}{_memory(series, i)}</div>'
+            f'<div class="row">{over_time(series, i, points)}{histogram(series, i)}{memory(series, i)}</div>'
             for series in bag.residuals.values()
             for i in range(len(series.channels))
         ]
@@ -55,7 +55,8 @@ def residuals(result: CalibrationResult) -> Section:
     return Section("residuals", "Residuals", body, lead)
 
 
-def _over_time(series: ResidualSeries, i: int, points: int) -> str:
+def over_time(series: ResidualSeries, i: int, points: int, reach: float | None = None) -> str:
+    """Residuals of a channel with their band; the axis goes to +- reach [unit], by default around all of it."""
     r, sigma = series.measured[:, i] - series.predicted[:, i], series.sigma[:, i]
     factor, unit = prefixed(float(np.median(sigma)) * 3.0, series.unit)
     whitened = r / sigma
@@ -69,10 +70,12 @@ def _over_time(series: ResidualSeries, i: int, points: int) -> str:
         Curve("+3 sigma", series.times, 3.0 * factor * sigma, "ink", "hair", 300),
         Curve("−3 sigma", series.times, -3.0 * factor * sigma, "ink", "hair", 300),
     ]
-    return plot(Axes(title, width=560, height=150), marks)
+    limits = None if reach is None else (-factor * reach, factor * reach)
+    return plot(Axes(title, width=560, height=150, y_range=limits), marks)
 
 
-def _histogram(series: ResidualSeries, i: int) -> str:
+def histogram(series: ResidualSeries, i: int) -> str:
+    """Distribution of a channel's residuals in sigmas, with the normal one."""
     whitened = (series.measured[:, i] - series.predicted[:, i]) / series.sigma[:, i]
     whitened = whitened[np.isfinite(whitened)]
     density, _ = np.histogram(np.clip(whitened, EDGES[0], EDGES[-1]), EDGES)
@@ -84,7 +87,8 @@ def _histogram(series: ResidualSeries, i: int) -> str:
     return plot(axes, marks)
 
 
-def _memory(series: ResidualSeries, i: int) -> str:
+def memory(series: ResidualSeries, i: int) -> str:
+    """Autocorrelation of a channel's residuals in sigmas, with the band of white noise."""
     r = (series.measured[:, i] - series.predicted[:, i]) / series.sigma[:, i]
     rho = autocorrelation(r)
     lags = np.arange(1, len(rho) + 1, dtype=float)

@@ -24,7 +24,7 @@ def verdict(result: CalibrationResult) -> Section:
     if len(findings) > FINDINGS:
         rest = f'<ul class="findings">{"".join(findings[FINDINGS:])}</ul>'
         told += foldable(f"{len(findings) - FINDINGS} more findings", rest)
-    checks = "".join(_check(check) for check in judgement.checks)
+    checks = "".join(check_line(check) for check in judgement.checks)
     body = (
         f'<div class="verdict {judgement.level}"><p class="answer">{escape(judgement.headline)}</p>'
         f'{_big_numbers(result)}{told}<ul class="checks">{checks}</ul></div>'
@@ -32,7 +32,8 @@ def verdict(result: CalibrationResult) -> Section:
     return Section("verdict", "Is this calibration good?", body)
 
 
-def _check(check: Check) -> str:
+def check_line(check: Check) -> str:
+    """A check as an entry of the list."""
     return (
         f'<li class="{check.level}"><i aria-label="{check.level}">{SIGNS[check.level]}</i>'
         f"<b>{escape(check.name)}</b><span>{escape(sentence(check.text))}</span></li>"

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots on which fast code for one state is held against the code for many: ready ones, and one for each effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from jointscope.robots.effect_catalogue import catalogue
+from jointscope.robots.effect_editing import add_effect, carried_noise
+from jointscope.robots.robot_file import load_robot
+
+READY, PAPER = load_robot("doggy"), load_robot("doggy_paper")
+SMOOTH = replace(READY, choices=replace(READY.choices, friction_sharpness=20.0))
+
+
+def _rigid(robot, *joints):
+    changed = replace(robot, choices=replace(robot.choices, rigid_joints=joints))
+    return replace(changed, noise=carried_noise(robot, changed))
+
+
+def _without_coriolis(robot):
+    robot = replace(robot, choices=replace(robot.choices, coriolis=False))
+    return replace(robot, tree=robot.tree.with_coriolis(False))
+
+
+def _with(effect, robot):
+    owner = effect.owners_of(robot)[-1]
+    return add_effect(robot, f"{effect.id}@{owner}", dict(effect.example))
+
+
+def _every():
+    yield "doggy", READY
+    yield "doggy_paper", PAPER
+    yield "friction on links", replace(READY, choices=replace(READY.choices, friction_velocity="link"))
+    yield "without Coriolis terms", _without_coriolis(READY)
+    yield "joint 2 rigid", _rigid(READY, "joint2")
+    yield "all joints rigid", _rigid(READY, *READY.joints)
+    bases = {"coriolis": _without_coriolis(READY), "joint_elasticity": _rigid(READY, "joint3")}
+    for effect in catalogue().values():
+        if effect.id != "integration_error":  # it is a choice of the rule, not a term of the equations
+            yield effect.id, _with(effect, bases.get(effect.id, READY))
+    bearing = catalogue()["bearing_flexibility"]
+    yield "bearing and a rigid joint", _rigid(_with(bearing, READY), "joint2")
+    for name in ("cogging", "hysteresis"):
+        yield f"bearing and {name}", _with(catalogue()[name], _with(bearing, READY))
+
+
+ROBOTS = dict(_every())
+
+
+def states(robot, count, seed=2):
+    """Random states, fast and slow, with deflections of a few hundredths of a radian, shape (count, d)."""
+    rng, layout = np.random.default_rng(seed), robot.layout
+    x = np.zeros((count, layout.size))
+    x[:, layout.q_link] = rng.normal(0.0, 0.02, (count, layout.n_link))
+    x[:, layout.joint_q] = rng.normal(0.0, 0.5, (count, robot.n))
+    x[:, layout.v_link] = rng.normal(0.0, 1.0, (count, layout.n_link)) * rng.choice([1e-3, 0.1, 2.0], (count, 1))
+    elastic = layout.motor_q != layout.joint_q
+    x[:, layout.motor_q[elastic]] = x[:, layout.joint_q[elastic]] + rng.normal(0.0, 0.02, (count, elastic.sum()))
+    x[:, layout.motor_v[elastic]] = x[:, layout.joint_v[elastic]] + rng.normal(0.0, 0.01, (count, elastic.sum()))
+    x[:, layout.memory] = rng.normal(0.0, 0.5, (count, len(layout.memories)))
+    return x

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads a bag as it was received: block by block, nothing sorted, nothing dropped.
+
+`read_recording` sorts every stream by stamp and drops repeated stamps, which is right for a batch; an estimator in the
+control loop has to cope with late and repeated messages, so a replay must hand them over. Only one block is in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from jointscope.graphs.fixed_lag.replay_result import ReplaySource
+from jointscope.robots.arrivals import Arrivals
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+from jointscope.robots.units import si_factor
+from jointscope.tools.bags.message_type import MessageType
+from jointscope.tools.bags.open_bag import Progress, RawTopic, bag_sha256, open_bag
+from jointscope.tools.bags.read_recording import StreamSource, check_topic, column_order, needed_streams, read_columns
+
+BLOCK = 20_000  # messages
+
+
+class ArrivalReader:
+    """The messages that a robot needs, as an iterable of blocks.
+
+    Attributes:
+        path: the bag.
+        start_ns: stamp of time zero [ns]: the earliest of the first block, as `read_recording` takes it; 0 before it
+            was read.
+        messages: number of messages that were read.
+    """
+
+    def __init__(self, path: str | Path, robot: Robot, progress: Progress | None = None, block: int = BLOCK):
+        """Opens nothing yet.
+
+        Args:
+            path: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
+            robot: says which topics, fields, units and joint names.
+            progress: called with the number of messages read and expected.
+            block: messages per block.
+        """
+        self.path = Path(path)
+        self.start_ns = self.messages = 0
+        self._needed = needed_streams(robot)
+        self._progress = progress
+        self._block = block
+
+    def __iter__(self) -> Iterator[Arrivals]:
+        """Reads the bag.
+
+        Raises:
+            RecordingError: the bag cannot be read, or does not hold what the robot needs.
+        """
+        with open_bag(self.path) as bag:
+            types = {need.name: check_topic(bag, need.source) for need in self._needed}
+            topics = sorted({need.source.topic for need in self._needed})
+            messages = bag.messages(topics, self._progress)
+            counts = dict.fromkeys(topics, 0)
+            while block := list(islice(messages, self._block)):
+                raw = {topic: RawTopic(topic) for topic in topics}
+                places: dict[str, list[int]] = {topic: [] for topic in topics}
+                for place, (topic, time, data) in enumerate(block):
+                    raw[topic].received.append(time)
+                    raw[topic].data.append(data)
+                    places[topic].append(place)
+                self.messages += len(block)
+                yield self._arrivals(raw, places, types, counts)
+                counts = {topic: counts[topic] + len(raw[topic].data) for topic in topics}
+
+    def seconds_later(self, recording: Recording) -> float:
+        """How much later time zero of these arrivals is than that of a recording of the same bag [s]."""
+        return (self.start_ns - recording.start_ns) / 1e9
+
+    def source(self, seconds: float, robot: str) -> ReplaySource:
+        """What was read, with its duration [s] and the name of the robot."""
+        return ReplaySource(str(self.path), bag_sha256(self.path), self.start_ns, seconds, self.messages, robot)
+
+    def _arrivals(
+        self,
+        raw: dict[str, RawTopic],
+        places: dict[str, list[int]],
+        types: dict[str, MessageType],
+        counts: dict[str, int],
+    ) -> Arrivals:
+        present = [need for need in self._needed if raw[need.source.topic].data]
+        columns = [_columns(need, raw[need.source.topic], types, counts) for need in present]
+        if not self.start_ns:
+            self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
+        parts = [
+            ((stamps - self.start_ns) / 1e9, (raw[need.source.topic].received_ns - self.start_ns) / 1e9, values)
+            for need, (stamps, values) in zip(present, columns, strict=True)
+        ]
+        keys = [np.array(places[need.source.topic], dtype=float) for need in present]
+        return Arrivals.merged(tuple(need.name for need in present), parts, keys)
+
+
+def _columns(
+    need: StreamSource, topic: RawTopic, types: dict[str, MessageType], counts: dict[str, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps [ns] and samples in SI units of one stream, as they lie in the block."""
+    message_type = types[need.name]
+    columns = read_columns(topic, message_type, need.source.field, first=counts[topic.name])
+    order, _ = column_order(need, columns)
+    stamps = topic.received_ns if columns.stamps is None else columns.stamps
+    return stamps, columns.values[:, order] * si_factor(need.source.unit)
