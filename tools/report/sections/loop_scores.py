@@ -57,7 +57,8 @@ def _cells(run: LoopRun, result: ClosedLoopResult) -> list[str]:
         if value is None:
             cells.append("never")
             continue
-        others = [value_of(other.tracking) for other in result.runs if other.source != "true"]
-        best = run.source != "true" and len(others) > 1 and value <= min(v for v in others if v is not None)
+        found = [value_of(other.tracking) for other in result.runs if other.source != "true"]
+        others = [v for v in found if v is not None]
+        best = run.source != "true" and value <= min(others) < max(others)
         cells.append(f'<span class="best">{text_of(value)}</span>' if best else text_of(value))
     return cells
