@@ -177,7 +177,9 @@ class FixedLagEstimator:
             self._catch_up(t)
         if not self.status.running or (t is not None and t > self._engine.time + GAP):
             time = t if t is not None else max(self._newest_sample, 0.0)
-            return unknown_state(self.layout, time, self._first.newest, time - self._newest_sample)
+            q = self._engine.newest.mean[self.layout.motor_q] if self.status.running else self._first.newest
+            adapted = self._engine.layout.parameters
+            return unknown_state(self.robot, adapted, time, q, time - self._newest_sample)
         when = self._engine.time if t is None else max(t, self._engine.time)
         return self._state_of(when, self._engine.ahead(when, self._acting))
 
