@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.fixed_lag.adaptation import prior_sigmas
 from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.newest_state import NewestState
+from jointscope.robots.robot import Robot
 from jointscope.robots.state_layout import StateLayout
 
 Array = NDArray[np.float64]
@@ -82,9 +84,20 @@ def state_of(layout: AugmentedLayout, time: float, found: NewestState, age: floa
     )
 
 
-def unknown_state(layout: StateLayout, time: float, q: Array | None, age: float) -> EstimatedState:
-    """What is known before there is a first state: the last encoder sample, shape (n,) [rad], if any."""
+def unknown_state(robot: Robot, adapted: Sequence[str], time: float, q: Array | None, age: float) -> EstimatedState:
+    """What is known without a state: last positions, shape (n,) [rad], if any; biases and parameters of the robot."""
+    layout = robot.layout
     mean = np.zeros(layout.size)
     if q is not None:
         mean[layout.motor_q] = mean[layout.joint_q] = q
-    return EstimatedState(time, mean, np.diag(np.full(layout.size, np.inf)), age, layout)
+    sigmas = prior_sigmas(robot, adapted).tolist()
+    return EstimatedState(
+        time=time,
+        mean=mean,
+        covariance=np.diag(np.full(layout.size, np.inf)),
+        age=age,
+        layout=layout,
+        biases={gyro.name: gyro.bias.copy() for gyro in robot.gyros},
+        bias_sigmas={gyro.name: np.full(3, gyro.bias_prior_sigma) for gyro in robot.gyros},
+        parameters={name: (robot.parameters[name].value, s) for name, s in zip(adapted, sigmas, strict=True)},
+    )

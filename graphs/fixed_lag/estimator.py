@@ -30,9 +30,10 @@ from jointscope.graphs.fixed_lag.event import Event
 from jointscope.graphs.fixed_lag.first_state import FirstSamples, first_state
 from jointscope.graphs.fixed_lag.innovation import Innovation
 from jointscope.graphs.fixed_lag.newest_state import NewestState
-from jointscope.graphs.fixed_lag.observation import AT_TICK, Observation
+from jointscope.graphs.fixed_lag.observation import AT_TICK
 from jointscope.graphs.fixed_lag.tick import Listener, Tick
 from jointscope.graphs.fixed_lag.tick_engine import TickEngine
+from jointscope.graphs.fixed_lag.waiting_messages import WaitingMessages
 from jointscope.graphs.timeline import LONGEST_STEP, SHORTEST_STEP
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.robot import Robot
@@ -43,8 +44,6 @@ Found = TypeVar("Found")
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
 GAP = 0.3  # [s] without a tick after which the estimator begins anew; so far it predicts
 BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and numpy raise where numbers are impossible
-FEW_MISSING = 0.02  # [s] within this every missing command gets its tick; longer gaps go in longer steps
-QUICKEST = 5e-4  # [s] shortest step that is made for a missing command
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
 
 
@@ -82,12 +81,9 @@ class FixedLagEstimator:
         self._engine = TickEngine(self.robot, lag, checked_densities(self.robot, adapt or {}), BIAS_WALK)
         self._books = Bookkeeping(self.robot, lag)
         self.status = self._books.status
-        self._commands = CommandHistory(self.robot, lag)
+        self._waiting = WaitingMessages(self._engine, self._books, CommandHistory(self.robot, lag))
         self._first = FirstSamples(self.robot)
-        self._pending: list[Observation] = []
-        self._late_ones: list[Innovation] = []  # of late samples since the last update
         self._wanted: float | None = None  # stamp of a command whose tick is not closed yet
-        self._late_command = math.inf  # from when on late commands change what acted
         self._newest_sample = -math.inf
 
     @property
@@ -102,22 +98,22 @@ class FixedLagEstimator:
             return
         if self.status.running:
             self._close_before(t)
-        self._commands.add(t, values)
+        self._waiting.commands.add(t, values)
         newest = self._now
         if newest is None:
             return
         self._books.watch.seen("command", t)
-        if self._commands.acts_until(t) <= self._engine.past[0].time:
+        if self._waiting.commands.acts_until(t) <= self._engine.past[0].time:
             self._books.intake.too_late("command", t, newest)
             return
         self.status.used["command"] += 1
-        since = self._commands.unsure_since(t)
+        since = self._waiting.commands.unsure_since(t)
         if since < self._engine.time - AT_TICK:
             # what happened in the gap before it is now seen differently
-            self._late_command = min(since, self._late_command)
+            self._waiting.late_command = min(since, self._waiting.late_command)
         if t < newest - AT_TICK:
             self.status.late["command"] += 1
-        elif t - newest > min(NEAR * self._commands.period, LONGEST_STEP) or t - newest > LONGEST_STEP:
+        elif t - newest > min(NEAR * self._waiting.commands.period, LONGEST_STEP):
             self._wanted = t
 
     def encoder(self, t: float, q: ArrayLike) -> None:
@@ -159,7 +155,7 @@ class FixedLagEstimator:
         if fresh:
             self._newest_sample = max(self._newest_sample, fresh[0].taken)
             self._close_before(max(o.taken for o in fresh))
-            self._pending += fresh if self.status.running else []
+            self._waiting.samples += fresh if self.status.running else []
 
     def state(self, t: float | None = None) -> EstimatedState:
         """The robot's state with all that is known by now.
@@ -177,9 +173,10 @@ class FixedLagEstimator:
             self._catch_up(t)
         if not self.status.running or (t is not None and t > self._engine.time + GAP):
             time = t if t is not None else max(self._newest_sample, 0.0)
-            return unknown_state(self.layout, time, self._first.newest, time - self._newest_sample)
+            q = self._engine.newest.mean[self.layout.motor_q] if self.status.running else self._first.newest
+            return unknown_state(self.robot, self._engine.layout.parameters, time, q, time - self._newest_sample)
         when = self._engine.time if t is None else max(t, self._engine.time)
-        return self._state_of(when, self._engine.ahead(when, self._acting))
+        return self._state_of(when, self._engine.ahead(when, self._waiting.acting))
 
     def smoothed(self, covariance: bool = True) -> EstimatedState | None:
         """The state at the lag, smoothed with everything since; None until the window is full.
@@ -219,13 +216,13 @@ class FixedLagEstimator:
         time, state = first_state(self.robot, layout, self._first.samples, before)
         self._engine.start(time, state)
         self._forget()
-        self._commands.forget_after(time + GAP)
+        self._waiting.commands.forget_after(time + GAP)
         self._newest_sample = time
         self.status.running = True
         self._books.log.tell(time, "started", "estimator", f"states are estimated from {time:.3f} s on")
 
     def _close_before(self, t: float) -> None:
-        """Closes all ticks that a message with stamp t shows to be complete."""
+        """Closes the ticks that a message with stamp t shows to be complete; they go on where commands have stopped."""
         if self._wanted is not None and t > self._wanted + AT_TICK:
             self._close(self._wanted)
         newest = self._now
@@ -234,7 +231,6 @@ class FixedLagEstimator:
         if t - newest > GAP:
             self._restart(t, f"nothing came for {t - newest:.2f} s")
             return
-        # commands that are slow or have stopped: ticks go on without them
         if t - newest > 1.5 * LONGEST_STEP and self._wanted is None:
             self._close(t - SHORTEST_STEP)
 
@@ -244,68 +240,29 @@ class FixedLagEstimator:
             self._close(self._wanted)
         if not self.status.running:
             return
-        newest = max((o.taken for o in self._pending), default=-math.inf)
+        waiting, newest = self._waiting, self._waiting.newest
         if newest > self._engine.time + AT_TICK and (t is None or newest <= t + AT_TICK):
             self._close(newest)
-        elif (self._pending and self._wanted is None) or self._late_command < math.inf:
-            self._late_ones.extend(self._unbroken(self._take_late_ones) or [])
+        elif (waiting.samples and self._wanted is None) or waiting.late_command < math.inf:
+            self._unbroken(waiting.take_late_ones)
 
     def _close(self, time: float) -> None:
         """Goes on to a new tick; where commands are missing on the way, their ticks are made, too."""
-        parts = self._parts(time - self._engine.time)
-        begin = self._engine.time
-        for i in range(1, parts):
+        begin, parts = self._engine.time, max(self._waiting.parts(time - self._engine.time), 1)
+        for i in range(1, parts + 1):
             if self.status.running:
-                self._close_one(begin + (time - begin) * i / parts)
-        if self.status.running:
-            self._close_one(time)
-
-    def _parts(self, h: float) -> int:
-        """Ticks into which a step of length h [s] is divided: samples are best taken at a tick."""
-        usual = min(max(self._commands.period, QUICKEST), LONGEST_STEP)
-        return round(h / (usual if h < FEW_MISSING else LONGEST_STEP))
+                self._close_one(time if i == parts else begin + (time - begin) * i / parts)
 
     def _close_one(self, time: float) -> None:
         """One update: late messages, the step to a new tick, its samples."""
         began = clock.perf_counter()
-        found = self._unbroken(lambda: self._update(time))
+        found = self._unbroken(lambda: self._waiting.up_to(time))
         if self._wanted is not None and time >= self._wanted - AT_TICK:
             self._wanted = None
         if found is not None:
             self._finish(*found, clock.perf_counter() - began)
 
-    def _update(self, time: float) -> tuple[list[Innovation], int, list[Observation]]:
-        """Takes in what came up to a time; all innovations, how many of the last are new, and the new samples."""
-        innovations = [*self._late_ones, *self._take_late_ones()]
-        self._late_ones.clear()
-        engine, now, found = self._engine, list[Observation](), list[Innovation]()
-        if time > engine.time + AT_TICK:
-            later = list[Observation]()
-            for o in self._pending:
-                (now if o.taken <= time + AT_TICK else later).append(o)
-            self._pending = later
-            u, doubt = self._acting(engine.time, time)
-            found = engine.advance(time, u, doubt, now)
-            innovations += found
-        return innovations, len(found), now
-
-    def _take_late_ones(self) -> list[Innovation]:
-        """Messages about times before the newest tick."""
-        engine, found = self._engine, list[Innovation]()
-        if self._late_command < math.inf:
-            self._books.reconsidered(engine.correct_commands(self._late_command, self._acting))
-            self._late_command = math.inf
-        late = [o for o in self._pending if o.taken <= engine.time + AT_TICK]
-        if late:
-            self._pending = [o for o in self._pending if o.taken > engine.time + AT_TICK]
-            for o in late:
-                if o.taken < engine.time - AT_TICK:
-                    self._books.intake.is_late(o, engine.time)
-            found = engine.late(late)
-            self._books.count(found)
-        return found
-
-    def _finish(self, innovations: list[Innovation], fresh: int, used: list[Observation], seconds: float) -> None:
+    def _finish(self, innovations: list[Innovation], fresh: int, seconds: float) -> None:
         """Counts, sanity, listener; the last `fresh` innovations were not counted yet."""
         began, engine = clock.perf_counter(), self._engine
         self._books.count(innovations[len(innovations) - fresh :])
@@ -330,21 +287,14 @@ class FixedLagEstimator:
         if self.status.running:
             self._restart(t, f"the stamps of the encoders went from {self._engine.time:.3f} s to {t:.3f} s")
         self._books.clock_was_set()
-        self._commands, self._newest_sample = CommandHistory(self.robot, self.lag), -math.inf
+        self._waiting.commands, self._newest_sample = CommandHistory(self.robot, self.lag), -math.inf
 
     def _forget(self) -> None:
         """Nothing of what waits is used any more."""
         self._first.samples.clear()
-        self._pending.clear()
-        self._late_ones.clear()
+        self._waiting.forget()
         self._books.begins_anew()
-        self._wanted, self._late_command = None, math.inf
-
-    def _acting(self, t0: float, t1: float) -> tuple[Array, Array | None]:
-        """Mean command over a step, and the standard deviation of the torques that missing commands leave open."""
-        lost = self._books.watch.command_is_lost(t1)
-        u, doubt = self._commands.lost(t0, t1) if lost else self._commands.acting(t0, t1)
-        return u, None if doubt is None else doubt * np.abs(self._engine.torque_gain)
+        self._wanted = None
 
     def _state_of(self, time: float, found: NewestState) -> EstimatedState:
         return state_of(self._engine.layout, time, found, time - self._newest_sample)

@@ -122,6 +122,10 @@ def test_before_the_start_nothing_is_claimed(run):
     np.testing.assert_array_equal(state.q_motor, q - est.robot.motor_encoder.zero)
     assert np.all(np.isinf(state.sigma))
     assert est.smoothed() is None and est.newest_of_window() is None
+    # a controller may look at these from the beginning
+    assert set(state.biases) == set(state.bias_sigmas) == {"imu1", "imu2"} and state.parameters == {}
+    adapting = FixedLagEstimator(run.robot, adapt={"motor.k_mi": 0.1}).state()
+    assert adapting.parameters["motor.k_mi"][0] == run.robot.parameters["motor.k_mi"].value
 
 
 def test_a_prediction_leads_where_the_robot_goes_and_says_how_well(run):
@@ -143,6 +147,7 @@ def test_far_ahead_nothing_is_known(run):
     near, far = est.state(REST + 0.3), est.state(REST + 10.0)
     assert np.isfinite(near.covariance).all()
     assert np.all(np.isinf(np.diag(far.covariance))) and far.time == REST + 10.0
+    np.testing.assert_allclose(far.q_motor, est.state().q_motor)
     assert est.status.running
 
 
