@@ -45,7 +45,7 @@ class Tally:
 def run_section(quick: bool) -> Section:
     """20 recordings with the true robot and with a calibrated one; `quick` takes two."""
     seeds, few = (range(1, 3), range(1, 2)) if quick else (range(1, 21), range(1, 6))
-    seconds = 3.0 if quick else 8.0
+    seconds = 3.0 if quick else 6.0
     section = Section(
         "Consistency",
         f"Recordings of {seconds:g} s of moves, each with a seed of its own, random torques of {TORQUE:g} N m on links "
