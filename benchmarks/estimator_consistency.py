@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from estimator_case import TORQUE, TRAINING, calibrated_robot, make_case
@@ -13,6 +12,8 @@ from estimator_run import LAG, Run, run
 from message_feed import in_order
 from patience import say
 from tables import Section, Table, answer
+
+from jointscope.robots.robot import Robot
 
 BOUNDS = (0.8, 1.25)  # per degree of freedom
 CORRELATED = 0.02  # [s]
@@ -55,7 +56,7 @@ def run_section(quick: bool) -> Section:
     say("consistency: calibrating")
     calibrated = calibrated_robot()
     white, correlated = "new each ms", f"correlated over {1000 * CORRELATED:g} ms"
-    settings: list[tuple[str, str, Any, float, range]] = [
+    settings: list[tuple[str, str, Robot | None, float, range]] = [
         ("true parameters, matching noise", white, None, 0.0, seeds),
         (f"calibrated on {TRAINING:g} s, noise included", white, calibrated, 0.0, seeds),
         ("true parameters, noise for torques that are new each ms", correlated, None, CORRELATED, few),
@@ -80,7 +81,7 @@ def within(mean: float) -> bool:
     return BOUNDS[0] <= mean <= BOUNDS[1]
 
 
-def _runs(words: str, robot: Any, correlation: float, seeds: range, seconds: float) -> Iterable[Run]:
+def _runs(words: str, robot: Robot | None, correlation: float, seeds: range, seconds: float) -> Iterable[Run]:
     for seed in seeds:
         say(f"consistency: {words}, seed {seed}")
         case = make_case(seed, seconds, correlation_time=correlation)

@@ -68,12 +68,15 @@ class PlainSmoother:
         robot: with every gyro in full.
         recording: all stamps at ticks.
         lag: [s].
+
+    Attributes:
+        newest: state of the newest tick, shape (d,).
     """
 
     def __init__(self, robot: Robot, recording: Recording, lag: float):
         self._problem = BagProblem.of(robot, recording)
         self._like = Calibration.of(robot)
-        self._first = initial_states(self._problem, self._like)[0]
+        self.newest, self._tick = initial_states(self._problem, self._like)[0], 0
         parameters = gtsam.ISAM2Params()
         parameters.findUnusedFactorSlots = True
         parameters.setFactorization("QR")
@@ -82,28 +85,32 @@ class PlainSmoother:
         self._layout = robot.layout
 
     def seconds(self) -> Array:
-        """Runs through the recording; seconds of every tick, newest mean and covariance included, shape (m,)."""
-        x, taken = self._first, []
-        for k in range(len(self._problem.timeline.ticks)):
+        """Runs through the rest of the recording; seconds of every tick, newest mean and covariance included."""
+        taken = []
+        while self._tick < len(self._problem.timeline.ticks):
             began = time.perf_counter()
-            x, _ = self._update(k, x)
+            self.advance()
+            self.covariance()
             taken.append(time.perf_counter() - began)
         return np.array(taken)
 
-    def _update(self, k: int, before: Array) -> tuple[Array, Array]:
-        """Newest state and its covariance."""
-        guess, layout, timeline = before.copy(), self._layout, self._problem.timeline
+    def advance(self) -> Array:
+        """One tick with its samples; the newest state, shape (d,)."""
+        k, layout, timeline = self._tick, self._layout, self._problem.timeline
+        guess, values, graph = self.newest.copy(), gtsam.Values(), self._graph(k)
         if k:
-            guess[layout.positions] += timeline.h[k - 1] * before[layout.velocities]
-        values, graph = gtsam.Values(), self._graph(k)
-        values.insert(state_key(k), guess)
-        if k == 0:
+            guess[layout.positions] += timeline.h[k - 1] * self.newest[layout.velocities]
+        else:
             for key, bias in zip(self._biases, self._like.biases.values(), strict=True):
                 values.insert(key, bias)
-        now = float(timeline.ticks[k])
-        self._smoother.update(graph, values, dict.fromkeys([state_key(k), *self._biases], now))
-        newest = self._smoother.calculateEstimateVector(state_key(k))
-        return newest, self._smoother.marginalCovariance(state_key(k))
+        values.insert(state_key(k), guess)
+        self._smoother.update(graph, values, dict.fromkeys([state_key(k), *self._biases], float(timeline.ticks[k])))
+        self.newest, self._tick = self._smoother.calculateEstimateVector(state_key(k)), k + 1
+        return self.newest
+
+    def covariance(self) -> Array:
+        """Of the newest state, shape (d, d)."""
+        return self._smoother.marginalCovariance(state_key(self._tick - 1))
 
     def _graph(self, k: int) -> gtsam.NonlinearFactorGraph:
         """Factors whose last state is that of tick k."""
