@@ -14,8 +14,8 @@ from message_feed import Message, in_order
 from numpy.typing import NDArray
 
 from jointscope.graphs.bag_problem import DEFLECTION_SIGMA
-from jointscope.graphs.coarse_encoder import shared_error
 from jointscope.graphs.fixed_lag.estimator import BIAS_WALK
+from jointscope.graphs.fixed_lag.sample_checks import SampleChecks
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -124,9 +124,9 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool) -> tuple[Array
         Times, shape (m,) [s], and states, shape (m, d).
     """
     name, messages = robot.motor_encoder.name, in_order(recording)
-    widened = shared_error(recording.streams[name], robot.motor_encoder.sigma) if like_ours else None
+    checks = SampleChecks(robot.n, robot.motor_encoder.sigma, False)
     kalman = KalmanFilter(robot, recording.streams[name].values[0])
-    u, now, samples = np.zeros(robot.n), messages[0].stamp, 0
+    u, now = np.zeros(robot.n), messages[0].stamp
     times, states = list[float](), list[Array]()
     for message in messages:
         if message.stamp > now:
@@ -136,9 +136,9 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool) -> tuple[Array
             now = message.stamp
         if message.stream == "command":
             u = message.values
-        elif message.stream == name:
-            kalman.update(message, 1.0 if widened is None else widened[samples])
-            samples += 1
+        elif message.stream == name and like_ours:
+            widened = checks.shared_error(message.stamp, message.values.tolist())
+            kalman.update(message, 1.0 if widened is None else np.array(widened))
         else:
             kalman.update(message)
     return np.array(times), np.array(states)
