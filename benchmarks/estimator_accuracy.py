@@ -60,10 +60,11 @@ def run_section(quick: bool) -> Section:
 
 
 def _kalman(section: Section, errors: dict[str, list[Array]], case: Case, ours: Run) -> None:
-    """At the ticks at which ours was asked."""
+    """At the ticks at which ours was asked, begun when ours began."""
+    since = ours.estimator.events[0].time
     for name, like_ours in ((KALMAN, True), (BY_HAND, False)):
         began = time.thread_time()
-        times, states = filtered(case.robot, case.recording, like_ours)
+        times, states = filtered(case.robot, case.recording, like_ours, since)
         section.numbers["kalman_ms"] = 1e3 * (time.thread_time() - began) / len(times)
         here = (times > SETTLED) & (times <= ours.now.times[-1])
         errors[name].append(states[here][:, case.robot.layout.joint_v] - _true_velocity(case, times[here]))

@@ -112,13 +112,14 @@ class KalmanFilter:
         return Q
 
 
-def filtered(robot: Robot, recording: Recording, like_ours: bool) -> tuple[Array, Array]:
+def filtered(robot: Robot, recording: Recording, like_ours: bool, since: float = 0.0) -> tuple[Array, Array]:
     """States with all samples of each tick.
 
     Args:
         robot: with every gyro in full.
-        recording: all stamps at ticks.
+        recording: all stamps at ticks; begins at rest.
         like_ours: whether samples of a quantized encoder count for less in slow motion, as they do in the estimator.
+        since: when the filter begins; what came before only tells how coarse the encoder is [s].
 
     Returns:
         Times, shape (m,) [s], and states, shape (m, d).
@@ -126,7 +127,7 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool) -> tuple[Array
     name, messages = robot.motor_encoder.name, in_order(recording)
     checks = SampleChecks(robot.n, robot.motor_encoder.sigma, False)
     kalman = KalmanFilter(robot, recording.streams[name].values[0])
-    u, now = np.zeros(robot.n), messages[0].stamp
+    u, now = np.zeros(robot.n), max(messages[0].stamp, since)
     times, states = list[float](), list[Array]()
     for message in messages:
         if message.stamp > now:
@@ -134,11 +135,12 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool) -> tuple[Array
             states.append(kalman.x[: robot.layout.size].copy())
             kalman.predict(u, message.stamp - now)
             now = message.stamp
+        widened: float | Array = 1.0
+        if message.stream == name and like_ours:
+            shared = checks.shared_error(message.stamp, message.values.tolist())
+            widened = 1.0 if shared is None else np.array(shared)
         if message.stream == "command":
             u = message.values
-        elif message.stream == name and like_ours:
-            widened = checks.shared_error(message.stamp, message.values.tolist())
-            kalman.update(message, 1.0 if widened is None else np.array(widened))
-        else:
-            kalman.update(message)
+        elif message.stamp >= since:
+            kalman.update(message, widened)
     return np.array(times), np.array(states)
