@@ -53,7 +53,9 @@ class Case:
         return np.column_stack([np.interp(times, ticks, column) for column in states.T])
 
 
-def make_case(seed: int, seconds: float, *, effects: Sequence[str] = (), correlation_time: float = 0.0) -> Case:
+def make_case(
+    seed: int, seconds: float, *, effects: Sequence[str] = (), correlation_time: float = 0.0, quantized: bool = True
+) -> Case:
     """One occasion of fast moves.
 
     Args:
@@ -61,21 +63,38 @@ def make_case(seed: int, seconds: float, *, effects: Sequence[str] = (), correla
         seconds: length [s].
         effects: of the simulated robot and of the model, as ID@OWNER.
         correlation_time: of the disturbance [s]; 0 for white torques.
+        quantized: whether encoders have steps.
     """
-    simulation = _simulate("moves", seconds, seed, effects, correlation_time)
+    simulation = _simulate("moves", seconds, seed, effects, correlation_time, quantized)
     return Case(_true_robot(simulation, effects), simulation)
 
 
 def calibrated_robot() -> Robot:
     """The robot as it comes out of `calibrate` on another occasion; its noise is what the calibration found."""
-    training = _simulate("calibration", TRAINING, HARDWARE, (), 0.0)
+    training = _simulate("calibration", TRAINING, HARDWARE)
     return with_full_gyros(calibrate(load_robot("doggy"), [training.recording]).robot)
 
 
-def _simulate(motion: str, seconds: float, seed: int, effects: Sequence[str], correlation_time: float) -> Simulation:
+def _simulate(
+    motion: str,
+    seconds: float,
+    seed: int,
+    effects: Sequence[str] = (),
+    correlation_time: float = 0.0,
+    quantized: bool = True,
+) -> Simulation:
     disturbance = Disturbance(link=TORQUE, motor=TORQUE, correlation_time=correlation_time)
-    settings = {"friction": "smooth", "disturbance": disturbance, "hardware_seed": HARDWARE}
-    return simulate(load_robot("doggy"), motion, seconds, seed, effects=effects, **settings)
+    return simulate(
+        load_robot("doggy"),
+        motion,
+        seconds,
+        seed,
+        effects=effects,
+        friction="smooth",
+        disturbance=disturbance,
+        quantized=quantized,
+        hardware_seed=HARDWARE,
+    )
 
 
 def _true_robot(simulation: Simulation, effects: Sequence[str]) -> Robot:
