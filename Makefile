@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | test | lint | bench | bench-discovery | clean. Everything lives in .venv; a second run installs only what changed.
+# make demo | test | lint | bench | bench-estimator | bench-discovery | clean. Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint style types bench bench-discovery clean
+.PHONY: demo test lint style types bench bench-estimator bench-discovery clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -33,6 +33,10 @@ types: $(VENV)/dev
 
 bench: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench.py
+
+# A quarter of an hour on a machine that has nothing else to do; with --quick two minutes.
+bench-estimator: $(VENV)/bench $(VENV)/code
+	$(BIN)/python benchmarks/bench_estimator.py
 
 # Hours; an interrupted run continues. A tenth: .venv/bin/python benchmarks/bench_discovery.py --quick
 bench-discovery: $(VENV)/bench $(VENV)/code
