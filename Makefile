@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | test | lint | bench | bench-estimator | bench-discovery | clean. Everything lives in .venv; a second run installs only what changed.
+# make demo | test | lint | bench | bench-discovery | bench-estimator | bench-real | clean
+# Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
@@ -10,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint style types bench bench-estimator bench-discovery clean
+.PHONY: demo test lint style types bench bench-discovery bench-estimator bench-real clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -41,6 +42,10 @@ bench-estimator: $(VENV)/bench $(VENV)/code
 # Hours; an interrupted run continues. A tenth: .venv/bin/python benchmarks/bench_discovery.py --quick
 bench-discovery: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench_discovery.py
+
+# Needs the recordings in ../shared/data/real; says so and ends where they are missing.
+bench-real: $(VENV)/bench $(VENV)/code
+	$(BIN)/python benchmarks/bench_real.py
 
 clean:
 	rm -rf $(VENV) build demo *.egg-info .mypy_cache .pytest_cache .ruff_cache

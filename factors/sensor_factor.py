@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
-from jointscope.robots.sensors import Gyro, MotorEncoder
+from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder
 
 Array = NDArray[np.float64]
-AnySensor = TypeVar("AnySensor", Gyro, MotorEncoder)
+AnySensor = TypeVar("AnySensor", Gyro, LinkEncoder, MotorEncoder)
 
 
 @dataclass(frozen=True)

@@ -69,6 +69,7 @@ class BagProblem:
     @staticmethod
     def of(robot: Robot, recording: Recording) -> BagProblem:
         """Builds the factors of a recording."""
+        robot.need_link_dynamics()
         timeline = Timeline.of(recording)
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)

@@ -28,7 +28,7 @@ from jointscope.graphs.residual_collection import BagResiduals, collect, series_
 from jointscope.graphs.robust_sigma import inflation
 from jointscope.robots.recording import Notice
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import AXES, Gyro, MotorEncoder, Sensor
+from jointscope.robots.sensors import AXES, Gyro, Sensor
 
 Array = NDArray[np.float64]
 
@@ -211,9 +211,8 @@ def _calibrated(
     }
     sensors: dict[str, Sensor] = {}
     for name, sensor in robot.sensors.items():
-        if isinstance(sensor, MotorEncoder):
-            continue
-        sensors[name] = _calibrated_gyro(sensor, calibration, table)
+        if isinstance(sensor, Gyro):
+            sensors[name] = _calibrated_gyro(sensor, calibration, table)
     noise = solved.problems[0].dynamics.steps.noise
     return replace(robot, parameters=new, noise=noise).with_sensors(sensors)
 

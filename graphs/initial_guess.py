@@ -44,6 +44,11 @@ def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:
     angles = encoder.values - problem.robot.motor_encoder.zero
     q_motor = _at(ticks, encoder.times, angles)
     v_motor = _smooth_derivative(q_motor, ticks)
+    links = problem.robot.link_encoder
+    if links is not None:
+        seen = problem.recording.streams[links.name]
+        q_link = _at(ticks, seen.times, seen.values - links.zero)
+        return np.hstack([q_link, _smooth_derivative(q_link, ticks), q_motor, v_motor])
     v_link = _link_rates(problem, calibration, q_motor, v_motor)
     h = np.diff(ticks, prepend=ticks[0])
     keep = float(np.exp(-np.median(h) / LEAK))

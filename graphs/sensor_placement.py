@@ -12,6 +12,7 @@ from jointscope.factors.distorted import DistortedFactor
 from jointscope.factors.factor import Factor
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.interpolated import InterpolatedFactor
+from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.relative_gyro import RelativeGyroFactor
 from jointscope.factors.rescaled import RescaledFactor
@@ -23,7 +24,7 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.lateness import Lateness, late_channels
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
+from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 
 Array = NDArray[np.float64]
 
@@ -113,9 +114,10 @@ def _rate_of_change(stream: Stream) -> Array:
 
 def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
     sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
-    if isinstance(sensor, MotorEncoder):
+    if isinstance(sensor, MotorEncoder | LinkEncoder):
         factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigma)
         return factor if shared is None else RescaledFactor(factor, shared[chosen])
+    assert isinstance(sensor, Gyro)
     if sensor.form == "full":
         return factor_on_state(robot, name, values, times)
     if sensor.form == "vertical":
@@ -138,6 +140,9 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     """
     sensor = robot.sensors[name]
     inner: GyroFactor | MotorEncoderFactor
+    if isinstance(sensor, LinkEncoder):
+        return LinkEncoderFactor(sensor, values, robot.layout)
+    assert not isinstance(sensor, TorqueSensor)
     if isinstance(sensor, MotorEncoder):
         inner = MotorEncoderFactor(sensor, values, robot.layout)
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}

@@ -208,7 +208,7 @@ def _sensor_part(
     channels = np.array([sensor.channels.index(row) for row in factor.rows], dtype=np.intp)
     stream = segment.problem.recording.streams[factor.name]
     measured = stream.values[np.searchsorted(stream.times, stamps)][:, channels]
-    offset = segment.calibration.biases[factor.name] if isinstance(sensor, Gyro) else sensor.zero
+    offset = segment.calibration.biases[factor.name] if isinstance(sensor, Gyro) else getattr(sensor, "zero", 0.0)
     motion = sum((J @ rate[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
     reading = linear.residual + measured - np.asarray(offset)[channels]
     return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion))

@@ -81,7 +81,7 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     effects = tuple(here for here in robot.effects if here.label != label)
     new = replace(robot, parameters=parameters, effects=effects, document=document)
     by_name = set(new.layout.links) - set(new.layout.joints) | set(new.memories)
-    if not by_name and "effects" in document["noise"]:
+    if not by_name and "effects" in document.get("noise", {}):
         remove_at(document, "noise", "effects")
     return replace(new, noise=carried_noise(robot, new))
 

@@ -44,6 +44,7 @@ class ElasticJoints:
     """
 
     def __init__(self, robot: Robot):
+        robot.need_link_dynamics()
         self.layout = layout = robot.layout
         self._tree = StructuredTree(robot)
         self._parameters = parameters = JointParameters(robot)

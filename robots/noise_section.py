@@ -22,6 +22,9 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
     Raises:
         RobotError: densities that are missing, too many or not positive.
     """
+    if robot.free_links:
+        layout = robot.layout
+        return ProcessNoise(False, "integrated", np.ones(layout.n_link), np.ones(layout.n_motor))
     model = section.text("model", "integrated", ("integrated", "independent"))
     layout, n = robot.layout, robot.n
     own = section.section("effects", {})

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the sensors read at one state, with Jacobians: the equations of the sensor factors, fast enough for a loop.
 
-    encoder  q_motor + zero + errors of effects
+    encoder  q_motor + zero + errors of effects, or q_link + zero
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
 
 A test holds it against the factors.
@@ -40,6 +40,9 @@ class ReadingsAtOneState:
         self._encoder = np.zeros((robot.n, robot.layout.size))
         self._encoder[np.arange(robot.n), robot.layout.motor_q] = 1.0
         self._zero = np.asarray(encoder.zero, dtype=float)
+        self._link_encoder = robot.link_encoder
+        self._links = np.zeros((robot.n, robot.layout.size))
+        self._links[np.arange(robot.n), robot.layout.joint_q] = 1.0
         values = {name: parameter.value for name, parameter in robot.parameters.items()}
         self._errors = {name: _errors_of(robot, sensor, values) for name, sensor in robot.sensors.items()}
         self._at: Array | None = None
@@ -58,6 +61,8 @@ class ReadingsAtOneState:
         if name in self._gyros:
             reading, J = self._rate(name, x)
             offset: Array | float = 0.0
+        elif self._link_encoder is not None and name == self._link_encoder.name:
+            reading, J, offset = self._links @ x, self._links, self._link_encoder.zero
         else:
             reading, J, offset = self._encoder @ x, self._encoder, self._zero
         for here, channels, p in self._errors[name]:

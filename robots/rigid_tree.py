@@ -30,9 +30,10 @@ class RigidTree:
         joints: names of the moving joints in the order of the state; all others stay locked.
         gravity: acceleration of gravity in the base frame, shape (3,) [m/s^2].
         coriolis: factor s on the Coriolis and centrifugal terms, 0 or 1.
+        inertias: whether the bodies need inertias; without, only the kinematics can be used.
     """
 
-    def __init__(self, urdf: Path, joints: Sequence[str], gravity: Array, coriolis: bool = True):
+    def __init__(self, urdf: Path, joints: Sequence[str], gravity: Array, coriolis: bool = True, inertias: bool = True):
         self.urdf = urdf
         self.joints = tuple(joints)
         self.coriolis = coriolis
@@ -43,7 +44,8 @@ class RigidTree:
         self._pool = pin.ModelPool(self.model, 1)
         self._rates = BodyRates(self.model)
         self.gravity = np.asarray(gravity, float)
-        self._check_inertias()
+        if inertias:
+            self._check_inertias()
 
     def with_model(self, model: pin.Model) -> RigidTree:
         """The same tree with other bodies or more joints; its inertias are not checked."""

@@ -22,7 +22,7 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.rigid_tree import RigidTree
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.state_layout import StateLayout
 from jointscope.robots.structured_tree import bearing_names, with_bearings
 
@@ -40,6 +40,8 @@ class ModelChoices:
         friction_sharpness: k in tanh(k v) [s/rad].
         bias_at_rest: whether gyro samples before the first command measure the bias directly (eq. 32).
         rigid_joints: joints whose link follows the motor without a spring.
+        link_dynamics: "model" (equations of motion of the links), or "free": their masses are not known, and only
+            what does not need them is modelled, the transmissions and the gyros.
     """
 
     integrator: str = "simpson"
@@ -48,6 +50,7 @@ class ModelChoices:
     friction_sharpness: float = 200.0
     bias_at_rest: bool = False
     rigid_joints: tuple[str, ...] = ()
+    link_dynamics: str = "model"
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,33 @@ class Robot:
             if isinstance(sensor, MotorEncoder):
                 return sensor
         raise RobotError(f"robot {self.name!r} has no sensor of kind motor_encoder")
+
+    @property
+    def link_encoder(self) -> LinkEncoder | None:
+        """The encoders on the links, where there are any."""
+        return next((sensor for sensor in self.sensors.values() if isinstance(sensor, LinkEncoder)), None)
+
+    @property
+    def torque_sensor(self) -> TorqueSensor | None:
+        """The sensors of the torques in the joints, where there are any."""
+        return next((sensor for sensor in self.sensors.values() if isinstance(sensor, TorqueSensor)), None)
+
+    @property
+    def free_links(self) -> bool:
+        """Whether the links' masses are not known, so that there are no equations of motion."""
+        return self.choices.link_dynamics == "free"
+
+    def need_link_dynamics(self) -> None:
+        """Complains about a robot without equations of motion.
+
+        Raises:
+            RobotError: its links are free.
+        """
+        if self.free_links:
+            raise RobotError(
+                f"{self.name} has link_dynamics: free, so there are no equations of motion to predict with; "
+                "`calibrate` and `discover` compare motors, links and gyros without them"
+            )
 
     @property
     def gyros(self) -> tuple[Gyro, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import MotorEncoder
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
 
 DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "inertia": "kg m2"}
@@ -36,7 +36,29 @@ def check_robot(robot: Robot) -> None:
         raise RobotError(f"{place}: sensors: none of kind motor_encoder; the motor positions are needed")
     if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
         raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
+    _check_links(robot, place)
     _check_parameters(robot, place)
+
+
+def _check_links(robot: Robot, place: str) -> None:
+    """What a robot with free links needs, and what only such a robot can use."""
+    if robot.free_links:
+        if robot.link_encoder is None:
+            raise RobotError(f"{place}: model.link_dynamics: free needs a sensor of kind link_encoder, got none")
+        springs = [joint for joint in robot.joints if joint not in robot.choices.rigid_joints]
+        if springs:
+            raise RobotError(
+                f"{place}: model.link_dynamics: free begins with rigid joints; list {', '.join(springs)} under "
+                "rigid_joints, and their springs as effects joint_elasticity@JOINT"
+            )
+        return
+    if not robot.motor_encoder.zero_known:
+        raise RobotError(f"{place}: sensors.{robot.motor_encoder.name}.zero: unknown needs link_dynamics: free")
+    if robot.torque_sensor is not None:
+        raise RobotError(
+            f"{place}: sensors.{robot.torque_sensor.name}: joint_torque is used with link_dynamics: free only; "
+            "remove the sensor, or set model.link_dynamics"
+        )
 
 
 def _check_names(robot: Robot, place: str) -> None:
@@ -46,6 +68,10 @@ def _check_names(robot: Robot, place: str) -> None:
         if name in taken:
             raise RobotError(f"{place}: sensors.{name}: the name {name!r} is taken; give the sensor another one")
     encoders = [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder)]
+    for kind in (LinkEncoder, TorqueSensor):
+        same = [name for name, sensor in robot.sensors.items() if isinstance(sensor, kind)]
+        if len(same) > 1:
+            raise RobotError(f"{place}: sensors: expected at most one of each kind but gyro, got {', '.join(same)}")
     if len(encoders) > 1:
         raise RobotError(f"{place}: sensors: expected one of kind motor_encoder, got {', '.join(encoders)}")
 
@@ -77,6 +103,8 @@ def _check_parameters(robot: Robot, place: str) -> None:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
         if parameter.unit != units[name]:
             raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
+    if robot.free_links:
+        return
     needed = tuple(DRIVE_PARAMETERS) if robot.command.unit != "N m" else ("inertia",)
     for joint in robot.joints:
         for name in needed:

@@ -64,12 +64,14 @@ def load_robot(name_or_path: str | Path) -> Robot:
         raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
     choices = top.section("model", {}).build(lambda s: _model_choices(s, joints))
     gravity = top.array("gravity", (3,))
-    tree = RigidTree(_urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis)
+    tree = RigidTree(
+        _urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis, choices.link_dynamics == "model"
+    )
     constants = top.section("constants", {}).build(_constants)
-    command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS))
+    command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS, scaled=True))
     sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
-    noise_section = top.section("noise")
+    noise_section = top.section("noise", *([{}] if choices.link_dynamics == "free" else []))
     robot = Robot(
         name=top.text("name"),
         description=top.text("description", ""),
@@ -185,6 +187,7 @@ def _model_choices(section: Section, joints: tuple[str, ...]) -> ModelChoices:
         friction_sharpness=section.number("friction_sharpness", 200.0, positive=True),
         bias_at_rest=section.flag("bias_at_rest", False),
         rigid_joints=_rigid_joints(section, joints),
+        link_dynamics=section.text("link_dynamics", "model", ("model", "free")),
     )
 
 

@@ -50,7 +50,8 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
         if gyro.R_sigma is not None:
             rotation.pop("sigma", None)
             rotation.insert(1, "sigma", _row(gyro.R_sigma, 3))
-    _write_noise(document["noise"], robot)
+    if not robot.free_links:
+        _write_noise(document["noise"], robot)
     if provenance is not None:
         document["calibration"] = _plain(provenance)
     return dump_document(document)

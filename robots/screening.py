@@ -10,6 +10,7 @@ from jointscope.robots.encoder_gyro_scale import check_scales
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.gyro_plausibility import check_gyros
 from jointscope.robots.joint_motion import JointMotion, joint_motion
+from jointscope.robots.motor_zero import with_motor_zero
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.units import UNITS, si_factor, si_unit
@@ -47,6 +48,7 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     """
     for stream in recording.streams.values():
         _check_samples(stream)
+    recording = with_motor_zero(recording, robot)
     notices = _check_overlap(recording)
     _check_command(recording.command, robot)
     motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)

@@ -9,22 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor, Topic
+from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.units import UNITS, si_unit
 from jointscope.robots.yaml_section import Section
 
 Array = NDArray[np.float64]
 
 GYRO_FORMS = ("full", "vertical", "relative")
+KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro")
+UNKNOWN = "unknown"
 
 
-def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = ()) -> Topic:
+def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = (), scaled: bool = False) -> Topic:
     """Where a signal is in a recording.
 
     Args:
         section: with topic, type, field, unit and names.
         joints: names to expect where the signal has one channel per joint.
         units: units to choose from; all known ones if empty.
+        scaled: whether each joint may have a factor of its own, such as the ratio of its gear.
 
     Raises:
         RobotError: another number of names than of joints.
@@ -33,7 +36,8 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     names = section.texts("names", joints)
     if joints and len(names) != len(joints):
         raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
-    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names)
+    scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
+    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names, scale)
 
 
 def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
@@ -45,8 +49,12 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
     """
 
     def make(section: Section) -> Sensor:
-        kind = section.text("kind", choices=("motor_encoder", "gyro"))
-        return _motor_encoder(name, section, joints) if kind == "motor_encoder" else _gyro(name, section)
+        kind = section.text("kind", choices=KINDS)
+        if kind == "gyro":
+            return _gyro(name, section)
+        if kind == "joint_torque":
+            return _torque_sensor(name, section, joints)
+        return (_motor_encoder if kind == "motor_encoder" else _link_encoder)(name, section, joints)
 
     return make
 
@@ -55,8 +63,24 @@ def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> Moto
     source = topic(section, joints)
     if si_unit(source.unit) != "rad":
         raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
+    zero_known = section.raw("zero") != UNKNOWN
+    zero = section.array("zero", (len(joints),), np.zeros(len(joints))) if zero_known else np.zeros(len(joints))
+    return MotorEncoder(name, source, section.number("sigma", positive=True), zero, joints, zero_known)
+
+
+def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:
+    source = topic(section, joints)
+    if si_unit(source.unit) != "rad":
+        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
     zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
-    return MotorEncoder(name, source, section.number("sigma", positive=True), zero, joints)
+    return LinkEncoder(name, source, section.number("sigma", positive=True), zero, joints)
+
+
+def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> TorqueSensor:
+    source = topic(section, joints)
+    if source.unit != "N m":
+        raise RobotError(f"{section.place}.unit: expected 'N m', got {source.unit!r}")
+    return TorqueSensor(name, source, section.number("sigma", positive=True), joints)
 
 
 def _gyro(name: str, section: Section) -> Gyro:

@@ -21,6 +21,7 @@ class Topic:
         field: field of the message that holds the sample, dots descend ("angular_velocity").
         unit: unit in the bag; converted to SI when read.
         names: name in the message for each joint of the robot, in the robot's order; empty for streams without names.
+        scale: factor on the value of each joint, such as the ratio of its gear; empty for none.
     """
 
     topic: str
@@ -28,6 +29,7 @@ class Topic:
     field: str
     unit: str
     names: tuple[str, ...] = ()
+    scale: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,37 @@ class MotorEncoder:
         sigma: standard deviation of the noise [rad].
         zero: reading at q_motor = 0, shape (n_joints,) [rad].
         joints: names of the joints.
+        zero_known: False for an incremental encoder, whose zero is another one in each recording.
+    """
+
+    name: str
+    source: Topic
+    sigma: float
+    zero: NDArray[np.float64]
+    joints: tuple[str, ...]
+    zero_known: bool = True
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per joint."""
+        return tuple(f"{joint}.motor_position" for joint in self.joints)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of a sample."""
+        return "rad"
+
+
+@dataclass(frozen=True)
+class LinkEncoder:
+    """Encoders on all links, behind the transmission: theta_measured = q_link + zero + noise.
+
+    Attributes:
+        name: key in the robot file.
+        source: topic.
+        sigma: standard deviation of the noise [rad].
+        zero: reading at q_link = 0, shape (n_joints,) [rad].
+        joints: names of the joints.
     """
 
     name: str
@@ -51,12 +84,39 @@ class MotorEncoder:
     @property
     def channels(self) -> tuple[str, ...]:
         """Channel names, one per joint."""
-        return tuple(f"{joint}.motor_position" for joint in self.joints)
+        return tuple(f"{joint}.link_position" for joint in self.joints)
 
     @property
     def unit(self) -> str:
         """SI unit of a sample."""
         return "rad"
+
+
+@dataclass(frozen=True)
+class TorqueSensor:
+    """Torques that the transmissions pass on to their links, measured behind the friction of the motors.
+
+    Attributes:
+        name: key in the robot file.
+        source: topic.
+        sigma: standard deviation of the noise [N m].
+        joints: names of the joints.
+    """
+
+    name: str
+    source: Topic
+    sigma: float
+    joints: tuple[str, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per joint."""
+        return tuple(f"{joint}.joint_torque" for joint in self.joints)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of a sample."""
+        return "N m"
 
 
 @dataclass(frozen=True)
@@ -104,4 +164,4 @@ class Gyro:
         return "rad/s"
 
 
-Sensor = MotorEncoder | Gyro
+Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro

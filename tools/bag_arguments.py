@@ -21,6 +21,12 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--holdout", metavar="BAG", type=Path, help="a recording that is scored and reported, but never chooses"
     )
+    parser.add_argument(
+        "--holdout-share",
+        metavar="SHARE",
+        type=float,
+        help="hold out the last part of the only BAG instead, for example 0.33; zeros and biases are then found anew",
+    )
     add_effects_option(parser)
 
 
@@ -39,11 +45,28 @@ def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tup
     from jointscope.tools.bags import read_recording
 
     recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+    if args.holdout_share is not None:
+        return _last_part_held_out(args, recordings)
     if args.holdout is None:
         return recordings, None
     holdout = read_recording(args.holdout, robot, reading(args.holdout, progress))
     _check_apart(recordings, holdout)
     return recordings, holdout
+
+
+def _last_part_held_out(
+    args: argparse.Namespace, recordings: Sequence[Recording]
+) -> tuple[list[Recording], Recording | None]:
+    """The first part of a recording for training, the last part held out."""
+    if args.holdout is not None or len(recordings) > 1 or not 0.05 <= args.holdout_share <= 0.95:
+        raise RecordingError(
+            f"--holdout-share {args.holdout_share:g}: expected a share from 0.05 to 0.95 of a single BAG, without "
+            f"--holdout; got {len(recordings)} bags"
+        )
+    (whole,) = recordings
+    end = max(float(stream.times[-1]) for stream in whole.streams.values())
+    cut = end - args.holdout_share * whole.duration
+    return [whole.between(float("-inf"), cut)], whole.between(cut, float("inf"))
 
 
 def _check_apart(recordings: Sequence[Recording], holdout: Recording) -> None:

@@ -172,7 +172,7 @@ def _write_views(
 def provenance(result: Any) -> dict[str, Any]:
     """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
     return {
-        **_origin(result.start.path.name, [bag.recording for bag in result.bags]),
+        **origin(result.start.path.name, [bag.recording for bag in result.bags]),
         "samples": int(result.samples),
         "cost": float(result.cost),
     }
@@ -182,14 +182,15 @@ def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Reco
     """Where a step of a discovery comes from: the same, and what was changed."""
     errors = {"train_error": step.train_error, "heldout_error": step.heldout_error, "floor": step.floor}
     return {
-        **_origin(start, recordings),
+        **origin(start, recordings),
         "discovery_step": index,
         **{name: label for name, label in (("added", step.added), ("removed", step.removed)) if label},
         **{name: float(f"{value:.6g}") for name, value in errors.items() if math.isfinite(value)},
     }
 
 
-def _origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Version, date, name of the start model's file, and bags with hashes."""
     return {
         "version": jointscope.__version__,
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from jointscope.robots.robot import Robot
 
-OWNER_KINDS = ("joint", "gyro", "robot")
+OWNER_KINDS = ("joint", "gyro", "link_encoder", "robot")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Effect(ABC):
         id: short name, as in ID@OWNER.
         card: what a user reads.
         parameters: of every instance; kinds whose parameters depend on the owner override `parameters_of`.
-        owners: kinds of owners: some of "joint", "gyro", "robot".
+        owners: kinds of owners: some of "joint", "gyro", "link_encoder", "robot".
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
     """
 
@@ -104,7 +104,9 @@ class Effect(ABC):
 
     def owners_of(self, robot: Robot) -> tuple[str, ...]:
         """Everything in a robot that the effect can act on."""
-        by_kind = {"joint": robot.joints, "gyro": tuple(g.name for g in robot.gyros), "robot": ("robot",)}
+        on_links = () if robot.link_encoder is None else (robot.link_encoder.name,)
+        gyros = tuple(g.name for g in robot.gyros)
+        by_kind = {"joint": robot.joints, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
         return tuple(owner for kind in self.owners for owner in by_kind[kind])
 
     def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:

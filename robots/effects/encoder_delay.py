@@ -22,14 +22,14 @@ def late(stamps: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]
 
 EFFECT = TimeShift(
     id="encoder_delay",
-    owners=("joint", "robot"),
+    owners=("joint", "link_encoder", "robot"),
     late=late,
     sensors="encoder",
     parameters=(EffectParameter("delay", "s", start=1e-3, prior_sigma=0.5, sign="+"),),
     example={"delay": 3e-3},
     card=Card(
         title="encoder reading older than its stamp",
-        law="reading(t) = q_motor(t - delay)",
+        law="reading(t) = q_motor(t - delay), or q_link(t - delay) for the encoders on the links",
         explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
         "joint: its encoder is read later than those of the others.",
         source="Kelly, Sukhatme (2014), A general framework for temporal calibration of multiple proprioceptive and "

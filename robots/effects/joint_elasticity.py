@@ -36,6 +36,8 @@ class JointElasticity(Structure):
         """Starts at a resonance of 10 Hz with the inertia that the joint moves at zero angles."""
         j = robot.joints.index(owner)
         inertia = float(robot.tree.mass_matrix(np.zeros((1, robot.n)))[0, j, j])
+        if inertia <= 0.0:  # a robot whose masses are not known
+            return self.parameters
         start = {
             "compliance": 1.0 / (inertia * RESONANCE**2),
             "damping": 2.0 * DAMPING_RATIO * inertia * RESONANCE,

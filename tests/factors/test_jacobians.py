@@ -14,6 +14,7 @@ from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.initial_state import InitialStateFactor
 from jointscope.factors.interpolated import InterpolatedFactor
+from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.midpoint_dynamics import MidpointDynamics
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.priors import BiasPrior, DynamicsPrior, RotationPrior
@@ -31,6 +32,7 @@ from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.lateness import Lateness, late_channels
 from jointscope.robots.robot_file import load_robot
+from jointscope.robots.sensors import LinkEncoder
 
 ROBOT = load_robot("doggy")
 PAPER = load_robot("doggy_paper")
@@ -53,6 +55,8 @@ def _factors():
     encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)), layout)
     gyro = GyroFactor(imu2, rates, tree, layout)
     yield "encoder", encoder
+    links = LinkEncoder("links", ROBOT.motor_encoder.source, 1e-4, rng.normal(size=3), ROBOT.joints)
+    yield "link encoder", LinkEncoderFactor(links, rng.normal(size=(M, 3)), layout)
     yield "gyro on the first body", GyroFactor(imu1, rates, tree, layout)
     yield "gyro on the last body", gyro
     yield "vertical gyro", VerticalGyroFactor(imu1, rates, tree, layout)

@@ -58,7 +58,8 @@ MISTAKES = [
     ("unit: rad\n", "unit: V\n", "my.yaml: sensors.motor_encoder.unit: an encoder measures an angle, got 'V'"),
     ("unit: rad/s\n", "unit: rad\n", "my.yaml: sensors.imu1.unit: a gyroscope measures an angular rate, got 'rad'"),
     ("kind: motor_encoder", "kind: encoder",
-     "my.yaml: sensors.motor_encoder.kind: expected one of motor_encoder, gyro, got 'encoder'"),
+     "my.yaml: sensors.motor_encoder.kind: expected one of motor_encoder, link_encoder, joint_torque, gyro, "
+     "got 'encoder'"),
     ("sigma: 6.9259e-5", "sigma: 0", "my.yaml: sensors.motor_encoder.sigma: expected a number above zero, got 0"),
     ("sigma: 6.9259e-5", "sigma: .nan", "my.yaml: sensors.motor_encoder.sigma: expected a finite number, got nan"),
     ("body: link1", "body: link9", "my.yaml: sensors.imu1.body: no link 'link9'; did you mean 'link3'?"),
@@ -130,7 +131,8 @@ def test_a_file_that_is_something_else_is_refused(content, told, tmp_path):
 
 def test_an_unknown_robot_is_answered_with_the_ready_ones():
     assert complaint("dogy") == "no robot 'dogy': neither a file nor a ready robot; did you mean 'doggy'?"
-    assert complaint("x") == "no robot 'x': neither a file nor a ready robot; expected doggy, doggy_paper"
+    known = "doggy, doggy_paper, hebi_2r, hebi_3r, hebi_5r, kr300, xl330_pendulum"
+    assert complaint("x") == f"no robot 'x': neither a file nor a ready robot; expected {known}"
 
 
 @pytest.mark.parametrize(
@@ -166,6 +168,11 @@ def test_ready_robots_load_and_describe_themselves(name):
     robot = load_robot(name)
     assert robot.name == name
     assert robot.description
+
+
+@pytest.mark.parametrize("name", ["doggy", "doggy_paper"])
+def test_doggy_has_twelve_parameters_and_nine_channels(name):
+    robot = load_robot(name)
     assert len(robot.parameters) == 12
     assert len(robot.channels) == 9
 

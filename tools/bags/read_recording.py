@@ -133,6 +133,8 @@ def _samples(
         text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
         notices.append(Notice(need.name, "info", len(stamps), text))
     values = columns.values[:, order] * si_factor(need.source.unit)
+    if need.source.scale:
+        values = values * np.asarray(need.source.scale)
     samples, found = in_time_order(need.name, TimedSamples(stamps, topic.received_ns, values))
     return samples, notices + found
 

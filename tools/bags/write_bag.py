@@ -126,7 +126,8 @@ def _messages(recording: Recording, topic: str, needs: list[StreamSource], ros2:
 
 
 def _in_bag_unit(need: StreamSource, stream: Stream) -> NDArray[np.float64]:
-    return stream.values / si_factor(need.source.unit)
+    scale = np.asarray(need.source.scale or 1.0)
+    return stream.values / (si_factor(need.source.unit) * scale)
 
 
 def _nanoseconds(times: NDArray[np.float64], start_ns: int) -> NDArray[np.int64]:

@@ -123,6 +123,11 @@ class Occasion:
         found: dict[str, SampledSensor] = {
             encoder.name: SampledEncoder(encoder, self.engine, sampling, times, seed, noise)
         }
+        links = self._robot.link_encoder
+        if links is not None:
+            times = stamps(links.name, sampling.encoder_rate)
+            noise = self.random("noise", links.name).standard_normal((len(times), self._robot.n))
+            found[links.name] = SampledEncoder(links, self.engine, sampling, times, seed, noise)
         for gyro in self.gyros:
             times = stamps(gyro.sensor.name, sampling.gyro_rate)
             found[gyro.sensor.name] = SampledGyro(gyro, self.engine, sampling, times, seed)

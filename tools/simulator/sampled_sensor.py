@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recording import Stream
-from jointscope.robots.sensors import MotorEncoder, Sensor
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder, Sensor
 from jointscope.tools.simulator.engine import Engine
 from jointscope.tools.simulator.hooks import age, distort, logged, taken_at
 from jointscope.tools.simulator.random_streams import random_stream
@@ -59,13 +59,20 @@ class SampledSensor:
 
 
 class SampledEncoder(SampledSensor):
-    """The motor encoders; `noise` is standard normal, shape (m, n_joints)."""
+    """The encoders on the motors, or on the links; `noise` is standard normal, shape (m, n_joints)."""
 
     def __init__(
-        self, encoder: MotorEncoder, engine: Engine, sampling: Sampling, stamps: Array, seed: int, noise: Array
+        self,
+        encoder: MotorEncoder | LinkEncoder,
+        engine: Engine,
+        sampling: Sampling,
+        stamps: Array,
+        seed: int,
+        noise: Array,
     ):
         super().__init__(encoder, engine, sampling, stamps, seed)
-        self._encoder, self._motor, self._noise, self._quantized = encoder, engine.motor, noise, sampling.quantized
+        self._encoder, self._noise, self._quantized = encoder, noise, sampling.quantized
+        self._columns = engine.motor if isinstance(encoder, MotorEncoder) else engine.link
 
     def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
         """Readings, shape (k, n_joints) [rad]."""
@@ -74,11 +81,11 @@ class SampledEncoder(SampledSensor):
         return read_encoder(self._encoder, angles, self._noise[rows], self._quantized)
 
     def _angles(self, trajectory: Trajectory, times: Array) -> Array:
-        """Each rotor as old as its channel, shape (k, n_joints) [rad]."""
-        angles = np.empty((len(times), len(self._motor)))
+        """Each rotor or link as old as its channel, shape (k, n_joints) [rad]."""
+        angles = np.empty((len(times), len(self._columns)))
         for old in np.unique(self._age):
             now = self._age == old
-            angles[:, now] = trajectory.at(times - old)[0][:, self._motor[now]]
+            angles[:, now] = trajectory.at(times - old)[0][:, self._columns[now]]
         return angles
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.sensors import Gyro, MotorEncoder
+from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder
 from jointscope.tools.simulator.engine import TICK
 
 Array = NDArray[np.float64]
@@ -90,12 +90,12 @@ class MountedGyro:
         return cls(sensor, bias, sensor.R_imu_body @ error)
 
 
-def read_encoder(encoder: MotorEncoder, q_motor: Array, noise: Array, quantized: bool) -> Array:
+def read_encoder(encoder: MotorEncoder | LinkEncoder, q_motor: Array, noise: Array, quantized: bool) -> Array:
     """What encoders read.
 
     Args:
         encoder: the sensor.
-        q_motor: angles that they are at, shape (m, n_joints) [rad].
+        q_motor: angles of the motors, or of the links, that they are at, shape (m, n_joints) [rad].
         noise: standard normal numbers of the same shape.
         quantized: steps and a little noise, or noise only.
 

@@ -49,6 +49,12 @@ def run(args: argparse.Namespace) -> int:
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+        if robot.free_links:
+            from jointscope.tools.free_links import run_free_links
+
+            print(run_free_links(robot, recordings, None, files, search=False))
+            print(f"\nWrote {', '.join(map(str, files.all))}")
+            return 0
         result = calibrate(robot, recordings, progress=progress)
         if files.report is not None or files.rrd is not None:
             progress("writing", 1.0)

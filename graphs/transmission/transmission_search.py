@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Adds effects one by one to a robot with free links, as long as seconds that were not fitted are explained better.
+
+Of the training recordings every other second is fitted and the seconds between validate. The held-out recording is
+scored once per step and never chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.transmission.candidates import Candidate, candidates, columns_of, may_be_added
+from jointscope.graphs.transmission.equation import Equation
+from jointscope.graphs.transmission.look_alikes import look_alikes
+from jointscope.graphs.transmission.regression import errors, fitted, parts, spread, total
+from jointscope.graphs.transmission.transmission_model import TransmissionModel, fit
+from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery, TransmissionStep
+from jointscope.graphs.verdicts import MOST
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+from jointscope.robots.screening import screen
+
+Array = NDArray[np.float64]
+
+BLOCK = 1.0  # [s] fitted and validated in turn
+MATTERS = 0.05  # share of the squared error of the equations concerned that an effect must explain
+SURE = 3.0  # [sigma] a size must be away from zero
+MOST_STEPS = 12
+
+
+def discover_transmission(
+    robot: Robot, recordings: Sequence[Recording], holdout: Recording | None = None, max_steps: int = MOST_STEPS
+) -> TransmissionDiscovery:
+    """Finds the effects that motors, links and gyros show of each other.
+
+    Args:
+        robot: with link_dynamics free.
+        recordings: for training.
+        holdout: scored once per step.
+        max_steps: effects to add at the most.
+
+    Raises:
+        RecordingError: a recording does not hold what the robot needs.
+    """
+    for recording in [*recordings, *([holdout] if holdout is not None else [])]:
+        screen(recording, robot)
+    model = fit(robot, recordings)
+    steps = [_step(None, model, recordings, holdout, (), "Rigid joints, all sensors in time.")]
+    refused: dict[str, str] = {}
+    while len(steps) <= max_steps:
+        found, refused = _best(model, recordings)
+        if found is None:
+            break
+        chosen = (*model.chosen, found)
+        alike, sentence = look_alikes(model, recordings, found)
+        model = fit(robot, recordings, chosen)
+        steps.append(_step(found, model, recordings, holdout, alike, sentence))
+    stop = "no effect explains more of the seconds that were not fitted"
+    if len(steps) > max_steps:
+        stop = f"{max_steps} effects were added, the largest number allowed"
+    return TransmissionDiscovery(tuple(steps), tuple(recordings), holdout, stop, refused, model.sigmas(recordings))
+
+
+def fit_blocks(equation: Equation) -> NDArray[np.bool_]:
+    """Samples that are fitted."""
+    return np.floor(equation.times / BLOCK).astype(int) % 2 == 0
+
+
+def validation_blocks(equation: Equation) -> NDArray[np.bool_]:
+    """Samples that judge."""
+    return ~fit_blocks(equation)
+
+
+def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Candidate | None, dict[str, str]]:
+    """The candidate that explains most, None if none does enough; and why the others were refused."""
+    equations = model.equations(recordings)
+    before = _validated(equations, model.names)
+    blocks = _by_block(equations, model.names)
+    gains: list[tuple[float, Candidate]] = []
+    refused: dict[str, str] = {}
+    for candidate in candidates(model.robot):
+        if not may_be_added(candidate, model.chosen):
+            continue
+        names = columns_of(model.robot, (*model.chosen, candidate))
+        after = _validated(equations, names)
+        concerned = {e.name for e in equations if any(size in e.columns for size in candidate.sizes)}
+        old, new = (sum(found[name] ** 2 for name in concerned) for found in (before, after))
+        share = (old - new) / old if old > 0.0 else 0.0
+        why = _why_not(candidate, equations, names, share)
+        why = why or _helps_rarely(blocks, _by_block(equations, names), concerned)
+        if why:
+            refused[candidate.label] = why
+        else:
+            gains.append((total(before) ** 2 - total(after) ** 2, candidate))
+    if not gains:
+        return None, refused
+    return max(gains, key=lambda pair: pair[0])[1], refused
+
+
+def _why_not(candidate: Candidate, equations: Sequence[Equation], names: Sequence[str], share: float) -> str:
+    """Why a candidate is refused; empty if it is not."""
+    if share < MATTERS:
+        return f"explains {100 * max(share, 0.0):.1f} % of what is left in the seconds that were not fitted"
+    own = [list(names).index(size) for size in candidate.sizes]
+    sizes = fitted(parts(equations, names))[own]
+    if candidate.one_sided and np.any(sizes < 0.0):
+        return f"would explain {100 * share:.0f} %, but with a size of {sizes[0]:.3g}, and only sizes above zero exist"
+    if not np.any(np.abs(sizes) > SURE * spread(equations, names)[own]):
+        return f"would explain {100 * share:.0f} %, but with a size that blocks of the recording do not agree about"
+    return ""
+
+
+def _by_block(equations: Sequence[Equation], names: Sequence[str]) -> dict[tuple[str, int, int], float]:
+    """Squared error on each second that was not fitted, by equation, place among the equations and block."""
+    sizes, found = fitted(parts(equations, names, fit_blocks)), {}
+    for place, equation in enumerate(equations):
+        for piece in parts([equation], names, validation_blocks):
+            left = (piece.error - piece.columns @ sizes).reshape(-1, equation.error.shape[1])
+            number = np.floor(equation.times[validation_blocks(equation)] / BLOCK).astype(int)
+            for block in np.unique(number):
+                found[equation.name, place, int(block)] = float(np.sum(left[number == block] ** 2))
+    return found
+
+
+def _helps_rarely(
+    before: dict[tuple[str, int, int], float], after: dict[tuple[str, int, int], float], concerned: set[str]
+) -> str:
+    """Why a candidate that helps in few blocks is refused; empty if it helps in most."""
+    helped = [after[key] < old for key, old in before.items() if key[0] in concerned]
+    share = float(np.mean(helped)) if helped else 0.0
+    if share >= MOST:
+        return ""
+    return f"would explain more on the whole, but helps in {100 * share:.0f} % only of the seconds that were not fitted"
+
+
+def _validated(equations: Sequence[Equation], names: Sequence[str]) -> dict[str, float]:
+    """Errors on the seconds that were not fitted [sigma]."""
+    return errors(parts(equations, names, validation_blocks), fitted(parts(equations, names, fit_blocks)))
+
+
+def _step(
+    added: Candidate | None,
+    model: TransmissionModel,
+    recordings: Sequence[Recording],
+    holdout: Recording | None,
+    alike: tuple[str, ...],
+    sentence: str,
+) -> TransmissionStep:
+    train = model.errors(recordings)
+    held = model.errors([holdout]) if holdout is not None else {}
+    return TransmissionStep(added.label if added else None, model, train, held, alike, sentence)
