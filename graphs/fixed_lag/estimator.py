@@ -59,11 +59,10 @@ class FixedLagEstimator:
     Attributes:
         robot: with every gyro predicted in full.
         status: counters, alarms.
-        layout: of the robot's state.
-        lag: length of the window [s].
+        layout, lag: of the robot's state; length of the window [s].
 
     Raises:
-        EstimatorError: impossible lag, or a parameter that cannot be adapted.
+        EstimatorError, RobotError: impossible lag, parameter that cannot be adapted; robot without equations of motion.
     """
 
     def __init__(
@@ -76,6 +75,7 @@ class FixedLagEstimator:
     ):
         if not (math.isfinite(lag) and lag > 0.0):
             raise EstimatorError(f"lag is {lag:g} s; expected a positive number of seconds, such as 0.1")
+        robot.need_link_dynamics()
         self.robot = with_full_gyros(robot)
         self.layout, self.lag, self._listener = self.robot.layout, lag, listener
         self._engine = TickEngine(self.robot, lag, checked_densities(self.robot, adapt or {}), BIAS_WALK)
