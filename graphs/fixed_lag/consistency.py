@@ -17,6 +17,8 @@ UPPER = 2.0  # mean square above which there is an alarm; 4 % of wrong noise wou
 BACK = 1.5  # below which it is over
 FEWEST = 50  # samples before a channel can alarm
 LARGEST = 1e4  # one sample counts for no more than this
+REFUSED = 25.0  # and a refused one for this: a glitch is no alarm, one sample in twenty is
+LARGEST_SHARE = 0.1  # of one sample in the mean, after a silence
 
 
 class Consistency:
@@ -28,7 +30,7 @@ class Consistency:
 
     def __init__(self) -> None:
         self.alarms: dict[str, float] = {}
-        self._groups: dict[tuple[str, ...], _Group] = {}
+        self._channels: dict[str, _Channel] = {}
         self._nis, self._weight, self._time = 0.0, 0.0, -math.inf
 
     @property
@@ -39,55 +41,48 @@ class Consistency:
     @property
     def mean_square(self) -> dict[str, float]:
         """Of the normalised innovations, by channel; 1 is right."""
-        found: dict[str, float] = {}
-        for channels, group in self._groups.items():
-            found |= dict(zip(channels, group.mean_square, strict=True))
-        return found
+        return {name: channel.mean_square for name, channel in self._channels.items()}
 
     def add(self, innovations: Sequence[Innovation]) -> list[tuple[str, float, bool]]:
         """Takes in innovations; returns channels whose alarm begins (True) or ends (False), with their mean square."""
         changed = []
         for innovation in innovations:
-            if not innovation.used:
-                continue
-            if innovation.time > self._time:
-                decay = math.exp(-(innovation.time - self._time) / SECONDS)
-                self._nis, self._weight, self._time = decay * self._nis, decay * self._weight, innovation.time
-            self._nis += min(innovation.nis, LARGEST * innovation.dof)
-            self._weight += innovation.dof
-            group = self._groups.get(innovation.channels)
-            if group is None:
-                group = self._groups[innovation.channels] = _Group(innovation)
-            group.add(innovation)
-            if group.count > FEWEST and (self.alarms or max(group.mean_square) > UPPER):
-                changed += self._crossed(innovation.channels, group)
+            if innovation.used:
+                self._add_to_mean(innovation)
+            largest = LARGEST if innovation.used else REFUSED
+            normalised = (innovation.residual / innovation.sigma).tolist()
+            for name, z in zip(innovation.channels, normalised, strict=True):
+                channel = self._channels.get(name)
+                if channel is None:
+                    channel = self._channels[name] = _Channel(innovation.time)
+                mean = channel.add(min(z * z, largest), innovation.time)
+                if name in self.alarms:
+                    self.alarms[name] = mean
+                    if mean < BACK:
+                        del self.alarms[name]
+                        changed.append((name, mean, False))
+                elif mean > UPPER and channel.count > FEWEST:
+                    self.alarms[name] = mean
+                    changed.append((name, mean, True))
         return changed
 
-    def _crossed(self, channels: tuple[str, ...], group: _Group) -> list[tuple[str, float, bool]]:
-        changed = []
-        for channel, mean in zip(channels, group.mean_square, strict=True):
-            if channel in self.alarms:
-                self.alarms[channel] = mean
-                if mean < BACK:
-                    del self.alarms[channel]
-                    changed.append((channel, mean, False))
-            elif mean > UPPER:
-                self.alarms[channel] = mean
-                changed.append((channel, mean, True))
-        return changed
+    def _add_to_mean(self, innovation: Innovation) -> None:
+        if innovation.time > self._time:
+            decay = math.exp(-(innovation.time - self._time) / SECONDS)
+            self._nis, self._weight, self._time = decay * self._nis, decay * self._weight, innovation.time
+        self._nis += min(innovation.nis, LARGEST * innovation.dof)
+        self._weight += innovation.dof
 
 
-class _Group:
-    """Channels that are always sampled together."""
+class _Channel:
+    """Running mean of one channel."""
 
-    def __init__(self, first: Innovation):
-        self.mean_square, self.count, self._last = [1.0] * first.dof, 0, first.time
+    def __init__(self, time: float):
+        self.mean_square, self.count, self._last = 1.0, 0, time
 
-    def add(self, innovation: Innovation) -> None:
-        share = min(max(innovation.time - self._last, 0.0) / SECONDS, 1.0)
-        normalised = (innovation.residual / innovation.sigma).tolist()
-        self.mean_square = [
-            mean + share * (min(z * z, LARGEST) - mean) for mean, z in zip(self.mean_square, normalised, strict=True)
-        ]
+    def add(self, square: float, time: float) -> float:
+        share = min(max(time - self._last, 0.0) / SECONDS, LARGEST_SHARE)
+        self.mean_square += share * (square - self.mean_square)
         self.count += 1
-        self._last = max(innovation.time, self._last)
+        self._last = max(time, self._last)
+        return self.mean_square
