@@ -66,7 +66,7 @@ def _kalman(section: Section, errors: dict[str, list[Array]], case: Case, ours: 
         began = time.thread_time()
         times, states = filtered(case.robot, case.recording, like_ours, since)
         section.numbers["kalman_ms"] = 1e3 * (time.thread_time() - began) / len(times)
-        here = (times > SETTLED) & (times <= ours.now.times[-1])
+        here = times > SETTLED
         errors[name].append(states[here][:, case.robot.layout.joint_v] - _true_velocity(case, times[here]))
 
 

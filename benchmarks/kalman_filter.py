@@ -10,7 +10,7 @@ The state is the robot's, then the biases of the gyros.
 from __future__ import annotations
 
 import numpy as np
-from message_feed import Message, in_order
+from message_feed import SAME, Message, in_order
 from numpy.typing import NDArray
 
 from jointscope.graphs.bag_problem import DEFLECTION_SIGMA
@@ -130,7 +130,7 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool, since: float =
     u, now = np.zeros(robot.n), max(messages[0].stamp, since)
     times, states = list[float](), list[Array]()
     for message in messages:
-        if message.stamp > now:
+        if message.stamp > now + SAME:
             times.append(now)
             states.append(kalman.x[: robot.layout.size].copy())
             kalman.predict(u, message.stamp - now)
@@ -141,6 +141,6 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool, since: float =
             widened = 1.0 if shared is None else np.array(shared)
         if message.stream == "command":
             u = message.values
-        elif message.stamp >= since:
+        elif message.stamp > since - SAME:
             kalman.update(message, widened)
-    return np.array(times), np.array(states)
+    return np.array([*times, now]), np.array([*states, kalman.x[: robot.layout.size]])

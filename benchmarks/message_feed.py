@@ -18,7 +18,7 @@ from jointscope.robots.recording import Recording
 Array = NDArray[np.float64]
 
 CYCLE = 1e-3  # [s]
-SAME = 1e-6  # [s] what arrives this soon after a cycle has begun belongs to it
+SAME = 1e-6  # [s] stamps nearer than this are those of one tick
 
 
 class Message(NamedTuple):
@@ -37,7 +37,7 @@ def in_order(recording: Recording) -> list[Message]:
         for stream in recording.streams.values()
         for t, values in zip(stream.times, stream.values, strict=True)
     ]
-    return sorted(messages, key=lambda m: (m.arrives, m.stream == "command"))
+    return sorted(messages, key=lambda m: (round(m.arrives / SAME), m.stream == "command"))
 
 
 def disturbed(
