@@ -112,7 +112,7 @@ def _report(section: Section, errors: dict[str, list[float]], distances: Array) 
 
     value, text = ratio(OURS, KALMAN)
     met = round(value, 3) <= AS_GOOD
-    section.promise("newest state, over the extended Kalman filter", f"at most {AS_GOOD:.3f}", text, met)
+    section.promise("newest state, over the extended Kalman filter", f"at most {AS_GOOD:g}, to a thousandth", text, met)
     section.promise("&nbsp;&nbsp;over the filter without weights for coarse encoders", "", ratio(OURS, BY_HAND)[1])
     best = min((_derivative(corner) for corner in CORNERS), key=lambda name: _rms(np.array(errors[name])))
     section.promise("&nbsp;&nbsp;over the best differentiated encoders", "", ratio(OURS, best)[1])
