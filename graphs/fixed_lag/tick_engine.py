@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 Acting = Callable[[float, float], tuple[Array, Array | None]]
 WALKED_TOO_FAR = 6.0  # [sigma of the prior] a bias that is further away is not kept when the estimator begins anew
-COMMITTED_TOGETHER = 5  # ticks that wait for iSAM2; the newest state does not need it
+COMMITTED_TOGETHER = 4  # ticks that wait for iSAM2; the newest state does not need it
 
 
 class TickEngine:

@@ -13,6 +13,7 @@ over within the step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -54,11 +55,13 @@ class RatesAt:
 
     def near(self, model: StateRates, x: Array, torque: Array) -> RatesAt:
         """At a state so near that derivatives stay; evaluated anew where friction says that it is not."""
-        moved, columns, k = x - self.x, model.friction_columns, model.sharpness
-        before, after = np.tanh(k * self.x[columns]), np.tanh(k * x[columns])
-        straight = (1.0 - before * before) * k * moved[columns]
-        if np.abs(after - before - straight).max() > SAME_FRICTION:
-            return RatesAt.of(model, x, torque)
+        columns, k = model.friction_columns, model.sharpness
+        for before, after in zip(self.x[columns].tolist(), x[columns].tolist(), strict=True):
+            was = math.tanh(k * before)
+            straight = (1.0 - was * was) * k * (after - before)
+            if abs(math.tanh(k * after) - was - straight) > SAME_FRICTION:
+                return RatesAt.of(model, x, torque)
+        moved = x - self.x
         return RatesAt(x, torque, self.f + self.A @ moved + self.C @ (torque - self.torque), self.A, self.C)
 
 
