@@ -114,22 +114,25 @@ def _why_not(candidate: Candidate, equations: Sequence[Equation], names: Sequenc
 
 
 def _by_block(equations: Sequence[Equation], names: Sequence[str]) -> dict[tuple[str, int, int], float]:
-    """Squared error on each second that was not fitted, by equation, place among the equations and block."""
+    """Mean squared error of each second that was not fitted [sigma^2], by equation, its place and block."""
     sizes, found = fitted(parts(equations, names, fit_blocks)), {}
     for place, equation in enumerate(equations):
         for piece in parts([equation], names, validation_blocks):
             left = (piece.error - piece.columns @ sizes).reshape(-1, equation.error.shape[1])
             number = np.floor(equation.times[validation_blocks(equation)] / BLOCK).astype(int)
             for block in np.unique(number):
-                found[equation.name, place, int(block)] = float(np.sum(left[number == block] ** 2))
+                found[equation.name, place, int(block)] = float(np.mean(left[number == block] ** 2))
     return found
 
 
 def _helps_rarely(
     before: dict[tuple[str, int, int], float], after: dict[tuple[str, int, int], float], concerned: set[str]
 ) -> str:
-    """Why a candidate that helps in few blocks is refused; empty if it helps in most."""
-    helped = [after[key] < old for key, old in before.items() if key[0] in concerned]
+    """Why a candidate that helps in few blocks is refused; empty if it helps in most.
+
+    Seconds that leave no more than the noise of the sensors, as those at rest do, cannot tell and are not asked.
+    """
+    helped = [after[key] < old for key, old in before.items() if key[0] in concerned and old > 1.0]
     share = float(np.mean(helped)) if helped else 0.0
     if share >= MOST:
         return ""
