@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Hides effects in simulated recordings, lets `discover` find them and prints the table as markdown.
 
-Usage: python benchmarks/bench_discovery.py [--quick] [--only PATTERN] [--jobs N] [--results FILE] [--list]
+Usage: python benchmarks/bench_discovery.py [--quick] [--only PATTERN] [--jobs N] [--results FILE] [--table] [--list]
 """
 
 from __future__ import annotations
@@ -43,15 +43,18 @@ def main() -> None:
         return
     results: Path = arguments.results
     known = known_rows(results)
-    missing = [case for case in wanted if case.name not in known]
-    say(f"{len(wanted)} cases, {len(wanted) - len(missing)} of them in {results} already")
+    missing = [case for case in wanted if case.name not in known and not arguments.table]
+    say(f"{len(wanted)} cases, {sum(case.name in known for case in wanted)} of them in {results} already")
     # in a random order, so that an interrupted table is a fair part of every kind
     random.Random(ORDER).shuffle(missing)
     for row in measure(missing, arguments.jobs):
         keep(results, row)
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
-    print(f"# Discovery{' (quick run)' if arguments.quick else ''}\n\n{environment()}\n\n{section(rows).markdown()}")
+    part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)} cases)"
+    print(
+        f"# Discovery{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{section(rows).markdown()}"
+    )
 
 
 def measure(missing: list[Case], jobs: int) -> Iterator[Row]:
@@ -117,6 +120,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes, each on one core; 2 by default")
     default = Path(tempfile.gettempdir()) / "jointscope-bench-discovery.jsonl"
     parser.add_argument("--results", type=Path, default=default, metavar="FILE", help=f"rows as JSON lines; {default}")
+    parser.add_argument("--table", action="store_true", help="measure nothing, print the table of what is there")
     parser.add_argument("--list", action="store_true", help="only print the names of the cases")
     return parser.parse_args()
 

@@ -14,6 +14,7 @@ from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.effect_kinds.groups import GROUPS, group_of
 from jointscope.robots.errors import EffectError
 from jointscope.robots.robot_file import load_robot
+from jointscope.robots.structured_tree import StructuredTree
 
 IDS = """motor_viscous motor_stribeck load_dependent_friction asymmetric_friction cogging torque_offset motor_lag
 command_delay pwm_deadband spring_cubic backlash hysteresis kinematic_coupling link_viscous link_coulomb
@@ -91,6 +92,32 @@ def test_a_bearing_starts_from_the_joint_that_it_carries():
     start = {p.name: p.start for p in catalogue()["bearing_flexibility"].parameters_of(DOGGY, "joint1")}
     assert start["compliance_x"] == pytest.approx(1.0 / 4000.0)
     assert start["inertia_x"] == pytest.approx(2.0)
+
+
+def test_a_bearing_brings_every_entry_of_the_inertia_that_a_rigid_one_hides():
+    robot = add_effect(DOGGY, "bearing_flexibility@joint1")
+    tree, still = StructuredTree(robot), np.zeros((1, robot.layout.n_link))
+    values = {name: p.value for name, p in robot.parameters.items()}
+
+    def mass_matrix(**moved):
+        full = {f"joint1.bearing_flexibility.{name}": value for name, value in moved.items()}
+        accelerations = [tree.acceleration(still, still, row[None], {**values, **full})[0] for row in np.eye(5)]
+        return np.linalg.inv(np.array(accelerations))
+
+    # at rest in the middle the hinges x, y and the joint are the axes of the body's own frame
+    start = {name: values[f"joint1.bearing_flexibility.{name}"] for name in ("inertia_x", "inertia_y")}
+    x, y, z = (robot.layout.links.index(name) for name in ("joint1.bearing_x", "joint1.bearing_y", "joint1"))
+    for name, (i, k) in {
+        "inertia_x": (x, x),
+        "inertia_y": (y, y),
+        "product_xy": (x, y),
+        "product_xz": (x, z),
+        "product_yz": (y, z),
+    }.items():
+        expected = np.zeros((5, 5))
+        expected[i, k] = expected[k, i] = 0.03
+        change = mass_matrix(**{name: start.get(name, 0.0) + 0.03}) - mass_matrix()
+        np.testing.assert_allclose(change, expected, atol=1e-10)
 
 
 def test_structures_that_the_model_has_already_are_refused_with_the_reason():
