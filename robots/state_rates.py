@@ -59,6 +59,10 @@ class StateRates:
         on_link = robot.choices.friction_velocity == "link"
         self.friction_columns = layout.joint_v if on_link else layout.motor_v
         self._rows = layout.motor_row
+        n = layout.n_link
+        # a slice where all motors have equations of their own: quicker
+        own_rows = np.array_equal(self._rows, np.arange(n, n + robot.n))
+        self._added = slice(n, n + robot.n) if own_rows else self._rows
         own = [layout.joints.index(joint) for joint in layout.motors]
         self._inertia = parameters.of(named, "inertia")[own]
         self._laws = _laws(robot, springs.at(np.zeros((1, layout.size)), named), named)
@@ -72,6 +76,11 @@ class StateRates:
         for j, row in enumerate(self._rows.tolist()):
             if row >= n:
                 self._by_torque[layout.v_motor.start + row - n, j] = 1.0 / self._inertia[row - n]
+
+    @property
+    def has_laws(self) -> bool:
+        """Whether effects add torques of their own."""
+        return bool(self._laws)
 
     def command_torque(self, u: Array) -> Array:
         """Torque of the motors for a command in its SI unit, shape (n,) [N m]."""
@@ -88,7 +97,7 @@ class StateRates:
             Shape (d,).
         """
         tau = self._linear @ x
-        tau[self._rows] += command_torque - self._coulomb * np.tanh(self.sharpness * x[self.friction_columns])
+        tau[self._added] += command_torque - self._coulomb * np.tanh(self.sharpness * x[self.friction_columns])
         for law in self._laws:
             law.add(x, tau, None)
         layout = self.layout
@@ -112,7 +121,7 @@ class StateRates:
         layout, n = self.layout, self._n
         tau, by_state = self._linear @ x, self._linear.copy()
         smooth_sign = np.tanh(self.sharpness * x[self.friction_columns])
-        tau[self._rows] += command_torque - self._coulomb * smooth_sign
+        tau[self._added] += command_torque - self._coulomb * smooth_sign
         by_state[self._rows, self.friction_columns] -= self._coulomb * self.sharpness * (1.0 - smooth_sign**2)
         for law in self._laws:
             law.add(x, tau, by_state)

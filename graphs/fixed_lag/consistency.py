@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from jointscope.graphs.fixed_lag.innovation import Innovation
 
@@ -50,12 +51,17 @@ class Consistency:
             if innovation.used:
                 self._add_to_mean(innovation)
             largest = LARGEST if innovation.used else REFUSED
-            normalised = (innovation.residual / innovation.sigma).tolist()
+            normalised, time = (innovation.residual / innovation.sigma).tolist(), innovation.time
             for name, z in zip(innovation.channels, normalised, strict=True):
                 channel = self._channels.get(name)
                 if channel is None:
-                    channel = self._channels[name] = _Channel(innovation.time)
-                mean = channel.add(min(z * z, largest), innovation.time)
+                    channel = self._channels[name] = _Channel(time)
+                elif time > channel.last:
+                    share = min((time - channel.last) / SECONDS, LARGEST_SHARE)
+                    channel.mean_square += share * (min(z * z, largest) - channel.mean_square)
+                    channel.last = time
+                channel.count += 1
+                mean = channel.mean_square
                 if name in self.alarms:
                     self.alarms[name] = mean
                     if mean < BACK:
@@ -74,15 +80,10 @@ class Consistency:
         self._weight += innovation.dof
 
 
+@dataclass
 class _Channel:
-    """Running mean of one channel."""
+    """Running mean of one channel, and the stamp of the sample that last changed it."""
 
-    def __init__(self, time: float):
-        self.mean_square, self.count, self._last = 1.0, 0, time
-
-    def add(self, square: float, time: float) -> float:
-        share = min(max(time - self._last, 0.0) / SECONDS, LARGEST_SHARE)
-        self.mean_square += share * (square - self.mean_square)
-        self.count += 1
-        self._last = max(time, self._last)
-        return self.mean_square
+    last: float
+    mean_square: float = 1.0
+    count: int = 0

@@ -17,7 +17,7 @@ from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-SAME_POSITION = 0.01  # [rad] inertia weighs the noise; within this it does so as before, to a percent
+SAME_POSITION = 0.02  # [rad] inertia weighs the noise; within this it does so as before, to two percent
 
 
 class StepNoise:
