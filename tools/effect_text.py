@@ -76,8 +76,13 @@ def _parameters(effect: Effect) -> list[str]:
 
 
 def _nulls(effect: Effect) -> str:
-    """At which values the effect is not there."""
-    return ", ".join(f"{p.name} {p.null:g}" for p in effect.parameters if not p.is_shape)
+    """At which values the effect is not there; a_x 0 and a_y 0 as a_x/y 0."""
+    found: dict[tuple[str, float], list[str]] = {}
+    for p in effect.parameters:
+        if not p.is_shape:
+            stem, _, end = p.name.rpartition("_")
+            found.setdefault((f"{stem}_" if stem else p.name, p.null), []).append(end if stem else "")
+    return ", ".join(f"{stem}{'/'.join(ends)} {null:g}" for (stem, null), ends in found.items())
 
 
 def _null(p: EffectParameter) -> str:

@@ -156,7 +156,7 @@ def with_bearing(robot):
     bearing = add_effect(robot, BEARING).with_values(found)
     parameters = dict(bearing.parameters)
     for name, p in parameters.items():
-        parameters[name] = dataclasses.replace(p, sigma=0.015 * p.value if p.effect else 0.002 * p.value)
+        parameters[name] = dataclasses.replace(p, sigma=0.015 * (abs(p.value) or 0.1) if p.effect else 0.002 * p.value)
     return dataclasses.replace(bearing, parameters=parameters)
 
 

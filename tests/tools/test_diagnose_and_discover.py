@@ -47,7 +47,7 @@ def quick(tmp_path, monkeypatch):
     _, _, _, train, test, _ = fake_inputs(0.5)
     known = {"a.mcap": train, "b.mcap": test}
     monkeypatch.setattr(bags, "read_recording", lambda path, robot, progress=None: known[Path(path).name])
-    fake = SimpleNamespace(diagnose=lambda robot, recordings, holdout, progress: fake_diagnosis(0.5, held_out=False))
+    fake = SimpleNamespace(diagnose=lambda robot, recordings, holdout, **_: fake_diagnosis(0.5, held_out=False))
     monkeypatch.setitem(sys.modules, "jointscope.graphs.diagnose", fake)
 
 
