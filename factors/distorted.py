@@ -76,7 +76,7 @@ class DistortedFactor:
         reading, values = self._undisturbed(residual, calibration), self._values(calibration)
         total = residual.copy()
         for here, channels in self.effects:
-            total[:, channels] += self._error(here, reading[:, channels], _own(here, values))
+            total[:, channels] += self._error(here, reading[:, channels], here.own(values))
         return total
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
@@ -88,7 +88,7 @@ class DistortedFactor:
         gain = np.broadcast_to(np.eye(residual.shape[1]), (*residual.shape, residual.shape[1])).copy()
         by_dynamics = np.zeros((*residual.shape, len(names)))
         for here, channels in self.effects:
-            part, p = reading[:, channels], _own(here, values)
+            part, p = reading[:, channels], here.own(values)
             residual[:, channels] += self._error(here, part, p)
             for i, channel in enumerate(channels):
                 moved = part.astype(complex)
@@ -120,8 +120,3 @@ class DistortedFactor:
     def _law(self, here: EffectAt, reading: Array, p: Mapping[str, complex]) -> NDArray[np.complex128]:
         assert isinstance(here.effect, ReadingEffect)
         return np.asarray(here.effect.law(reading, self.times, p))
-
-
-def _own(here: EffectAt, values: Mapping[str, float]) -> dict[str, float]:
-    start = here.parameter("")
-    return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from jointscope.robots.effect_kinds.effect import Effect
@@ -28,3 +29,8 @@ class EffectAt:
     def parameter(self, name: str) -> str:
         """Full name OWNER.EFFECT.NAME of a parameter."""
         return f"{self.owner}.{self.effect.id}.{name}"
+
+    def own(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The effect's own parameters by the last part of their name, from values by full name."""
+        start = self.parameter("")
+        return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}

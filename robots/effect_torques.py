@@ -70,7 +70,7 @@ class EffectTorques:
     ) -> None:
         effect = here.effect
         assert isinstance(effect, RobotTorque)
-        signals, p = self._signals(here, x, springs), _own(here, values)
+        signals, p = self._signals(here, x, springs), here.own(values)
         self._put(terms.value, effect.law(signals, p))
         if terms.by_state is None or terms.by_parameter is None:
             return
@@ -156,7 +156,7 @@ class _LocalLaw:
         motion: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
         motion |= {"tau_spring": springs.torque[:, j], "stiffness": springs.stiffness[j]}
         signals = JointSignals(**motion, sharpness=sharpness)
-        p = _own(self.here, values)
+        p = self.here.own(values)
         self._add_law(terms, self.effect.law, self._rows, signals, p, springs)
         if self.effect.memory is not None:
             self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs)
@@ -208,12 +208,6 @@ class _LocalLaw:
             ):
                 if index >= 0:
                     terms.by_parameter[:, row, index] += slope * factor * signal[:, j]
-
-
-def _own(here: EffectAt, values: Mapping[str, float]) -> dict[str, float]:
-    """The effect's own parameters by the last part of their name."""
-    start = here.parameter("")
-    return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
 
 
 def _imaginary(torques: tuple[Any, Any]) -> tuple[Any, Any]:

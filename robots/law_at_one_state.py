@@ -49,7 +49,7 @@ class JointLawAtOneState:
     def __init__(self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float]):
         assert isinstance(here.effect, JointTorque)
         layout, j = robot.layout, robot.joints.index(here.owner)
-        self._p, self._sharpness = _own(here, values), robot.choices.friction_sharpness
+        self._p, self._sharpness = here.own(values), robot.choices.friction_sharpness
         columns = [layout.joint_q[j], layout.joint_v[j], layout.motor_q[j], layout.motor_v[j]]
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
@@ -108,7 +108,7 @@ class CoupledLawAtOneState:
 
     def __init__(self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float]):
         assert isinstance(here.effect, RobotTorque)
-        layout, self._law, self._p = robot.layout, here.effect.law, _own(here, values)
+        layout, self._law, self._p = robot.layout, here.effect.law, here.own(values)
         self._columns = np.concatenate([layout.joint_q, layout.joint_v, layout.motor_q, layout.motor_v])
         self._rows = layout.joint_link, layout.motor_row
         self._fixed: dict[str, Any] = {
@@ -134,9 +134,3 @@ class CoupledLawAtOneState:
             if by_state is not None:
                 for j, row in enumerate(rows.tolist()):
                     np.add.at(by_state[row], self._columns, found[1:, j].imag / STEP)
-
-
-def _own(here: EffectAt, values: Mapping[str, float]) -> dict[str, float]:
-    """The effect's own parameters by the last part of their name."""
-    start = here.parameter("")
-    return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}

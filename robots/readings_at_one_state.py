@@ -15,7 +15,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Gyro, MotorEncoder, Sensor
@@ -95,7 +94,7 @@ def _errors_of(
     else:
         seats = {}
     return [
-        (here.effect, seats[here.owner], _own(here, values))
+        (here.effect, seats[here.owner], here.own(values))
         for here in robot.effects
         if isinstance(here.effect, ReadingEffect) and here.owner in seats
     ]
@@ -112,9 +111,3 @@ def _disturbed(
     changed[channels] += found[0].real
     by_state[channels] += (found[1:].imag / STEP).T @ J[channels]
     return changed, by_state
-
-
-def _own(here: EffectAt, values: Mapping[str, float]) -> dict[str, float]:
-    """The effect's own parameters by the last part of their name."""
-    start = here.parameter("")
-    return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
