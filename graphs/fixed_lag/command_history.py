@@ -62,11 +62,6 @@ class CommandHistory:
         """Stamp of the newest command [s]; minus infinity without one."""
         return self._times[-1] if self._times else float("-inf")
 
-    def knows(self, t: float) -> bool:
-        """Whether there is a command with this stamp."""
-        i = bisect_left(self._times, t)
-        return i < len(self._times) and self._times[i] == t
-
     def add(self, t: float, u: Array) -> None:
         """Takes in a command; it may be older than others."""
         i = bisect_right(self._times, t)

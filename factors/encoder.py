@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What encoders on motors and on links share: theta_measured - q - zero, of one position for each channel.
+
+Variables: X at the time of the sample.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.factor import Linearization
+from jointscope.factors.sensor_factor import SensorFactor
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.state_layout import StateLayout
+
+Array = NDArray[np.float64]
+AnyEncoder = TypeVar("AnyEncoder", LinkEncoder, MotorEncoder)
+
+
+@dataclass(frozen=True)
+class EncoderFactor(SensorFactor[AnyEncoder]):
+    """Residual = predicted - measured angle; measured has shape (m, n) [rad].
+
+    Attributes:
+        layout: of the states.
+    """
+
+    layout: StateLayout
+
+    @property
+    @abstractmethod
+    def columns(self) -> NDArray[np.intp]:
+        """Column of the position that each channel measures, shape (n,)."""
+
+    @property
+    def blocks(self) -> tuple[str, ...]:
+        """None: the zero of the encoder is known."""
+        return ()
+
+    def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
+        """Predicted - measured, shape (m, n) [rad]."""
+        return x[0][:, self.columns] + self.sensor.zero - self.measured
+
+    def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
+        """Residual and its constant derivative."""
+        m, n = self.measured.shape
+        by_state = np.zeros((m, n, self.layout.size))
+        by_state[:, np.arange(n), self.columns] = 1.0
+        return Linearization(self.residual(x, calibration), (by_state,))
