@@ -18,6 +18,7 @@ from jointscope.factors.factor import Factor
 from jointscope.factors.priors import DynamicsPrior, RotationPrior
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
+from jointscope.graphs.convergence import Iteration, has_converged, is_flat, measured_rows, short_step
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.robots.errors import SolveError
@@ -28,9 +29,8 @@ Progress = Callable[[str, float], None]
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 LAMBDA_LARGEST = 1e8
+LAMBDA_STATES = 1e-9  # of the states, as long as shorter steps of the shared values may help
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
-SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
-COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,6 @@ class Estimate:
         )
 
 
-@dataclass(frozen=True)
-class Iteration:
-    """What happened in one iteration: cost before and after, damping, largest step in sigmas."""
-
-    cost_before: float
-    cost_after: float
-    damping: float
-    step_in_sigmas: float
-
-
 @dataclass
 class Solution:
     """Result of a batch solve.
@@ -75,6 +65,7 @@ class Solution:
         shared: layout of the shared values.
         systems: normal equations of each recording at the estimate.
         converged: False if the iterations ended before the step became small.
+        flat: the iterations ended because a model that contradicts its recording gained nothing any more.
     """
 
     estimate: Estimate
@@ -84,6 +75,7 @@ class Solution:
     systems: list[NormalEquations]
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
+    flat: bool = False
 
 
 def priors_of(problem: BagProblem) -> list[Factor]:
@@ -107,7 +99,7 @@ def solve(
         problems: factors of each recording, all of one robot.
         start: where to begin.
         max_iterations: linearizations at the most; the solution says whether it converged.
-        step_tolerance: largest step of a shared value, in its sigmas, at which it has converged.
+        step_tolerance: largest step of a shared value, in its sigmas times the misfit, at which it has converged.
         hold: blocks that stay at their start, for example "dynamics".
         progress: called with a text and the share done.
 
@@ -119,23 +111,26 @@ def solve(
     solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
     if not np.isfinite(solution.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
-    damping = LAMBDA_START
+    damping, measured = LAMBDA_START, measured_rows(problems)
     for i in range(max_iterations):
         if progress:
             progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
         step = _try(problems, solution, hold, damping)
         while not step.accepted:
+            near = 0.0 < step.in_sigmas < short_step(solution.cost, step_tolerance, measured)
+            if near and damping <= LAMBDA_START:
+                # there already: only states at a kink of the friction keep the cost from falling
+                solution.converged = True
+                return solution
             damping *= LAMBDA_FACTOR
             if damping > LAMBDA_LARGEST:
                 return _stuck(solution, step, step_tolerance)
             step = _try(problems, solution, hold, damping)
-        fall = (solution.cost - step.cost) / max(solution.cost, 1e-300)
         solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
         solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
-        arrived = step.in_sigmas < step_tolerance and _remaining(solution.iterations) < SLOW * step_tolerance
-        small = arrived and fall < 1e-3
-        if small or (fall < COST_TOLERANCE and damping <= LAMBDA_START):
-            solution.converged = True
+        solution.converged = has_converged(solution.iterations, step_tolerance, measured, damping <= LAMBDA_START)
+        solution.flat = not solution.converged and is_flat(solution.iterations, measured)
+        if solution.converged or solution.flat:
             break
         damping = max(damping / LAMBDA_FACTOR, 1e-12)
     return solution
@@ -180,12 +175,20 @@ def newton_step(
     """
     shared = solution.shared
     free = free_indices(shared, hold)
-    eliminations = [eliminate(system, damping) for system in solution.systems]
+    eliminations = [eliminate(system, _of_states(damping)) for system in solution.systems]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
     dp, in_sigmas = _solve_shared(H, g, free, damping)
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     solution.hessian = H
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
+
+
+def _of_states(damping: float) -> float:
+    """Damping of the states: they follow the shared values at once, or a long valley is walked in tiny steps.
+
+    Where steps of the shared values are next to nothing and the cost still rises, the states are what is too far off.
+    """
+    return float(max(min(damping, LAMBDA_STATES), (damping / LAMBDA_LARGEST) ** 1.5))
 
 
 def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
@@ -202,15 +205,6 @@ def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str]
     cost_there = _cost(problems[0], systems, step.estimate)
     accepted = bool(np.isfinite(cost_there) and cost_there <= solution.cost * (1.0 + 1e-12))
     return _Trial(step.estimate, step.in_sigmas, step.dx, step.dp, systems, cost_there, accepted)
-
-
-def _remaining(iterations: Sequence[Iteration]) -> float:
-    """How far the minimum may still be, in sigmas, if the steps go on shrinking as the last one did."""
-    last = iterations[-1].step_in_sigmas
-    if len(iterations) < 2:
-        return last
-    ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.97)
-    return last * ratio / (1.0 - ratio)
 
 
 def _stuck(solution: Solution, step: _Trial, step_tolerance: float) -> Solution:

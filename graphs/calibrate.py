@@ -222,9 +222,11 @@ def _loose(noise: ProcessNoise) -> ProcessNoise:
 
 
 def _must_converge(solution: Solution, enough: float) -> None:
-    """Raises unless the solver converged, or made its last step shorter than `enough` sigmas."""
+    """Raises unless the solver converged, gained nothing more, or made a last step shorter than `enough` sigmas."""
+    if solution.converged or solution.flat:
+        return
     last = solution.iterations[-1]
-    if not solution.converged and last.step_in_sigmas >= enough:
+    if last.step_in_sigmas >= enough:
         raise SolveError(
             f"no convergence after {len(solution.iterations)} iterations: the last step was still "
             f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "

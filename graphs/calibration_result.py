@@ -154,6 +154,7 @@ class CalibrationResult:
         recording_seconds: length of all recordings together [s].
         wall_seconds: time the calibration took [s].
         findings: sentences for the user, most important first.
+        converged: False where the model contradicts the recordings so much that the values never came to rest.
     """
 
     robot: Robot
@@ -172,11 +173,12 @@ class CalibrationResult:
     recording_seconds: float
     wall_seconds: float
     findings: tuple[str, ...] = field(default_factory=tuple)
+    converged: bool = True
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
         return {
-            "converged": True,
+            "converged": self.converged,
             "iterations": len(self.iterations),
             "samples": self.samples,
             "recording_seconds": self.recording_seconds,

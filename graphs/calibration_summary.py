@@ -112,6 +112,7 @@ def summarize(
         samples=sum(len(p.factor) for problem in solved.problems for p in problem.sensors),
         recording_seconds=sum(problem.recording.duration for problem in solved.problems),
         wall_seconds=0.0,
+        converged=not solution.flat,
     )
     return replace(result, findings=findings(result, notices))
 

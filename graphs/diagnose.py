@@ -22,7 +22,7 @@ from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.validation import ValidationError, heldout_error, validation_error
-from jointscope.graphs.verdicts import SAME, SENSOR_FLOOR, Trialled, excess_share, judge, worth_a_refit
+from jointscope.graphs.verdicts import MATTERS, SAME, SENSOR_FLOOR, Trialled, excess_share, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -31,6 +31,7 @@ from jointscope.robots.screening import screen
 Array = NDArray[np.float64]
 
 LEADERS = 3  # candidates that are refitted
+PATIENCE = 2  # times as many, as long as none of them helps: one effect may hide that another one is right
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 SUSPICION = "Look at this before any effect"  # how a paragraph about a plain mistake begins
@@ -72,7 +73,7 @@ def diagnose(
         base: the model calibrated with these recordings, if that was done.
         comparison: of that model with the held-out recording, else with the first training recording, if it was made.
         validation: errors of that model on the validation blocks, if they are known.
-        leaders: number of candidates to refit.
+        leaders: number of candidates to refit; up to twice as many where none of them helps.
         missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
         progress: called with a text and the share done, from 0 to 1.
 
@@ -180,14 +181,16 @@ def _refit_leaders(
 ) -> tuple[dict[str, Trialled], set[str]]:
     """Refits of the best candidates, and the labels of those whose fit ran away.
 
-    Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too.
+    Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too; where none
+    helps, the next ones are.
     """
     worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
     found, failed, enough = dict[str, Trialled](), set[str](), 0.0
-    for i, candidate in enumerate(worth[:leaders]):
-        if candidate.plausible < enough:
+    for i, candidate in enumerate(worth[: PATIENCE * leaders]):
+        helped = any(t.validation.error**2 < (1.0 - MATTERS) * error**2 for t in found.values())
+        if candidate.plausible < enough or (i >= leaders and helped):
             break
-        report(f"refitting {candidate.label}", 0.5 + 0.5 * i / leaders)
+        report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
         trial = _trial(base, candidate, *base.spans(), holdout)
         if trial is None:
             failed.add(candidate.label)

@@ -22,11 +22,23 @@ def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple
         result: a calibration without findings.
         notices: what the screening saw.
     """
-    said = [_verdict(result), *_sensor_noise(result), *_process_noise(result), *_coloured(result)]
+    said = [*_not_at_rest(result), _verdict(result), *_sensor_noise(result), *_process_noise(result)]
+    said += _coloured(result)
     said += [direction.text for direction in result.weak_directions]
     said += [f"{p.name}: {p.note}" for p in result.parameters if p.note and "prior" not in p.note]
     said += [notice.text for notice in notices]
     return tuple(said)
+
+
+def _not_at_rest(result: CalibrationResult) -> list[str]:
+    if result.converged:
+        return []
+    worst, fit = max(result.channels.items(), key=lambda item: item[1].chi2)
+    return [
+        f"the model contradicts the recordings (residuals of {np.sqrt(fit.chi2):.2g} sigma on {worst}): nothing was "
+        "gained any more although values still moved; believe no value and no sigma before the missing effect is in "
+        "the model: jointscope diagnose"
+    ]
 
 
 def _verdict(result: CalibrationResult) -> str:

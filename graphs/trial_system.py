@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ from jointscope.robots.robot import ProcessNoise
 from jointscope.robots.sensors import Gyro
 
 Array = NDArray[np.float64]
+Whitened = tuple[Array, tuple[Array, ...], dict[str, Array]]
+"""Residual, shape (s, r), derivatives by states, shape (s, r, d) each, and by blocks, shape (s, r, size)."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class Segment:
             stamps.append(np.array([next(placed) for _ in range(count)]))
         elimination = eliminate(accumulate(linearized, x, calibration))
         return Segment(problem, calibration, TrialSignals.of(problem, x, calibration), linearized, stamps, elimination)
+
+    @cached_property
+    def whitened(self) -> list[Whitened]:
+        """Residual and derivatives of every piece of `linearized`, whitened; the same for every batch of trials."""
+        return [whitened(factor, linear) for factor, _, linear in self.linearized]
 
     def with_noise(self, noise: ProcessNoise) -> Segment:
         """The same with another process noise; only weights change."""
@@ -102,10 +110,10 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[TrialRows]:
     )
     stacked = _stacked([columns[i].at_ticks for i in at_ticks]), _stacked([columns[i].in_steps for i in in_steps])
     found = []
-    for (factor, ticks, linear), stamps in zip(segment.linearized, segment.stamps, strict=True):
+    pieces = zip(segment.linearized, segment.whitened, segment.stamps, strict=True)
+    for (factor, ticks, linear), (r, J, by_block), stamps in pieces:
         if factor.states == 0 or factor.name == "initial_state":
             continue
-        r, J, by_block = whitened(factor, linear)
         if isinstance(factor, DynamicsFactor):
             by_trial = np.zeros((*r.shape, len(columns)))
             if at_ticks:
