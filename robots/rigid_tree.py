@@ -191,6 +191,23 @@ class RigidTree:
                 )
 
 
+def moving_joints(urdf: Path) -> tuple[str, ...]:
+    """Names of the joints with one axis and limits, base to tip.
+
+    Raises:
+        RobotError: no such file, no URDF, or none of its joints is of that kind.
+    """
+    model = _read_urdf(urdf)
+    moving = list(zip(model.names, model.joints, strict=True))[1:]  # the first one is the universe
+    names = [name for name, joint in moving if joint.nq == 1 and joint.nv == 1]
+    if not names:
+        raise RobotError(
+            f"{urdf.name} has no moving joint that can be used: expected revolute or prismatic joints with limits "
+            "(continuous ones: make them revolute, with limits of many turns)"
+        )
+    return tuple(names)
+
+
 def _read_urdf(urdf: Path) -> pin.Model:
     if not urdf.is_file():
         raise RobotError(f"the URDF {urdf} does not exist; set `urdf` in the robot file, relative to that file")

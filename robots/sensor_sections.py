@@ -60,7 +60,7 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
 
 
 def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
-    source = topic(section, joints)
+    source = topic(section, joints, scaled=True)
     if si_unit(source.unit) != "rad":
         raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
     zero_known = section.raw("zero") != UNKNOWN
@@ -69,7 +69,7 @@ def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> Moto
 
 
 def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:
-    source = topic(section, joints)
+    source = topic(section, joints, scaled=True)
     if si_unit(source.unit) != "rad":
         raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
     zero = section.array("zero", (len(joints),), np.zeros(len(joints)))

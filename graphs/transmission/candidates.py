@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from jointscope.robots.robot import Robot
 
@@ -28,10 +28,12 @@ class Candidate:
     Attributes:
         effect: id.
         owner: joint, gyro or link encoder.
+        order: periods per turn of an effect that repeats with the position; the same effect at any order.
     """
 
     effect: str
     owner: str
+    order: float = field(default=1.0, compare=False)
 
     @property
     def label(self) -> str:
@@ -64,7 +66,12 @@ def candidates(robot: Robot) -> list[Candidate]:
 
 def present(robot: Robot) -> list[Candidate]:
     """The effects that a robot has."""
-    return [Candidate(here.effect.id, here.owner) for here in robot.effects if here.effect.id in SIZES]
+    found = []
+    for here in robot.effects:
+        if here.effect.id in SIZES:
+            order = robot.parameters.get(here.parameter("order"))
+            found.append(Candidate(here.effect.id, here.owner, 1.0 if order is None else order.value))
+    return found
 
 
 def columns_of(robot: Robot, chosen: Sequence[Candidate]) -> list[str]:

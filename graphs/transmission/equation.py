@@ -47,6 +47,7 @@ class Equation:
         error: measured - predicted, shape (m, c).
         constants: columns of what each recording has for itself, shape (m, c, b).
         columns: by full name of the parameter that multiplies it, shape (m, c) each.
+        position: of the link, shape (m,) [rad]; None for gyros.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Equation:
     error: Array
     constants: Array
     columns: Mapping[str, Array]
+    position: Array | None = None
 
 
 def equations(recording: Recording, robot: Robot, values: Mapping[str, float]) -> list[Equation]:
@@ -102,7 +104,7 @@ def gear_equation(s: JointSignals, robot: Robot, j: int) -> Equation:
     sigma = float(np.hypot(robot.motor_encoder.sigma, encoder.sigma))
     constants = np.ones((len(q), 1, 1))
     shaped = {name: column[:, None] for name, column in columns.items()}
-    return Equation(f"{joint}.gear", "rad", sigma, s.times, s.deflection[:, [j]], constants, shaped)
+    return Equation(f"{joint}.gear", "rad", sigma, s.times, s.deflection[:, [j]], constants, shaped, q)
 
 
 def gyro_equation(recording: Recording, robot: Robot, gyro: Gyro, delay: float) -> Equation:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.transmission.candidates import Candidate, candidates
 from jointscope.graphs.transmission.equation import Equation
+from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
+from jointscope.graphs.transmission.position_ripple import with_order
 from jointscope.graphs.transmission.regression import fitted, parts, spread
 from jointscope.graphs.transmission.transmission_model import TransmissionModel
 from jointscope.robots.recording import Recording
@@ -30,6 +32,8 @@ def look_alikes(
 ) -> tuple[tuple[str, ...], str]:
     """Labels of the effects that cannot be told from `found`, and a sentence about what it is."""
     equations = model.equations(recordings)
+    if found.effect == RIPPLE:
+        equations = with_order(equations, found.owner, found.order)
     labels = []
     for other in candidates(model.robot):
         if other == found or other in model.chosen:
@@ -40,7 +44,8 @@ def look_alikes(
     if encoder is not None and found.owner == encoder.name:
         return tuple(labels), _lateness_sentence(equations, model, found)
     alike = f"; in these recordings {', '.join(labels)} would explain the same" if labels else ""
-    return tuple(labels), f"{found.label} added{alike}."
+    order = f" with {found.order:.4g} periods per turn of the joint" if found.order != 1.0 else ""
+    return tuple(labels), f"{found.label} added{order}{alike}."
 
 
 def per_joint(equations: Sequence[Equation], names: Sequence[str], size: str) -> dict[str, tuple[float, float]]:

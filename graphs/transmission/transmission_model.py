@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from jointscope.graphs.transmission.candidates import Candidate, columns_of, present
 from jointscope.graphs.transmission.equation import Equation, delay_name, equations
+from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
+from jointscope.graphs.transmission.position_ripple import with_order
 from jointscope.graphs.transmission.regression import Choose, errors, everything, fitted, parts, spread
 from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.recording import Recording
@@ -43,8 +45,12 @@ class TransmissionModel:
     delays: Mapping[str, float]
 
     def equations(self, recordings: Sequence[Recording]) -> list[Equation]:
-        """The equations of recordings, gyro delays and mountings in them."""
-        return [e for recording in recordings for e in equations(recording, self.robot, self.delays)]
+        """The equations of recordings, gyro delays, mountings and orders of ripples in them."""
+        found = [e for recording in recordings for e in equations(recording, self.robot, self.delays)]
+        for candidate in self.chosen:
+            if candidate.effect == RIPPLE:
+                found = with_order(found, candidate.owner, candidate.order)
+        return found
 
     def size(self, name: str) -> float:
         """The size of one column."""
@@ -117,6 +123,8 @@ def with_found_effects(model: TransmissionModel, sigmas: Mapping[str, float]) ->
     robot = model.robot
     for candidate in model.chosen:
         values = {name.rsplit(".", 1)[1]: physical(model, name) for name in candidate.sizes}
+        if candidate.effect == RIPPLE:
+            values["order"] = candidate.order
         if not robot.has_effect(candidate.effect, candidate.owner):
             robot = add_effect(robot, candidate.label, values)
         robot = robot.with_values({f"{candidate.owner}.{candidate.effect}.{size}": v for size, v in values.items()})

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from jointscope.graphs.transmission.candidates import Candidate, candidates, columns_of, may_be_added
 from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.look_alikes import look_alikes
+from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
+from jointscope.graphs.transmission.position_ripple import strongest_order, with_order
 from jointscope.graphs.transmission.regression import errors, fitted, parts, spread, total
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, fit
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery, TransmissionStep
@@ -81,16 +83,15 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
     blocks = _by_block(equations, model.names)
     gains: list[tuple[float, Candidate]] = []
     refused: dict[str, str] = {}
-    for candidate in candidates(model.robot):
-        if not may_be_added(candidate, model.chosen):
-            continue
+    for candidate in _with_orders(model, equations):
         names = columns_of(model.robot, (*model.chosen, candidate))
-        after = _validated(equations, names)
-        concerned = {e.name for e in equations if any(size in e.columns for size in candidate.sizes)}
+        own = with_order(equations, candidate.owner, candidate.order) if candidate.effect == RIPPLE else equations
+        after = _validated(own, names)
+        concerned = {e.name for e in own if any(size in e.columns for size in candidate.sizes)}
         old, new = (sum(found[name] ** 2 for name in concerned) for found in (before, after))
         share = (old - new) / old if old > 0.0 else 0.0
-        why = _why_not(candidate, equations, names, share)
-        why = why or _helps_rarely(blocks, _by_block(equations, names), concerned)
+        why = _why_not(candidate, own, names, share)
+        why = why or _helps_rarely(blocks, _by_block(own, names), concerned)
         if why:
             refused[candidate.label] = why
         else:
@@ -98,6 +99,16 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
     if not gains:
         return None, refused
     return max(gains, key=lambda pair: pair[0])[1], refused
+
+
+def _with_orders(model: TransmissionModel, equations: Sequence[Equation]) -> list[Candidate]:
+    """What may be added; a ripple both at one period per turn and at the order that stands out."""
+    found = [c for c in candidates(model.robot) if may_be_added(c, model.chosen)]
+    for candidate in [c for c in found if c.effect == RIPPLE]:
+        order = strongest_order(equations, model.names, candidate.owner, fit_blocks)
+        if order is not None:
+            found.append(Candidate(RIPPLE, candidate.owner, order))
+    return found
 
 
 def _why_not(candidate: Candidate, equations: Sequence[Equation], names: Sequence[str], share: float) -> str:

@@ -149,8 +149,30 @@ def test_the_spring_of_a_hebi_module_is_found_as_its_maker_calibrated_it():
     assert stiffness == pytest.approx(70.0, rel=0.05)
 
 
-def _arm_of_three(seed):
-    """Torque in a motor of a KR300: friction and a load, a spring of 5e6 N m/rad, link encoders 3 ms late."""
+def test_a_ripple_of_unknown_order_is_found_and_written_with_it():
+    robot = load_robot("kr300")
+    recordings = [_arm_of_three(seed, ripple=(6e-5, 310.0)) for seed in (1, 2)]
+    result = discover_transmission(robot, recordings, _arm_of_three(3, ripple=(6e-5, 310.0)))
+    assert "encoder_eccentricity@joint_a2" in added(result)
+    prefix = "joint_a2.encoder_eccentricity."
+    found = {name: result.robot.parameters[prefix + name].value for name in ("cos", "sin", "order")}
+    assert found["order"] == pytest.approx(310.0, abs=2.0)
+    assert np.hypot(found["cos"], found["sin"]) == pytest.approx(6e-5, rel=0.1)
+    step = next(s for s in result.steps if s.added == "encoder_eccentricity@joint_a2")
+    assert "periods per turn" in step.paragraph
+    assert result.steps[-1].heldout["joint_a2.gear"] < 0.5 * result.steps[1].heldout["joint_a2.gear"]
+
+
+def test_where_nothing_repeats_fast_with_the_position_no_order_is_claimed():
+    result = discover_transmission(load_robot("kr300"), [_arm_of_three(seed) for seed in (1, 2)])
+    assert {candidate.order for candidate in result.model.chosen} == {1.0}
+
+
+def _arm_of_three(seed, ripple=(0.0, 1.0)):
+    """Torque in a motor of a KR300: friction and a load, a spring of 5e6 N m/rad, link encoders 3 ms late.
+
+    `ripple` of joint 2: amplitude [rad] and periods per turn.
+    """
     rng = np.random.default_rng(seed)
     times = np.arange(0.0, 10.0, 0.004)
     w, p = rng.uniform(1.0, 5.0, (3, 4)), rng.uniform(0.0, 6.0, (3, 4))
@@ -161,9 +183,10 @@ def _arm_of_three(seed):
     v = (q(times + 1e-4) - q(times - 1e-4)) / 2e-4
     load = 1500.0 * np.cos(q(times) * 3.0 + np.arange(3))
     torque = load + 300.0 * np.tanh(100.0 * v)
+    wave = ripple[0] * np.sin(ripple[1] * q(times)[:, 1] + 0.7)
     data = {
         "command": torque + 5.0 * rng.standard_normal(v.shape),
-        "motor_encoder": q(times) + 2e-7 * load + 1e-5 * rng.standard_normal(v.shape),
+        "motor_encoder": q(times) + 2e-7 * load + np.outer(wave, [0.0, 1.0, 0.0]) + 1e-5 * rng.standard_normal(v.shape),
         "link_encoder": q(times - 3e-3) + 1e-5 * rng.standard_normal(v.shape),
     }
     streams = {

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All guesses about one robot, each with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.joint_motion import joint_motion
+from jointscope.robots.recording import Stream
+from jointscope.robots.rigid_tree import RigidTree, moving_joints
+from jointscope.tools.bags.open_bag import Progress
+from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
+from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
+from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
+from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
+from jointscope.tools.robot_guess.signals import Signal, read_signals
+
+GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] ROS: z of the base points up
+SUPPLY = 24.0  # [V]
+
+
+@dataclass(frozen=True)
+class GuessedGyro:
+    """A gyroscope, where it seems to sit, and its noise."""
+
+    name: str
+    signal: Signal
+    mount: Mount
+    noise: NoiseGuess
+
+
+@dataclass(frozen=True)
+class RobotGuess:
+    """What a URDF and a bag say about a robot.
+
+    Attributes:
+        name: of the robot.
+        urdf: its file.
+        bag: path of the bag.
+        roles: which signal is what.
+        masses: whether the URDF has inertias for all moving bodies.
+        angle_unit: of the encoders, "rad" or "deg".
+        encoder_signs: which way the joints' encoders count.
+        command_unit: unit of the drive and why.
+        drives: start values by joint.
+        encoder_noise, link_noise, torque_noise: of the sensors.
+        gyros: those that sit on a moving link.
+        left_out: what the bag also holds and why it is not used.
+    """
+
+    name: str
+    urdf: Path
+    bag: str
+    roles: Roles
+    masses: bool
+    angle_unit: str
+    encoder_signs: SignGuess
+    command_unit: tuple[str, str]
+    drives: list[DriveValues]
+    encoder_noise: NoiseGuess
+    link_noise: NoiseGuess | None
+    torque_noise: NoiseGuess | None
+    gyros: list[GuessedGyro]
+    left_out: list[str] = field(default_factory=list)
+
+    @property
+    def free_links(self) -> bool:
+        """Whether only transmissions can be modelled: no masses, but encoders on both sides."""
+        return not self.masses and self.roles.link_encoder is not None
+
+
+def guess_robot(
+    urdf: Path, bag: Path, joints: Sequence[str] = (), name: str = "", progress: Progress | None = None
+) -> RobotGuess:
+    """Guesses a robot.
+
+    Args:
+        urdf: its bodies and joints.
+        bag: a recording in which all joints move.
+        joints: those to use; all that the bag shows if empty.
+        name: of the robot; that of the URDF's file if empty.
+        progress: called with the number of messages read and expected.
+
+    Raises:
+        RobotError: the URDF cannot be read, or has neither masses nor are there encoders on the links.
+        RecordingError: the bag cannot be read, or lacks positions or what drives the motors.
+    """
+    known = moving_joints(urdf)
+    signals = read_signals(bag, progress)
+    roles = assign_roles(signals, known, tuple(joints))
+    tree, masses = _tree(urdf, roles.joints)
+    if not masses and roles.link_encoder is None:
+        raise RobotError(
+            f"{urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected one of "
+            "them; add <inertial> to the links, or record a topic with the positions of the links"
+        )
+    unit = _angle_unit(tree, roles)
+    factor = np.pi / 180.0 if unit == "deg" else 1.0
+    encoder = _stream(roles.motor_encoder, roles.joints, factor)
+    streams = [s.stream(("x", "y", "z")) for s in roles.imus]
+    # the links turn the gyroscopes, and their encoders know where zero is
+    seen = encoder if roles.link_encoder is None else _stream(roles.link_encoder, roles.joints, factor)
+    signs = joint_signs(tree, joint_motion(seen, np.zeros(len(roles.joints))), streams)
+    turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
+    gyros, left_out = _gyros(tree, seen, roles.imus, streams)
+    drive = command_unit(roles.command)
+    command = _stream(roles.command, roles.joints)
+    torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
+    per_unit = SUPPLY if drive[0] == "duty" else 1.0
+    left_out += _unused(signals, roles, masses)
+    return RobotGuess(
+        name=name or urdf.stem,
+        urdf=urdf,
+        bag=str(bag),
+        roles=roles,
+        masses=masses,
+        angle_unit=unit,
+        encoder_signs=signs,
+        command_unit=drive,
+        drives=drive_values(tree, turned, command, per_unit, torque, masses),
+        encoder_noise=_noise(roles.motor_encoder, roles, unit),
+        link_noise=None if roles.link_encoder is None else _noise(roles.link_encoder, roles, unit),
+        torque_noise=None if roles.joint_torque is None else _noise(roles.joint_torque, roles, "N m"),
+        gyros=gyros,
+        left_out=left_out,
+    )
+
+
+def _tree(urdf: Path, joints: tuple[str, ...]) -> tuple[RigidTree, bool]:
+    """The bodies, and whether they have masses."""
+    gravity = np.array(GRAVITY)
+    try:
+        return RigidTree(urdf, joints, gravity), True
+    except RobotError:
+        return RigidTree(urdf, joints, gravity, inertias=False), False
+
+
+def _angle_unit(tree: RigidTree, roles: Roles) -> str:
+    """Degrees where the angles are far beyond the limits of the URDF."""
+    names = roles.motor_encoder.names or roles.joints
+    span = np.ptp(roles.motor_encoder.signal.stream(names).values, axis=0)
+    limits = tree.limits
+    return "deg" if np.any(span > 5.0 * (limits[:, 1] - limits[:, 0])) else "rad"
+
+
+def _noise(chosen: Chosen, roles: Roles, unit: str) -> NoiseGuess:
+    stream = _stream(chosen, roles.joints)
+    return guess_noise(stream.times, stream.values, unit)
+
+
+def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float = 1.0) -> Stream:
+    return chosen.signal.stream(chosen.names or joints, factor)
+
+
+def _gyros(
+    tree: RigidTree, encoder: Stream, imus: Sequence[Signal], streams: Sequence[Stream]
+) -> tuple[list[GuessedGyro], list[str]]:
+    """Gyroscopes with their links, and a sentence for each one that is on none."""
+    motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
+    found: list[GuessedGyro] = []
+    left_out = []
+    for signal, stream in zip(imus, streams, strict=True):
+        mount = find_mount(tree, motion, stream)
+        if mount is None:
+            left_out.append(f"{signal.topic}: stands still, or no link turns like it")
+            continue
+        name = _sensor_name(signal.topic, [gyro.name for gyro in found])
+        unit = "deg/s" if mount.degrees else "rad/s"
+        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.times, stream.values, unit)))
+    return found, left_out
+
+
+def _sensor_name(topic: str, taken: Sequence[str]) -> str:
+    """The first part of a topic, as "imu1" of "/imu1/data_raw"; numbered where that is taken."""
+    name = next((part for part in topic.split("/") if part), "imu").replace("-", "_")
+    number = 2
+    while name in taken:
+        name, number = f"{name.rstrip('0123456789')}{number}", number + 1
+    return name
+
+
+def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
+    used = {roles.motor_encoder.signal.topic, roles.command.signal.topic, *(s.topic for s in roles.imus)}
+    if roles.link_encoder is not None:
+        used.add(roles.link_encoder.signal.topic)
+    said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]
+    if roles.joint_torque is not None and masses:
+        said.append(f"{roles.joint_torque.signal.topic}, effort: measured joint torques need link_dynamics: free")
+    return said

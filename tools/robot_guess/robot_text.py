@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A guessed robot as the text of a robot file; everything that was guessed says so and why."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess
+from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, GuessedGyro, RobotGuess
+from jointscope.tools.robot_guess.roles import Chosen
+from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
+from jointscope.tools.robot_guess.signals import Signal
+
+GUESS = "GUESS"
+COLUMN = 48  # where comments begin
+LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
+
+
+def robot_text(guess: RobotGuess, urdf: str) -> str:
+    """The robot file.
+
+    Args:
+        guess: what was found.
+        urdf: how the file names the URDF.
+    """
+    joints = guess.roles.joints
+    free = guess.free_links
+    lines = [
+        f"# {guess.name}: written by `jointscope init` from {guess.urdf.name} and {guess.bag}.",
+        f"# Lines marked {GUESS} were concluded from that recording; check them, then delete the mark.",
+        "format: 1",
+        f"name: {_plain(guess.name)}",
+        f"urdf: {_plain(urdf)}",
+        _line(f"gravity: {_list(GRAVITY)}", "[m/s^2] in the base frame; z of the base points up", sure=False),
+        _line(f"joints: {_list(joints)}", "moving joints of the URDF that the recording shows"),
+        "",
+        "model:",
+        *_model(free, joints),
+        "",
+        *_constants(guess),
+        *_command(guess),
+        "",
+        "sensors:",
+        *_motor_encoder(guess),
+        *_link_encoder(guess),
+        *(_torque(guess) if free else ()),
+        *(line for gyro in guess.gyros for line in _gyro(gyro)),
+        *(f"  # not used: {text}" for text in guess.left_out),
+        "",
+        *_parameters(guess),
+        *([] if free else _noise(len(joints))),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def guesses(text: str) -> list[str]:
+    """The guessed lines of a robot file: "key: value (why)"."""
+    found = []
+    for line in text.splitlines():
+        value, mark, why = line.partition(f"# {GUESS}: ")
+        if mark:
+            found.append(f"{value.strip()}  ({why})")
+    return found
+
+
+def _line(text: str, comment: str, sure: bool = True, indent: int = 0) -> str:
+    place = " " * indent + text
+    return f"{place.ljust(COLUMN)} # {comment if sure else f'{GUESS}: {comment}'}"
+
+
+def _model(free: bool, joints: tuple[str, ...]) -> list[str]:
+    rigid = _line(f"rigid_joints: {_list(joints)}", "`jointscope discover` finds which joints are elastic", indent=2)
+    if free:
+        return [_line("link_dynamics: free", "the URDF has no inertias", indent=2), rigid]
+    return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", rigid]
+
+
+def _constants(guess: RobotGuess) -> list[str]:
+    if guess.command_unit[0] != "duty":
+        return []
+    text = f"motor.supply_voltage: {SUPPLY}"
+    return ["constants:", _line(text, "[V] not in the recording; see the data sheet", sure=False, indent=2), ""]
+
+
+def _source(signal: Signal, unit: str, indent: int = 4) -> list[str]:
+    space = " " * indent
+    return [
+        _line(f"topic: {signal.topic}", _timing(signal), indent=indent),
+        f"{space}type: {signal.msgtype}",
+        f"{space}field: {signal.field}",
+        f"{space}unit: {unit}",
+    ]
+
+
+def _timing(signal: Signal) -> str:
+    seen = signal.timing
+    text = f"{seen.rate:.4g} Hz, jitter {1e3 * seen.jitter:.2f} ms"
+    text += f", {seen.gaps} gap{'s' * (seen.gaps != 1)} of up to {seen.longest_gap:.3g} s" if seen.gaps else ""
+    return text if signal.stamped else f"{text}; no stamps, times are those of reception"
+
+
+def _names(chosen: Chosen, joints: tuple[str, ...], indent: int) -> list[str]:
+    if not chosen.names or chosen.names == joints:
+        return []
+    return [_line(f"names: {_list(chosen.names)}", "in the messages, in the order of `joints`", False, indent)]
+
+
+def _signs(signs: Iterable[float], reason: str, indent: int) -> list[str]:
+    values = [float(sign) for sign in signs]
+    return [_line(f"scale: {_list(values)}", reason, False, indent)] if min(values) < 0 else []
+
+
+def _turned_joints(found: SignGuess) -> str:
+    others = " or ".join(_list(signs) for signs in found.others)
+    return f"so do the gyroscopes agree; as well with {others}" if others else "only so do the gyroscopes agree"
+
+
+def _command(guess: RobotGuess) -> list[str]:
+    command, joints = guess.roles.command, guess.roles.joints
+    unit, why = guess.command_unit
+    signs = [drive.sign for drive in guess.drives]
+    lines = [
+        _line("command:", command.reason, command.sure),
+        *_source(command.signal, unit, 2)[:3],
+        _line(f"unit: {unit}", f"{why}; duty | V | N m", sure=False, indent=2),
+        *_names(command, joints, 2),
+        *_signs(signs, "moves against its command", 2),
+    ]
+    weak = [joint for joint, drive in zip(joints, guess.drives, strict=True) if drive.confidence < 10.0]
+    if weak:
+        lines.append(f"  # {GUESS}: the sign of {', '.join(weak)} cannot be seen in this recording; taken as positive")
+    return lines
+
+
+def _sigma(noise: NoiseGuess, unit: str) -> str:
+    sigma = noise.sigma if noise.sigma > 0 else 1e-4
+    reason = noise.reason if noise.sigma > 0 else "nothing to see in the recording; see the data sheet"
+    return _line(f"sigma: {_number(sigma)}", f"[{unit}] {reason}", False, 4)
+
+
+def _motor_encoder(guess: RobotGuess) -> list[str]:
+    chosen = guess.roles.motor_encoder
+    factor = np.pi / 180.0 if guess.angle_unit == "deg" else 1.0
+    noise = NoiseGuess(factor * guess.encoder_noise.sigma, guess.encoder_noise.reason)
+    lines = [
+        "  motor_encoder:",
+        _line("kind: motor_encoder", chosen.reason, chosen.sure, 4),
+        *_source(chosen.signal, guess.angle_unit),
+        *_names(chosen, guess.roles.joints, 4),
+        *_signs(guess.encoder_signs.signs, _turned_joints(guess.encoder_signs), 4),
+    ]
+    if guess.free_links:
+        zero = "counts from where the motor stood when it was switched on"
+        lines.append(_line("zero: unknown", zero, False, 4))
+    return [*lines, _sigma(noise, "rad")]
+
+
+def _link_encoder(guess: RobotGuess) -> list[str]:
+    chosen = guess.roles.link_encoder
+    if chosen is None or guess.link_noise is None:
+        return []
+    factor = np.pi / 180.0 if guess.angle_unit == "deg" else 1.0
+    noise = NoiseGuess(factor * guess.link_noise.sigma, guess.link_noise.reason)
+    return [
+        "  link_encoder:",
+        _line("kind: link_encoder", chosen.reason, chosen.sure, 4),
+        *_source(chosen.signal, guess.angle_unit),
+        *_names(chosen, guess.roles.joints, 4),
+        *_signs(guess.encoder_signs.signs, "as the motor encoder", 4),
+        _sigma(noise, "rad"),
+    ]
+
+
+def _torque(guess: RobotGuess) -> list[str]:
+    chosen = guess.roles.joint_torque
+    if chosen is None or guess.torque_noise is None:
+        return []
+    return [
+        "  joint_torque:",
+        _line("kind: joint_torque", chosen.reason, chosen.sure, 4),
+        *_source(chosen.signal, "N m"),
+        *_names(chosen, guess.roles.joints, 4),
+        _sigma(guess.torque_noise, "N m"),
+    ]
+
+
+def _gyro(gyro: GuessedGyro) -> list[str]:
+    mount = gyro.mount
+    factor = np.pi / 180.0 if mount.degrees else 1.0
+    noise = NoiseGuess(factor * gyro.noise.sigma, gyro.noise.reason)
+    R = [[round(float(x), 4) + 0.0 for x in row] for row in mount.R_imu_body]
+    return [
+        f"  {gyro.name}:",
+        "    kind: gyro",
+        *_source(gyro.signal, "deg/s" if mount.degrees else "rad/s"),
+        _line(f"body: {_plain(mount.body)}", _seat(mount), False, 4),
+        "    form: full",
+        _sigma(noise, "rad/s"),
+        "    bias: {value: [0.0, 0.0, 0.0], prior_sigma: 0.1}",
+        _line("R_imu_body:", _turned(mount), False, 4),
+        f"      value: [{', '.join(_list(row) for row in R)}]",
+        "      prior_sigma: 0.1",
+    ]
+
+
+def _seat(mount: Mount) -> str:
+    text = f"the encoders explain {100 * (1 - mount.left):.1f} % of its motion if it sits there"
+    return f"{text}, and about as much on {', '.join(mount.others)}" if mount.others else text
+
+
+def _turned(mount: Mount) -> str:
+    text = "right angles" if mount.square else "not in right angles"
+    return f"{text}; the link turns about one axis only, the rotation about it is open" if mount.open_axis else text
+
+
+def _parameters(guess: RobotGuess) -> list[str]:
+    if guess.free_links:
+        return ["parameters: {}"]
+    lines = [_line("parameters:", "start values by regression; a calibration finds them", False)]
+    for joint, drive in zip(guess.roles.joints, guess.drives, strict=True):
+        rows = [("coulomb_torque", drive.coulomb, "N m"), ("inertia", drive.inertia, "kg m2")]
+        if guess.command_unit[0] != "N m":
+            rows += [("k_pwm", drive.k, "N m/V"), ("k_mi", drive.k_mi, "N m s/rad")]
+        for name, value, unit in rows:
+            number = _number(value)
+            spread = _number(2.0 * value)
+            lines.append(f"  {joint}.{name}: {{value: {number}, unit: {unit}, prior_sigma: {spread}}}")
+    return lines
+
+
+def _noise(n: int) -> list[str]:
+    link, motor = LOOSE
+    return [
+        "",
+        "noise:",
+        _line("estimate: true", "random torques, as densities of the velocities [rad/s/sqrt(s)]", indent=2),
+        f"  link_velocity: {_list([link] * n)}",
+        f"  motor_velocity: {_list([motor] * n)}",
+    ]
+
+
+def _number(value: float) -> str:
+    """Three digits, with a point, so that YAML reads a float."""
+    text = f"{value:.3g}"
+    mantissa, e, exponent = text.partition("e")
+    mantissa = mantissa if "." in mantissa else f"{mantissa}.0"
+    return f"{mantissa}{e}{exponent}"
+
+
+def _plain(text: str) -> str:
+    """A text as YAML reads it back."""
+    simple = re.fullmatch(r"[A-Za-z_/.][\w./:-]*", text) and text.lower() not in ("yes", "no", "true", "false", "null")
+    return text if simple else "'" + text.replace("'", "''") + "'"
+
+
+def _list(values: Iterable[object]) -> str:
+    return "[" + ", ".join(_plain(value) if isinstance(value, str) else str(value) for value in values) + "]"

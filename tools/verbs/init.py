@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope init`: writes a first robot file from a URDF and a bag, and marks what it guessed."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from jointscope.tools.progress import progress_bar, reading
+from jointscope.tools.whole_file import check_outputs, whole_file, write_json
+
+EXAMPLE = """example:
+  jointscope init arm.urdf moves.mcap -o arm.yaml
+  jointscope info moves.mcap --robot arm.yaml
+  jointscope discover arm.yaml moves.mcap --holdout-share 0.33 -o better.yaml
+
+The recording should move every joint, several at once. Guessed are joints, topics, units, signs, on which link a
+gyroscope sits and how it is turned, noise of the sensors and start values; every guess stands in the file with its
+reason."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "init",
+        help="writes a first robot file from a URDF and a bag, and marks what it guessed",
+        description="Writes a robot file for a robot of your own.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("urdf", metavar="URDF", type=Path, help="bodies and joints of the robot")
+    parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument("-o", "--output", metavar="ROBOT", type=Path, required=True, help="robot file to write")
+    parser.add_argument("--name", default="", help="name of the robot; that of the URDF's file by default")
+    parser.add_argument("--joints", default="", metavar="A,B,...", help="joints to use, if not all that the bag shows")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Guesses, writes, reads the file again and says whether the bag fits it."""
+    check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
+    from jointscope.robots.robot_file import load_robot, urdf_reference
+    from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.robot_guess.robot_guess import guess_robot
+    from jointscope.tools.robot_guess.robot_text import guesses, robot_text
+
+    joints = [joint.strip() for joint in args.joints.split(",") if joint.strip()]
+    with progress_bar() as progress:
+        guess = guess_robot(args.urdf, args.bag, joints, args.name, reading(args.bag, progress))
+        text = robot_text(guess, urdf_reference(args.urdf, args.output.parent))
+        with whole_file(args.output) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
+            robot = load_robot(unfinished)
+        description = describe_bag(args.bag, robot)
+    if args.json is not None:
+        content = {"robot": str(args.output), "joints": list(guess.roles.joints), "guesses": guesses(text)}
+        write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
+    print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
+    print("\n".join(f"  {line}" for line in guesses(text)))
+    for line in (*(f"  not used: {text}" for text in guess.left_out), *(f"note: {n}" for n in description.notices)):
+        print(line)
+    verdict = "can" if description.usable else "cannot"
+    reason = "" if description.usable else f": {description.problem}"
+    print(f"\nWrote {args.output}; the recording {verdict} be used with it{reason}")
+    print(f"Check the lines marked GUESS, then: jointscope discover {args.output} {args.bag} --holdout-share 0.33")
+    return 0
