@@ -26,6 +26,7 @@ from jointscope.graphs.comparison_result import (
     SensorPrediction,
     WorstWindow,
 )
+from jointscope.graphs.free_run import FreeRun, free_run
 from jointscope.graphs.initial_guess import initial_biases
 from jointscope.graphs.joint_states import JointStates
 from jointscope.graphs.noise_floor import channel_floors
@@ -93,7 +94,18 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         floors=floors,
         motion=JointStates.of(robot, problem.timeline.ticks, states),
         predicted_motion=_predicted_motion(robot, recording, ahead[HORIZONS[0]]),
+        free_run=_free_run(robot, recording),
     )
+
+
+def _free_run(robot: Robot, recording: Recording) -> FreeRun | None:
+    """The whole loop simulated, where robot and recording allow it."""
+    if robot.controller is None or recording.goal is None:
+        return None
+    try:
+        return free_run(robot, recording)
+    except RobotError:
+        return None
 
 
 def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calibration]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.free_run import FreeRun
 from jointscope.graphs.joint_states import JointStates
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -92,6 +93,7 @@ class ModelComparison:
         floors: `floor` by channel [sensor sigma]; empty where it was not kept.
         motion: smoothed motion of the joints at all ticks; None where it was not kept.
         predicted_motion: motion 0.01 s ahead of the causal states; None where it was not kept.
+        free_run: the whole recording simulated with the position controller; None for other robots.
     """
 
     label: str
@@ -104,6 +106,7 @@ class ModelComparison:
     floors: Mapping[str, float] = field(default_factory=dict)
     motion: JointStates | None = None
     predicted_motion: JointStates | None = None
+    free_run: FreeRun | None = None
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,9 @@ class ComparisonResult:
 
 
 def _model_json(model: ModelComparison) -> dict[str, Any]:
-    return {
+    run = model.free_run
+    free = {} if run is None else {"free_run": {"mean_abs": run.mean_abs, "rms": run.rms}}
+    return free | {
         "error": model.error,
         "floor": model.floor,
         "channels": {

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem
+from jointscope.robots.carried_weight import CarriedWeight
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.robot import Robot
 
@@ -34,7 +35,7 @@ class TrialSignals:
         u: logged commands of the m steps, shape (m, n).
         response: accelerations per unit of each command, shape (m, r, n).
         stiffness, damping: of every joint, shape (n,); zero for rigid ones.
-        tau_spring: shape (m + 1, n) [N m].
+        tau_spring: shape (m + 1, n) [N m]; of rigid joints the weight that they carry.
         inertia: of each motor, shape (n,) [kg m2].
         shared: what trials that differ in their shapes alone have in common, by label; they fill it.
     """
@@ -80,7 +81,7 @@ class TrialSignals:
             response=model.command_response(here, parameters)[:-1],
             stiffness=springs.stiffness,
             damping=springs.damping,
-            tau_spring=springs.torque,
+            tau_spring=springs.torque + CarriedWeight(problem.robot).torque(x),
             inertia=model.motor_inertia(values),
         )
 

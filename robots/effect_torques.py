@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.carried_weight import CarriedWeight
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
@@ -35,6 +36,7 @@ class EffectTorques:
         layout: of the state.
         names: names of the free parameters.
         sharpness: of the base model's friction [s/rad].
+        weight: what rigid joints carry, for laws that ask for their load.
     """
 
     def __init__(
@@ -44,10 +46,11 @@ class EffectTorques:
         layout: StateLayout,
         names: tuple[str, ...],
         sharpness: float,
+        weight: CarriedWeight,
     ):
         self._layout, self._names, self._joints, self._sharpness = layout, names, joints, sharpness
         self._local = [
-            _LocalLaw(here, joints, layout, names) for here in effects if isinstance(here.effect, JointTorque)
+            _LocalLaw(here, joints, layout, names, weight) for here in effects if isinstance(here.effect, JointTorque)
         ]
         self._global = [here for here in effects if isinstance(here.effect, RobotTorque)]
 
@@ -129,10 +132,19 @@ class EffectTorques:
 class _LocalLaw:
     """One effect of one joint."""
 
-    def __init__(self, here: EffectAt, joints: tuple[str, ...], layout: StateLayout, names: tuple[str, ...]):
+    def __init__(
+        self,
+        here: EffectAt,
+        joints: tuple[str, ...],
+        layout: StateLayout,
+        names: tuple[str, ...],
+        weight: CarriedWeight,
+    ):
         assert isinstance(here.effect, JointTorque)
         self.here, self.effect = here, here.effect
         j = self.joint = joints.index(here.owner)
+        self._weight = weight if weight.some and here.owner not in layout.motors else None
+        self._q_link = layout.q_link
         self._columns = {
             **{"q_link": int(layout.joint_q[j]), "v_link": int(layout.joint_v[j])},
             **{"q_motor": int(layout.motor_q[j]), "v_motor": int(layout.motor_v[j])},
@@ -154,12 +166,13 @@ class _LocalLaw:
         """Adds the torque, and the rate of the memory."""
         j = self.joint
         motion: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
-        motion |= {"tau_spring": springs.torque[:, j], "stiffness": springs.stiffness[j]}
+        load = springs.torque[:, j] if self._weight is None else self._weight.torque(x)[:, j]
+        motion |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
         signals = JointSignals(**motion, sharpness=sharpness)
         p = self.here.own(values)
-        self._add_law(terms, self.effect.law, self._rows, signals, p, springs)
+        self._add_law(terms, self.effect.law, self._rows, signals, p, springs, x)
         if self.effect.memory is not None:
-            self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs)
+            self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs, x)
 
     def _add_law(
         self,
@@ -169,6 +182,7 @@ class _LocalLaw:
         signals: JointSignals,
         p: dict[str, float],
         springs: Springs,
+        x: Array,
     ) -> None:
         value = np.real(law(signals, p))
         for row, sign in rows:
@@ -181,6 +195,11 @@ class _LocalLaw:
                 continue
             slope = np.imag(law(replace(signals, **{name: getattr(signals, name) + 1j * STEP}), p)) / STEP
             if not np.any(slope):
+                continue
+            if name == "tau_spring" and self._weight is not None:
+                by_q = slope[:, None] * self._weight.slopes(x)[:, j]
+                for row, sign in rows:
+                    terms.by_state[:, row, self._q_link] += sign * by_q
                 continue
             for row, sign in rows:
                 self._chain(terms, row, name, sign * slope, springs, j)

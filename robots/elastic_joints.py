@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.accelerations import Accelerations, RigidDerivatives
 from jointscope.robots.bearing_springs import BearingSprings
+from jointscope.robots.carried_weight import CarriedWeight
 from jointscope.robots.effect_torques import EffectTorques
 from jointscope.robots.joint_parameters import JointParameters
 from jointscope.robots.joint_springs import JointSprings, Springs
@@ -52,7 +53,8 @@ class ElasticJoints:
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
         self._bearings = BearingSprings(robot.effects, layout, self.names)
         sharpness = robot.choices.friction_sharpness
-        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, sharpness)
+        weight = CarriedWeight(robot)
+        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, sharpness, weight)
         self._elastic = list(layout.elastic_joints)
         self._own_motor = layout.motor_row[self._elastic].tolist()
 

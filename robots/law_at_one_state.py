@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.carried_weight import CarriedWeight
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
@@ -60,6 +61,9 @@ class JointLawAtOneState:
             self._laws.append((here.effect.memory.rate, ((layout.n_link + layout.n_motor + index, 1.0),)))
         self._columns = np.array(columns, dtype=np.intp)
         self._stiffness, self._damping = float(springs.stiffness[j]), float(springs.damping[j])
+        weight = CarriedWeight(robot)
+        self._weight = weight if weight.some and here.owner not in layout.motors else None
+        self._joint, self._q_link = j, layout.q_link
         # torque of the spring by (q_link, v_link, q_motor, v_motor); a set of signals for each and for the torque
         self._spring = np.array([self._stiffness, self._damping, -self._stiffness, -self._damping])
         count = len(columns) + 1
@@ -68,7 +72,8 @@ class JointLawAtOneState:
     def add(self, x: Array, tau: Array, by_state: Array | None) -> None:
         """Adds the torque, and the rate of the memory; see `LawAtOneState`."""
         own = x[self._columns]
-        signals = np.append(own, self._spring @ own[:4])[:, None]
+        load = self._spring @ own[:4] if self._weight is None else self._weight.torque(x[None])[0, self._joint]
+        signals = np.append(own, load)[:, None]
         if by_state is not None:
             signals = signals + self._moves
         q_link, v_link, q_motor, v_motor = signals[:4]
@@ -94,6 +99,8 @@ class JointLawAtOneState:
             for row, sign in rows:
                 # a rigid joint has link and motor in the same columns
                 np.add.at(by_state[row], self._columns, sign * by_columns)
+                if self._weight is not None and slopes[-1] != 0.0:
+                    by_state[row, self._q_link] += sign * slopes[-1] * self._weight.slopes(x[None])[0, self._joint]
 
 
 class CoupledLawAtOneState:

@@ -72,6 +72,7 @@ class Recording:
         start_ns: stamp of time zero [ns].
         streams: by name; always contains "command".
         notices: what was dropped and why, and what looked odd.
+        goal: goal positions of a position-controlled robot [rad], NaN where a drive was off; None without.
     """
 
     path: str
@@ -79,6 +80,7 @@ class Recording:
     start_ns: int
     streams: dict[str, Stream]
     notices: list[Notice] = field(default_factory=list)
+    goal: Stream | None = None
 
     @property
     def command(self) -> Stream:
@@ -112,4 +114,5 @@ class Recording:
                 held.unit,
                 received,
             )
-        return Recording(self.path, self.sha256, self.start_ns, streams, self.notices)
+        goal = None if self.goal is None else self.goal.between(t0, t1)
+        return Recording(self.path, self.sha256, self.start_ns, streams, self.notices, goal)

@@ -133,6 +133,13 @@ class RigidTree:
         pin.rneaInParallel(1, self._pool, *columns, tau)
         return np.ascontiguousarray(tau.T)
 
+    def gravity_derivatives(self, q: Array) -> Array:
+        """Derivative of the torques of gravity g(q) by q, shape (m, n, n) [N m/rad], for q of shape (m, n) [rad]."""
+        by_q = np.empty((len(q), self.n, self.n))
+        for k in range(len(q)):
+            by_q[k] = pin.computeGeneralizedGravityDerivatives(self.model, self.data, q[k])
+        return by_q
+
     def mass_matrix(self, q: Array) -> Array:
         """M(q), shape (m, n, n) [kg m^2], for positions q of shape (m, n) [rad]."""
         M = np.empty((len(q), self.n, self.n))

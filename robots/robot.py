@@ -21,6 +21,7 @@ from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.parameter import Parameter
+from jointscope.robots.position_controller import PositionController
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.state_layout import StateLayout
@@ -91,6 +92,7 @@ class Robot:
         parameters: by full name, in the order of the file.
         noise: process noise, in the order of `layout`.
         effects: physical effects that were added to the base model.
+        controller: that of drives which are commanded by a position; None for others, or where it is not known.
         path: the file it was read from.
         document: the file's content with comments, for writing it again.
     """
@@ -108,6 +110,7 @@ class Robot:
     path: Path
     document: Any
     effects: tuple[EffectAt, ...] = ()
+    controller: PositionController | None = None
 
     @property
     def n(self) -> int:

@@ -21,6 +21,7 @@ from jointscope.robots.effect_catalogue import parse_effect
 from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.noise_section import process_noise
 from jointscope.robots.parameter import Parameter
+from jointscope.robots.position_controller import PositionController, position_controller
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
 from jointscope.robots.robot_consistency import check_robot
@@ -71,6 +72,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
     command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS, scaled=True))
     sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
+    controller = top.section("controller").build(lambda s: _controller(s, joints)) if "controller" in top else None
     noise_section = top.section("noise", *([{}] if choices.link_dynamics == "free" else []))
     robot = Robot(
         name=top.text("name"),
@@ -85,6 +87,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         noise=ProcessNoise(False, "integrated", np.zeros(0), np.zeros(0)),
         path=path,
         document=document,
+        controller=controller,
     )
     robot = with_effects(robot, top.texts("effects", ()))
     robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
@@ -197,6 +200,10 @@ def _rigid_joints(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
     if unknown:
         raise RobotError(f"{section.place}.rigid_joints: no joint {unknown[0]!r}{did_you_mean(unknown[0], joints)}")
     return rigid
+
+
+def _controller(section: Section, joints: tuple[str, ...]) -> PositionController:
+    return position_controller(section, topic(section, joints), joints)
 
 
 def _constants(section: Section) -> dict[str, float]:

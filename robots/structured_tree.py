@@ -180,7 +180,8 @@ def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:
 def joint_axis(model: pin.Model, joint: int) -> Array:
     """Axis of a revolute joint in its own frame, shape (3,); zero for a prismatic one."""
     jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-    return np.array(jacobian[3:, model.joints[joint].idx_v])
+    # a single column comes back as a vector
+    return np.array(jacobian.reshape(6, model.nv)[3:, model.joints[joint].idx_v])
 
 
 def bearing_names(joint: str) -> tuple[str, str]:

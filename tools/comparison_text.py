@@ -17,6 +17,7 @@ def comparison_text(result: ComparisonResult) -> str:
         f"{recording.path}: {recording.duration:.1f} s, measured against predicted",
         _models(result),
         _channels(result),
+        _free_runs(result),
         *(_worst(model) for model in result.models),
     ]
     return "\n\n".join(part for part in parts if part)
@@ -53,6 +54,17 @@ def _channels(result: ComparisonResult) -> str:
             rows.append([*start, model.label, *rms, f"{c.fit_percent:.1f} %"])
     head = ["channel", "sigma", "unit", "model", *titles, "fit 0.1 s"]
     return f"Rms error per channel and horizon:\n{text_table(head, rows, '<><<' + '>' * len(titles) + '>')}"
+
+
+def _free_runs(result: ComparisonResult) -> str:
+    """Position-controlled robots: the model with its controller, alone from beginning to end."""
+    lines = []
+    for model in result.models:
+        if model.free_run is not None:
+            factor, unit = prefixed(max(model.free_run.mean_abs.values()), "rad")
+            said = [f"{name} {significant(factor * e)} {unit}" for name, e in model.free_run.mean_abs.items()]
+            lines.append(f"  {model.label}: {', '.join(said)}")
+    return "\n".join(["Simulated with its position controller, mean absolute error:", *lines]) if lines else ""
 
 
 def _worst(model: ModelComparison) -> str:

@@ -26,7 +26,8 @@ class JointSignals:
     Attributes:
         q_link, q_motor: positions [rad].
         v_link, v_motor: velocities [rad/s].
-        tau_spring: K (q_link - q_motor) + D (v_link - v_motor) of the base model [N m].
+        tau_spring: K (q_link - q_motor) + D (v_link - v_motor) of the base model; of a rigid joint the weight that it
+            carries [N m].
         stiffness: K [N m/rad].
         sharpness: k of the base model's friction law [s/rad], a real number.
         memory: the effect's own state, if its kind has one.

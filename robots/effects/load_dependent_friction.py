@@ -27,7 +27,8 @@ EFFECT = JointTorque(
     example={"coefficient": 0.1},
     card=Card(
         title="friction that grows with the load",
-        law="b a_motor = ... - mu_L |tau_c| tanh(k v_motor), with mu_L = coefficient, tau_c the torque of the spring",
+        law="b a_motor = ... - mu_L |tau_c| tanh(k v_motor), with mu_L = coefficient, tau_c the torque of the spring; "
+        "of a rigid joint the weight that it carries",
         explanation="The torque that a gear or a belt passes on presses its surfaces together, so that friction rises "
         "with it. What arrives is then a fixed share less than what is sent.",
         source="Ho, Kisner (BioRob), eq. (12), (14): stiction as a function of the stress in the joint; Bittencourt, "

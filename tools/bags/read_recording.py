@@ -66,7 +66,10 @@ def read_recording(
     needed = needed_streams(robot)
     with open_bag(path) as bag:
         types = {need.name: check_topic(bag, need.source) for need in needed}
-        raw = bag.read(sorted({need.source.topic for need in needed}), progress)
+        wanted = {need.source.topic for need in needed}
+        if robot.controller is not None and robot.controller.source.topic in bag.topics:
+            wanted.add(robot.controller.source.topic)
+        raw = bag.read(sorted(wanted), progress)
         samples: dict[str, TimedSamples] = {}
         notices: list[Notice] = []
         for need in needed:
@@ -74,12 +77,30 @@ def read_recording(
             samples[need.name], found = _samples(need, topic, types[need.name], decode_all)
             notices += found
             notices += _surplus(need.name, topic, bag.count(topic.name))
+        goal, found = _goal(bag, robot, raw, decode_all)
+        notices += found
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
     for stream in streams.values():
         notices += timing_notices(stream.name, stream.times)
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
-    return Recording(str(path), bag_sha256(path), start_ns, streams, notices)
+    moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
+    return Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal)
+
+
+def _goal(
+    bag: Bag, robot: Robot, raw: dict[str, RawTopic], decode_all: bool
+) -> tuple[tuple[StreamSource, TimedSamples] | None, list[Notice]]:
+    """Goal positions, if the robot has a controller and the bag holds them; a model can do without."""
+    if robot.controller is None:
+        return None, []
+    need = StreamSource("goal", robot.controller.source, tuple(f"{joint}.goal" for joint in robot.joints))
+    try:
+        message_type = check_topic(bag, need.source)
+        samples, notices = _samples(need, raw[need.source.topic], message_type, decode_all)
+    except RecordingError as err:
+        return None, [Notice("goal", "info", 0, f"goal: {err}; the controller cannot be simulated")]
+    return (need, samples), notices
 
 
 def check_topic(bag: Bag, source: Topic) -> MessageType:

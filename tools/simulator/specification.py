@@ -85,7 +85,8 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
 
 def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
     """Axis of a joint in its own frame, and whether it turns: what pinocchio made of the URDF's <axis>."""
-    column = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), j)[:, model.joints[j].idx_v]
+    jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), j)
+    column = jacobian.reshape(6, model.nv)[:, model.joints[j].idx_v]  # a single column comes back as a vector
     turns = bool(np.any(column[3:]))
     return (column[3:] if turns else column[:3]), turns
 

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A position-controlled robot simulated with its controller: goals in, positions out, no measurement on the way.
+
+The model alone answers to the goals, from the first measured position at rest to the end of the recording; its errors
+add up, but the controller holds them down as it does in the robot. Runge-Kutta of order 4; the controller acts at every
+step. A drive that is switched off (goal NaN) is an open bridge: no torque, and no back-EMF either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+STEP = 1e-3  # [s]
+STABLE = 1.0  # largest step times rate of the friction; Runge-Kutta 4 is stable up to 2.8
+BACK_EMF = ".k_mi"
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """A simulated recording.
+
+    Attributes:
+        channels: names of the motor encoder's channels.
+        times: stamps of the motor encoder, shape (m,) [s].
+        simulated, measured: shape (m, n) [rad].
+    """
+
+    channels: tuple[str, ...]
+    times: Array
+    simulated: Array
+    measured: Array
+
+    @property
+    def mean_abs(self) -> dict[str, float]:
+        """Mean absolute error of every channel [rad]."""
+        return self._by_channel(np.mean(np.abs(self.simulated - self.measured), axis=0))
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square error of every channel [rad]."""
+        return self._by_channel(np.sqrt(np.mean((self.simulated - self.measured) ** 2, axis=0)))
+
+    def _by_channel(self, values: Array) -> dict[str, float]:
+        return dict(zip(self.channels, values.tolist(), strict=True))
+
+
+def free_run(robot: Robot, recording: Recording) -> FreeRun:
+    """Simulates a recording.
+
+    Raises:
+        RobotError: no controller, or effects on the command, which act before the controller's output is known.
+        RecordingError: the recording holds no goals.
+    """
+    controller, goal = robot.controller, recording.goal
+    if controller is None:
+        raise RobotError(f"{robot.name} has no section `controller`; without it the loop cannot be simulated")
+    if goal is None:
+        raise RecordingError(f"{recording.path} holds no goal positions on {controller.source.topic}")
+    late = [here.label for here in robot.effects if isinstance(here.effect, CommandEffect)]
+    if late:
+        raise RobotError(f"the loop cannot be simulated with effects on the command yet: {', '.join(late)}")
+    encoder, zero = recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero
+    on, off = _Rates(robot), _Rates(_without_back_emf(robot))
+    layout = robot.layout
+    at_rest = np.zeros((1, len(robot.joints)))
+    joints = np.hstack([encoder.values[:1] - zero, at_rest, encoder.values[:1] - zero, at_rest])
+    x = layout.from_joints(joints)
+    times = np.arange(encoder.times[0], encoder.times[-1] + STEP, STEP)
+    wanted = _held(goal, times)
+    positions = np.empty((len(times), len(robot.joints)))
+    for k in range(len(times)):
+        positions[k] = x[0, layout.motor_q] + zero
+        command = controller.command(wanted[k], positions[k])[None]
+        # one bridge for all joints that are off: their back-EMF goes together
+        x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
+    simulated = np.column_stack([np.interp(encoder.times, times, column) for column in positions.T])
+    return FreeRun(encoder.channels, encoder.times, simulated, encoder.values)
+
+
+class _Rates:
+    """Steps of one model."""
+
+    def __init__(self, robot: Robot):
+        self._model = ElasticJoints(robot)
+        self._values = np.array([robot.parameters[name].value for name in self._model.names])
+        friction = [robot.parameter(f"{j}.coulomb_torque").value for j in robot.joints]
+        inertia = [robot.drive_parameter(j, "inertia").value for j in robot.joints]
+        rate = robot.choices.friction_sharpness * float(np.max(np.array(friction) / np.array(inertia)))
+        self._substeps = max(int(np.ceil(STEP * rate / STABLE)), 1)
+
+    def step(self, x: Array, u: Array) -> Array:
+        """The state one step later, shape (1, d)."""
+        h = STEP / self._substeps
+        for _ in range(self._substeps):
+            k1 = self._rate(x, u)
+            k2 = self._rate(x + 0.5 * h * k1, u)
+            k3 = self._rate(x + 0.5 * h * k2, u)
+            k4 = self._rate(x + h * k3, u)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        return x
+
+    def _rate(self, x: Array, u: Array) -> Array:
+        layout, rate = self._model.layout, np.empty_like(x)
+        rate[:, layout.positions] = x[:, layout.velocities]
+        rate[:, layout.rates] = self._model.accelerations(x, u, self._values)
+        return rate
+
+
+def _without_back_emf(robot: Robot) -> Robot:
+    return robot.with_values({name: 0.0 for name in robot.parameters if name.endswith(BACK_EMF)})
+
+
+def _held(goal: Stream, times: Array) -> Array:
+    """The last goal at every time, shape (k, n); the first one before it came."""
+    index = np.clip(np.searchsorted(goal.times, times, side="right") - 1, 0, len(goal.times) - 1)
+    return goal.values[index]

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The controller of a drive that is commanded by a position: u = clip(gain (goal - reading), +-limit)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.sensors import Topic
+from jointscope.robots.units import si_unit
+from jointscope.robots.yaml_section import Section
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PositionController:
+    """A proportional controller inside each drive.
+
+    Attributes:
+        source: where the goals are in a bag [rad]; a goal that is NaN switches the drive off.
+        gain: command per angle of each joint, shape (n,) [unit of the command / rad].
+        limit: largest command [unit of the command].
+    """
+
+    source: Topic
+    gain: tuple[float, ...]
+    limit: float
+
+    def command(self, goal: Array, reading: Array) -> Array:
+        """Command of every joint, zero where its drive is off; goal and reading of shape (n,) [rad]."""
+        wanted = np.clip(np.array(self.gain) * (goal - reading), -self.limit, self.limit)
+        return np.where(np.isfinite(goal), wanted, 0.0)
+
+
+def position_controller(section: Section, source: Topic, joints: tuple[str, ...]) -> PositionController:
+    """From a section of a robot file, with its topic.
+
+    Raises:
+        RobotError: not an angle, another number of gains than of joints, or gains and a limit that are not positive.
+    """
+    if si_unit(source.unit) != "rad":
+        raise RobotError(f"{section.place}.unit: a goal position is an angle, got {source.unit!r}")
+    gain = section.array("gain", (len(joints),))
+    if np.any(gain <= 0.0):
+        raise RobotError(f"{section.place}.gain: expected numbers above zero")
+    return PositionController(source, tuple(gain.tolist()), section.number("limit", 1.0, positive=True))
