@@ -66,7 +66,7 @@ def spring_and_drive(problem: BagProblem, x: Array) -> tuple[Array, Array]:
     parameters = np.array([values[name] for name in model.names])
     u = problem.dynamics.steps.acting(values)[0]
     drive = _at_ticks(u) * model.drive_gain(parameters)
-    if robot.command.unit != "N m":
+    if "k_mi" in robot.drive_laws:
         k_mi = np.array([robot.drive_parameter(joint, "k_mi").value for joint in robot.joints])
         drive = drive - k_mi * x[:, robot.layout.motor_v]
     return model.springs(x, values).torque, drive

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
-from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
+from jointscope.robots.state_rates import StateRates
 
 Array = NDArray[np.float64]
 
@@ -71,50 +71,43 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     if late:
         raise RobotError(f"the loop cannot be simulated with effects on the command yet: {', '.join(late)}")
     encoder, zero = recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero
-    on, off = _Rates(robot), _Rates(_without_back_emf(robot))
+    on, off = _Stepper(robot), _Stepper(_without_back_emf(robot))
     layout = robot.layout
     at_rest = np.zeros((1, len(robot.joints)))
     joints = np.hstack([encoder.values[:1] - zero, at_rest, encoder.values[:1] - zero, at_rest])
-    x = layout.from_joints(joints)
+    x = layout.from_joints(joints)[0]
     times = np.arange(encoder.times[0], encoder.times[-1] + STEP, STEP)
     wanted = _held(goal, times)
     positions = np.empty((len(times), len(robot.joints)))
     for k in range(len(times)):
-        positions[k] = x[0, layout.motor_q] + zero
-        command = controller.command(wanted[k], positions[k])[None]
+        positions[k] = x[layout.motor_q] + zero
+        command = controller.command(wanted[k], positions[k])
         # one bridge for all joints that are off: their back-EMF goes together
         x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
     simulated = np.column_stack([np.interp(encoder.times, times, column) for column in positions.T])
     return FreeRun(encoder.channels, encoder.times, simulated, encoder.values)
 
 
-class _Rates:
+class _Stepper:
     """Steps of one model."""
 
     def __init__(self, robot: Robot):
-        self._model = ElasticJoints(robot)
-        self._values = np.array([robot.parameters[name].value for name in self._model.names])
+        self._rates = StateRates(robot)
         friction = [robot.parameter(f"{j}.coulomb_torque").value for j in robot.joints]
         inertia = [robot.drive_parameter(j, "inertia").value for j in robot.joints]
         rate = robot.choices.friction_sharpness * float(np.max(np.array(friction) / np.array(inertia)))
         self._substeps = max(int(np.ceil(STEP * rate / STABLE)), 1)
 
     def step(self, x: Array, u: Array) -> Array:
-        """The state one step later, shape (1, d)."""
-        h = STEP / self._substeps
+        """The state one step later, shape (d,)."""
+        h, torque = STEP / self._substeps, self._rates.command_torque(u)
         for _ in range(self._substeps):
-            k1 = self._rate(x, u)
-            k2 = self._rate(x + 0.5 * h * k1, u)
-            k3 = self._rate(x + 0.5 * h * k2, u)
-            k4 = self._rate(x + h * k3, u)
+            k1 = self._rates.rates(x, torque)
+            k2 = self._rates.rates(x + 0.5 * h * k1, torque)
+            k3 = self._rates.rates(x + 0.5 * h * k2, torque)
+            k4 = self._rates.rates(x + h * k3, torque)
             x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         return x
-
-    def _rate(self, x: Array, u: Array) -> Array:
-        layout, rate = self._model.layout, np.empty_like(x)
-        rate[:, layout.positions] = x[:, layout.velocities]
-        rate[:, layout.rates] = self._model.accelerations(x, u, self._values)
-        return rate
 
 
 def _without_back_emf(robot: Robot) -> Robot:

@@ -28,6 +28,13 @@ Array = NDArray[np.float64]
 
 SMOOTHING = 0.008  # [s] window over which encoders are differentiated
 LEAK = 0.2  # [s] time after which a deflection from integrated gyro rates is forgotten
+SIGNAL_OF = {  # what each law of a motor multiplies
+    "k_pwm": "drive",
+    "torque_constant": "drive",
+    "k_mi": "minus_v_motor",
+    "coulomb_torque": "minus_sign",
+    "inertia": "minus_a_motor",
+}
 OPPOSITE = 20.0  # [sigma] a drive constant below minus this is a wrong sign
 BAND = (0.5, 10.0)  # [Hz] the regression uses motion between these frequencies
 
@@ -79,10 +86,9 @@ def initial_dynamics(problems: Sequence[BagProblem], states: Sequence[Array], ca
     for i, joint in enumerate(robot.joints):
         link = np.column_stack([-merged["deflection"][:, i], -merged["deflection_rate"][:, i]])
         _regress(found, robot, joint, ("stiffness", "damping"), link, merged["load"][:, i])
-        motor = np.column_stack(
-            [merged[key][:, i] for key in ("drive", "minus_v_motor", "minus_sign", "minus_a_motor")]
-        )
-        _regress(found, robot, joint, ("k_pwm", "k_mi", "coulomb_torque", "inertia"), motor, merged["load"][:, i])
+        laws = (*robot.drive_laws, "coulomb_torque", "inertia")
+        motor = np.column_stack([merged[SIGNAL_OF[law]][:, i] for law in laws])
+        _regress(found, robot, joint, laws, motor, merged["load"][:, i])
     return _with_values(calibration, found)
 
 
@@ -132,13 +138,13 @@ def _regress(
     scale = np.sqrt(np.mean(regressors**2, axis=0))
     if np.any(scale == 0.0):
         return
-    if "k_pwm" in laws:
+    if robot.drive_gain in laws:
         _check_sign(joint, regressors / scale, target)
     values, _ = nnls(regressors / scale, target)
     for law, value, size in zip(laws, values / scale, scale, strict=True):
         parameter = (
             robot.parameter(f"{joint}.{law}")
-            if law not in ("k_pwm", "k_mi", "inertia")
+            if law not in (*robot.drive_laws, "inertia")
             else robot.drive_parameter(joint, law)
         )
         if value > 0.0 and not parameter.fixed:

@@ -22,7 +22,8 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, Solution, newton_step, solve
+from jointscope.graphs.batch_solver import Estimate, NewtonStep, Progress, Solution, newton_step, solve
+from jointscope.graphs.convergence import measured_rows, short_step
 from jointscope.graphs.normal_equations import accumulate, linearize_all
 from jointscope.graphs.posterior import ResidualPart, posteriors, residual_parts
 from jointscope.graphs.shared_layout import SharedLayout
@@ -32,7 +33,7 @@ Array = NDArray[np.float64]
 
 SMALLEST_DENSITY = 1e-3  # [rad/s/sqrt(s)] below this, rounding in the Hessian and the integration error take over
 CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
-FAR = 5.0  # [sigma] a Gauss-Newton step beyond this is checked and damped
+FAR = 5.0  # [sigma times misfit] a Gauss-Newton step beyond this is checked and damped
 LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at the most
 
 
@@ -168,9 +169,12 @@ def _cycle(
     shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
     here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, systems)
     step = newton_step(problems, here, hold)
-    if step.in_sigmas > FAR and not damped:
-        # too far for a step that nobody checks: two checked ones first
-        return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
+    cost = sum(system.cost for system in systems)
+    if step.in_sigmas > short_step(cost, FAR, measured_rows(problems)):
+        # too far for a step that nobody checks: two checked ones first, and none if it is still too far
+        if not damped:
+            return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
+        step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
     found, _ = posteriors(problems, here, hold)
     evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
     for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):

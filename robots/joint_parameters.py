@@ -17,7 +17,8 @@ class JointParameters:
     """Parameters of the base model's laws, joint by joint.
 
     Laws are "inertia", "coulomb_torque", "stiffness", "damping" and, where the command is a voltage, "k_pwm" and
-    "k_mi". A spring that an effect gave to a rigid joint has a compliance, that of the base model a stiffness.
+    "k_mi", where it is a current, "torque_constant". A spring that an effect gave to a rigid joint has a compliance,
+    that of the base model a stiffness.
 
     Args:
         robot: drives, springs and parameters.
@@ -29,7 +30,7 @@ class JointParameters:
     def __init__(self, robot: Robot):
         self.names = tuple(name for name, parameter in robot.parameters.items() if not parameter.fixed)
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        drives = ("coulomb_torque", "inertia", *(() if robot.command.unit == "N m" else ("k_pwm", "k_mi")))
+        drives = ("coulomb_torque", "inertia", *robot.drive_laws)
         self._sources = {law: [robot.drive_parameter(joint, law).name for joint in robot.joints] for law in drives}
         springs = [_spring_of(robot, joint) for joint in robot.joints]
         self._sources["stiffness"] = [stiffness for stiffness, _ in springs]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a motor does of its own: torque of the command, back-EMF and friction.
 
-    tau_motor = k_pwm U u - k_mi v_motor             (eq. 11), or u itself where the command is a torque
+    tau_motor = k_pwm U u - k_mi v_motor             (eq. 11), k_t u where the command is a current,
+                                                     u itself where it is a torque
     tau_friction = mu tanh(k v)                      (eq. 12), with v of the motor or of the link
 
 Equation numbers: Schuethe, Wenk, Frese (2016).
@@ -32,13 +33,13 @@ class MotorTorques:
     def __init__(self, robot: Robot, parameters: JointParameters):
         self._layout, self._parameters = robot.layout, parameters
         self._volts = robot.command_volts
-        self._torque_command = robot.command.unit == "N m"
+        self._gain, self._has_back_emf = robot.drive_gain, "k_mi" in robot.drive_laws
         self._friction_on_link = robot.choices.friction_velocity == "link"
         self._sharpness = robot.choices.friction_sharpness
 
     def of_command(self, u: Array, values: Mapping[str, float]) -> Array:
         """Torque of commands in their SI unit, shape (m, n) [N m]."""
-        return u if self._torque_command else self._parameters.of(values, "k_pwm") * self._volts * u
+        return u if self._gain is None else self._parameters.of(values, self._gain) * self._volts * u
 
     def add_command_slopes(self, by_parameter: Array, u: Array, inertia: Array | float = 1.0) -> None:
         """Adds the derivative of `of_command`, over an inertia where accelerations are meant.
@@ -48,11 +49,11 @@ class MotorTorques:
             u: commands in their SI unit, shape (m, n).
             inertia: shape (n,) [kg m2], or 1 for torques.
         """
-        if self._torque_command:
+        if self._gain is None:
             return
         slopes = self._volts * u / inertia
         for i, row in enumerate(self._layout.motor_row.tolist()):
-            self._parameters.add(by_parameter, "k_pwm", i, row, slopes[:, i])
+            self._parameters.add(by_parameter, self._gain, i, row, slopes[:, i])
 
     def add(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
         """Adds friction, and the back-EMF where the command is a voltage, at states of shape (m, d)."""
@@ -60,7 +61,7 @@ class MotorTorques:
         mu = parameters.of(values, "coulomb_torque")
         friction_v = layout.joint_v if self._friction_on_link else layout.motor_v
         smooth_sign = np.tanh(self._sharpness * x[:, friction_v])
-        k_mi = np.zeros(len(mu)) if self._torque_command else parameters.of(values, "k_mi")
+        k_mi = parameters.of(values, "k_mi") if self._has_back_emf else np.zeros(len(mu))
         v_motor = x[:, layout.motor_v]
         torque = -mu * smooth_sign - k_mi * v_motor
         for i, row in enumerate(layout.motor_row.tolist()):
@@ -70,5 +71,5 @@ class MotorTorques:
             terms.by_state[:, row, friction_v[i]] -= mu[i] * self._sharpness * (1.0 - smooth_sign[:, i] ** 2)
             terms.by_state[:, row, layout.motor_v[i]] -= k_mi[i]
             parameters.add(terms.by_parameter, "coulomb_torque", i, row, -smooth_sign[:, i])
-            if not self._torque_command:
+            if self._has_back_emf:
                 parameters.add(terms.by_parameter, "k_mi", i, row, -v_motor[:, i])

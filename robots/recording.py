@@ -24,7 +24,7 @@ class Stream:
         times: time of measurement, strictly increasing, shape (n,) [s].
         values: samples, shape (n, m), in the SI unit of the sensor.
         channels: name of each column ("joint1.motor_position", "imu1.x", "joint1.command").
-        unit: SI unit of the values ("rad", "rad/s", "1" for a duty cycle, "V", "N m").
+        unit: SI unit of the values ("rad", "rad/s", "1" for a duty cycle, "V", "A", "N m").
         received: time at which the message was written to the bag, shape (n,) [s].
     """
 

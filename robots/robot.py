@@ -87,7 +87,7 @@ class Robot:
         joints: names of the joints, base to tip.
         choices: model choices.
         constants: known numbers by name ("motor.supply_voltage" [V]).
-        command: where the commands are; its unit is "duty", "V" or "N m".
+        command: where the commands are; its unit is "duty", "V", "A" or "N m".
         sensors: by name.
         parameters: by full name, in the order of the file.
         noise: process noise, in the order of `layout`.
@@ -202,6 +202,17 @@ class Robot:
         if name not in self.parameters:
             raise RobotError(f"robot {self.name!r} has no parameter {name!r}; it has {', '.join(self.parameters)}")
         return self.parameters[name]
+
+    @property
+    def drive_gain(self) -> str | None:
+        """Law that turns commands into torques: of a voltage, of a current; None where the command is a torque."""
+        return {"N m": None, "A": "torque_constant"}.get(self.command.unit, "k_pwm")
+
+    @property
+    def drive_laws(self) -> tuple[str, ...]:
+        """The gain, where there is one, and the back-EMF of a motor that is driven by a voltage."""
+        gain = self.drive_gain
+        return () if gain is None else (gain, "k_mi") if gain == "k_pwm" else (gain,)
 
     def drive_parameter(self, joint: str, name: str) -> Parameter:
         """A parameter of a joint's drive: the joint's own if it has one, else the one all motors share."""

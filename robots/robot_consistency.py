@@ -8,7 +8,7 @@ from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
 
-DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "inertia": "kg m2"}
+DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "torque_constant": "N m/A", "inertia": "kg m2"}
 JOINT_PARAMETERS = {"coulomb_torque": "N m", "stiffness": "N m/rad", "damping": "N m s/rad"}
 
 
@@ -105,7 +105,7 @@ def _check_parameters(robot: Robot, place: str) -> None:
             raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
     if robot.free_links:
         return
-    needed = tuple(DRIVE_PARAMETERS) if robot.command.unit != "N m" else ("inertia",)
+    needed = (*robot.drive_laws, "inertia")
     for joint in robot.joints:
         for name in needed:
             if not {f"{joint}.{name}", f"motor.{name}"} & set(robot.parameters):

@@ -33,7 +33,7 @@ READY_ROOT = Path(__file__).parent
 READY_PREFIX = "ready:"
 
 INTEGRATORS = ("euler", "midpoint", "simpson")
-COMMAND_UNITS = ("duty", "V", "N m")
+COMMAND_UNITS = ("duty", "V", "A", "N m")
 CONSTANTS = ("motor.supply_voltage", "motor.gear")
 
 

@@ -14,6 +14,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "rpm": ("rad/s", 2.0 * math.pi / 60.0),
     "duty": ("1", 1.0),
     "V": ("V", 1.0),
+    "A": ("A", 1.0),
     "N m": ("N m", 1.0),
 }
 """Unit in a bag: its SI unit and the factor that turns a value into it."""

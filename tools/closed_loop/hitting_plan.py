@@ -70,7 +70,7 @@ def hitting_plan(robot: Robot, times: Array, home: Array, rng: np.random.Generat
 def speed_limits(robot: Robot) -> Array:
     """Largest velocity of each joint, shape (n_joints,) [rad/s]: of the URDF, and of the motor running free."""
     limits = robot.tree.velocity_limits
-    if robot.command.unit == "N m":
+    if "k_mi" not in robot.drive_laws:
         return np.where(np.isfinite(limits), limits, 2.0 * np.pi)
     volts = full_command(robot) * robot.command_volts
     for i, joint in enumerate(robot.joints):

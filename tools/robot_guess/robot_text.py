@@ -125,7 +125,7 @@ def _command(guess: RobotGuess) -> list[str]:
     lines = [
         _line("command:", command.reason, command.sure),
         *_source(command.signal, unit, 2)[:3],
-        _line(f"unit: {unit}", f"{why}; duty | V | N m", sure=False, indent=2),
+        _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),
     ]

@@ -49,6 +49,8 @@ def proportional(error: Array, limit: Array | float) -> Array:
 def full_command(robot: Robot) -> Array:
     """The largest command of each joint, shape (n_joints,): duty 1, the supply voltage, or the URDF's effort limit.
 
+    For currents, the one that gives that effort.
+
     Raises:
         SimulationError: it is not known.
     """
@@ -61,4 +63,5 @@ def full_command(robot: Robot) -> Array:
     effort = np.array(robot.tree.model.effortLimit, dtype=float)
     if not np.all(np.isfinite(effort) & (effort > 0) & (effort < 1e9)):
         raise SimulationError(f"robot {robot.name!r}: simulating needs an effort limit of every joint in the URDF")
-    return effort
+    gain = 1.0 if robot.drive_gain is None else [robot.drive_parameter(j, robot.drive_gain).value for j in robot.joints]
+    return effort / np.array(gain)

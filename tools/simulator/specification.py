@@ -110,8 +110,9 @@ def _add_spring(spec: Any, robot: Robot, joint: str) -> None:
 
 def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
     gain, back_emf = 1.0, 0.0
-    if robot.command.unit != "N m":
-        gain = robot.drive_parameter(joint, "k_pwm").value * robot.command_volts
+    if robot.drive_gain is not None:
+        gain = robot.drive_parameter(joint, robot.drive_gain).value * robot.command_volts
+    if "k_mi" in robot.drive_laws:
         back_emf = robot.drive_parameter(joint, "k_mi").value
     motor = spec.add_actuator(
         name=drive(joint),

@@ -14,7 +14,7 @@ from jointscope.tools.report.sensor_signals import COLOURS, points_per_curve
 
 Array = NDArray[np.float64]
 
-UNITS = {"1": "duty cycle", "V": "V", "N m": "N m"}
+UNITS = {"1": "duty cycle", "V": "V", "A": "A", "N m": "N m"}
 
 
 def commands(result: CalibrationResult) -> Section:
