@@ -14,6 +14,7 @@ from jointscope.robots.motor_zero import with_motor_zero
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.units import UNITS, si_factor, si_unit
+from jointscope.robots.wrapped_counter import wrapping_jump
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,9 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     """
     for stream in recording.streams.values():
         _check_samples(stream)
+    for sensor in (robot.motor_encoder, robot.link_encoder):
+        if sensor is not None:
+            _check_wraps(recording.streams[sensor.name])
     recording = with_motor_zero(recording, robot)
     notices = _check_overlap(recording)
     _check_command(recording.command, robot)
@@ -101,6 +105,17 @@ def _check_frozen(stream: Stream) -> None:
             f"{stream.name} repeats one sample from {t0:.3f} to {t1:.3f} s: the sensor has stopped; use the part of "
             "the recording before or after it"
         )
+
+
+def _check_wraps(stream: Stream) -> None:
+    """An angle does not cross its whole range between two samples; a counter that begins anew does."""
+    for channel, column in zip(stream.channels, stream.values.T, strict=True):
+        jump = wrapping_jump(stream.times, column)
+        if jump > 10.0 * MOVED_ANGLE:
+            raise RecordingError(
+                f"{channel} jumps by {jump:.4g} rad from one sample to the next, nearly its whole range: it looks like "
+                f"a counter that begins anew; set `wraps` of sensors.{stream.name} in the robot file to its period"
+            )
 
 
 def _check_overlap(recording: Recording) -> list[Notice]:

@@ -37,7 +37,9 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     if joints and len(names) != len(joints):
         raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
     scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
-    return Topic(section.text("topic"), section.text("type"), section.text("field"), unit, names, scale)
+    wraps = section.number("wraps", None, positive=True) if scaled else None
+    place = section.text("topic"), section.text("type"), section.text("field")
+    return Topic(*place, unit, names, scale, wraps or 0.0)
 
 
 def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:

@@ -22,6 +22,7 @@ class Topic:
         unit: unit in the bag; converted to SI when read.
         names: name in the message for each joint of the robot, in the robot's order; empty for streams without names.
         scale: factor on the value of each joint, such as the ratio of its gear; empty for none.
+        wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
     """
 
     topic: str
@@ -30,6 +31,7 @@ class Topic:
     unit: str
     names: tuple[str, ...] = ()
     scale: tuple[float, ...] = ()
+    wraps: float = 0.0
 
 
 @dataclass(frozen=True)

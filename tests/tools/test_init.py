@@ -14,7 +14,9 @@ import pytest
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot_file import load_robot
+from jointscope.robots.screening import screen
 from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.robot_guess.robot_guess import guess_robot
 from jointscope.tools.robot_guess.sensor_noise import guess_noise
@@ -130,6 +132,25 @@ def test_a_joint_that_counts_backwards_gets_a_sign(doggy, tmp_path):
     raw = read_recording(bag, doggy).streams["motor_encoder"].values
     np.testing.assert_allclose(seen, raw * found.signs)
     assert "as well with" in (tmp_path / "own.yaml").read_text()
+
+
+def test_a_counter_that_begins_anew_is_continued(doggy, tmp_path):
+    recording = moving(doggy)
+    encoder = recording.streams["motor_encoder"]
+    wrapped = replace(encoder, values=encoder.values % (2.0 * np.pi))
+    streams = {**recording.streams, "motor_encoder": wrapped}
+    bag = written(tmp_path, replace(recording, streams=streams), doggy)
+    with pytest.raises(RecordingError, match=r"begins anew; set `wraps` of sensors\.motor_encoder"):
+        screen(read_recording(bag, doggy), doggy)
+    run(doggy.tree.urdf, bag, "-o", tmp_path / "own.yaml")
+    robot = load_robot(tmp_path / "own.yaml")
+    assert robot.motor_encoder.source.wraps == pytest.approx(2.0 * np.pi)
+    seen = read_recording(bag, robot).streams["motor_encoder"].values
+    np.testing.assert_allclose(np.diff(seen, axis=0), np.diff(encoder.values, axis=0), atol=1e-6)
+    # block by block, as a replay reads it
+    blocks = list(ArrivalReader(bag, robot, block=777))
+    online = np.concatenate([block.values[block.names.index("motor_encoder")] for block in blocks])
+    np.testing.assert_allclose(online, seen, atol=1e-9)
 
 
 def test_a_motor_that_turns_against_its_command_gets_a_sign(doggy, tmp_path):

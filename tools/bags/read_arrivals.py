@@ -17,10 +17,16 @@ from jointscope.graphs.fixed_lag.replay_result import ReplaySource
 from jointscope.robots.arrivals import Arrivals
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
-from jointscope.robots.units import si_factor
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Progress, RawTopic, bag_sha256, open_bag
-from jointscope.tools.bags.read_recording import StreamSource, check_topic, column_order, needed_streams, read_columns
+from jointscope.tools.bags.read_recording import (
+    StreamSource,
+    check_topic,
+    column_order,
+    in_si,
+    needed_streams,
+    read_columns,
+)
 
 BLOCK = 20_000  # messages
 
@@ -49,6 +55,7 @@ class ArrivalReader:
         self._needed = needed_streams(robot)
         self._progress = progress
         self._block = block
+        self._last: dict[str, np.ndarray] = {}
 
     def __iter__(self) -> Iterator[Arrivals]:
         """Reads the bag.
@@ -61,6 +68,7 @@ class ArrivalReader:
             topics = sorted({need.source.topic for need in self._needed})
             messages = bag.messages(topics, self._progress)
             counts = dict.fromkeys(topics, 0)
+            self._last.clear()
             while block := list(islice(messages, self._block)):
                 raw = {topic: RawTopic(topic) for topic in topics}
                 places: dict[str, list[int]] = {topic: [] for topic in topics}
@@ -88,7 +96,10 @@ class ArrivalReader:
         counts: dict[str, int],
     ) -> Arrivals:
         present = [need for need in self._needed if raw[need.source.topic].data]
-        columns = [_columns(need, raw[need.source.topic], types, counts) for need in present]
+        columns = []
+        for need in present:
+            columns.append(_columns(need, raw[need.source.topic], types, counts, self._last.get(need.name)))
+            self._last[need.name] = columns[-1][1][-1]
         if not self.start_ns:
             self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
         parts = [
@@ -100,11 +111,15 @@ class ArrivalReader:
 
 
 def _columns(
-    need: StreamSource, topic: RawTopic, types: dict[str, MessageType], counts: dict[str, int]
+    need: StreamSource,
+    topic: RawTopic,
+    types: dict[str, MessageType],
+    counts: dict[str, int],
+    before: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps [ns] and samples in SI units of one stream, as they lie in the block."""
+    """Stamps [ns] and samples in SI units of one stream, as they lie in the block; `before` is the last one's."""
     message_type = types[need.name]
     columns = read_columns(topic, message_type, need.source.field, first=counts[topic.name])
     order, _ = column_order(need, columns)
     stamps = topic.received_ns if columns.stamps is None else columns.stamps
-    return stamps, columns.values[:, order] * si_factor(need.source.unit)
+    return stamps, in_si(need.source, columns.values[:, order], before)

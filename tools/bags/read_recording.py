@@ -15,6 +15,7 @@ from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Topic
 from jointscope.robots.units import si_factor, si_unit
+from jointscope.robots.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.fast_columns import fast_columns
@@ -131,6 +132,20 @@ def full_type_name(name: str) -> str:
     return name if "/" in rest else f"{package}/msg/{rest}"
 
 
+def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    """Samples in SI units, counters continued, each joint with its own factor.
+
+    Args:
+        source: where they come from.
+        values: as they stand in the bag, shape (n, m).
+        before: what the last sample before them became, shape (m,); None for the first ones.
+    """
+    factor = si_factor(source.unit) * np.asarray(source.scale or 1.0)
+    if not source.wraps:
+        return values * factor
+    return continued(values, source.wraps, None if before is None else before / factor) * factor
+
+
 def read_columns(
     topic: RawTopic, message_type: MessageType, field: str, decode_all: bool = False, first: int = 0
 ) -> Columns:
@@ -153,9 +168,7 @@ def _samples(
         stamps = topic.received_ns
         text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
         notices.append(Notice(need.name, "info", len(stamps), text))
-    values = columns.values[:, order] * si_factor(need.source.unit)
-    if need.source.scale:
-        values = values * np.asarray(need.source.scale)
+    values = in_si(need.source, columns.values[:, order])
     samples, found = in_time_order(need.name, TimedSamples(stamps, topic.received_ns, values))
     return samples, notices + found
 

@@ -113,6 +113,12 @@ def _signs(signs: Iterable[float], reason: str, indent: int) -> list[str]:
     return [_line(f"scale: {_list(values)}", reason, False, indent)] if min(values) < 0 else []
 
 
+def _wraps(chosen: Chosen) -> list[str]:
+    if not chosen.wraps:
+        return []
+    return [_line(f"wraps: {chosen.wraps:.9g}", "jumps by that much from one sample to the next", False, 4)]
+
+
 def _turned_joints(found: SignGuess) -> str:
     others = " or ".join(_list(signs) for signs in found.others)
     return f"so do the gyroscopes agree; as well with {others}" if others else "only so do the gyroscopes agree"
@@ -150,6 +156,7 @@ def _motor_encoder(guess: RobotGuess) -> list[str]:
         _line("kind: motor_encoder", chosen.reason, chosen.sure, 4),
         *_source(chosen.signal, guess.angle_unit),
         *_names(chosen, guess.roles.joints, 4),
+        *_wraps(chosen),
         *_signs(guess.encoder_signs.signs, _turned_joints(guess.encoder_signs), 4),
     ]
     if guess.free_links:
@@ -169,6 +176,7 @@ def _link_encoder(guess: RobotGuess) -> list[str]:
         _line("kind: link_encoder", chosen.reason, chosen.sure, 4),
         *_source(chosen.signal, guess.angle_unit),
         *_names(chosen, guess.roles.joints, 4),
+        *_wraps(chosen),
         *_signs(guess.encoder_signs.signs, "as the motor encoder", 4),
         _sigma(noise, "rad"),
     ]

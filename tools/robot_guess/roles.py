@@ -7,16 +7,19 @@ Every choice keeps its reason, for the user to agree or not.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.wrapped_counter import continued, wrapping_jump
 from jointscope.tools.robot_guess.signals import JOINT_STATE, Signal
 
 COMMAND = re.compile(r"command|cmd|desired|target|setpoint|reference|goal")
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
 IMU = "sensor_msgs/msg/Imu"
+TURNS = (2.0 * np.pi, 360.0, 1.0)  # periods of counters, in rad, degrees, turns
+NEAR_A_TURN = 0.1  # relative; the joint moves on while its counter jumps
 LARGEST_DUTY = 1.0 + 1e-6
 
 
@@ -29,12 +32,14 @@ class Chosen:
         names: joint names in the messages, one per joint of the robot; empty where the messages name none.
         reason: why this one.
         sure: whether nothing else could be meant.
+        wraps: period after which its counter begins anew, in the unit of the bag; the signal is continued already.
     """
 
     signal: Signal
     names: tuple[str, ...]
     reason: str
     sure: bool
+    wraps: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -77,9 +82,10 @@ def assign_roles(signals: list[Signal], urdf_joints: tuple[str, ...], wanted: tu
     joints, names = _joints(motors, link_side, urdf_joints, wanted)
     rivals = [s.topic for s in motor_side[1:]]
     reason = f"also there: {', '.join(rivals)}" if rivals else "the positions that are not those of links or commands"
-    encoder = Chosen(motors, names, reason, sure=not rivals)
+    encoder = _encoder(motors, names, joints, reason, sure=not rivals)
     links = next((s for s in link_side if s is not motors and s.moving(names)), None)
-    link = None if links is None else Chosen(links, names, "its topic speaks of links or loads", sure=False)
+    said = "its topic speaks of links or loads"
+    link = None if links is None else _encoder(links, names, joints, said, sure=False)
     torque = next((s for s in signals if s.field == "effort" and links and s.topic == links.topic), None)
     return Roles(
         joints=joints,
@@ -89,6 +95,16 @@ def assign_roles(signals: list[Signal], urdf_joints: tuple[str, ...], wanted: tu
         joint_torque=_torque(torque, names),
         imus=tuple(s for s in signals if s.msgtype == IMU),
     )
+
+
+def _encoder(signal: Signal, names: tuple[str, ...], joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
+    """An encoder; one whose counter begins anew after a turn is continued."""
+    columns = signal.columns(names or joints)
+    jump = max(wrapping_jump(signal.times, column) for column in columns.T)
+    turn = next((turn for turn in TURNS if abs(jump / turn - 1.0) < NEAR_A_TURN), 0.0)
+    if turn:
+        signal = replace(signal, values=continued(signal.values, turn))
+    return Chosen(signal, names, reason, sure, turn)
 
 
 def _joints(
