@@ -137,7 +137,9 @@ class ScoreTest:
         ]
         H, g = self._assembled(parts, k)[:2]
         S, s, _ = self._profile(H, g, k)
-        return s**2 / np.diag(S)
+        seen = np.diag(S)
+        # a regressor of zeros, as the load of a rigid joint that carries no weight, explains nothing
+        return np.divide(s**2, seen, out=np.zeros(k), where=seen > 0.0)
 
     def _profiled(
         self, trials: Sequence[Trial], with_blocks: bool = False

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.transmission.candidates import Candidate, candidates, columns_of, may_be_added
 from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.look_alikes import look_alikes
@@ -33,6 +34,7 @@ SURE = 3.0  # [sigma] a size must be away from zero
 MOST_STEPS = 12
 
 
+@in_solver_context
 def discover_transmission(
     robot: Robot, recordings: Sequence[Recording], holdout: Recording | None = None, max_steps: int = MOST_STEPS
 ) -> TransmissionDiscovery:

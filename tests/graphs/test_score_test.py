@@ -13,6 +13,7 @@ from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.normal_equations import accumulate, layout, whitened
 from jointscope.graphs.order_scan import scan_orders
 from jointscope.graphs.score_test import ScoreTest
+from jointscope.graphs.scored_candidates import _placebos
 from jointscope.graphs.trial_columns import columns_of
 from jointscope.graphs.trial_system import Segment, rows_of
 from jointscope.graphs.trials import trials_of
@@ -149,6 +150,13 @@ def test_an_injected_effect_comes_out_with_its_size_and_sign(long):
         assert score.estimate[0] == pytest.approx(amount, rel=0.02)
         assert score.plausible[0] == (pytest.approx(score.score) if amount > 0 else 0.0)
         assert score.score > 0.0
+
+
+def test_placebos_of_a_robot_with_a_rigid_joint_have_scores():
+    segment, _ = base("joint 2 rigid", seconds=0.3)
+    found = ScoreTest([segment]).placebo([_placebos(segment.signals)])
+    assert np.all(np.isfinite(found)) and found.max() > 0.0
+    assert found.min() == 0.0  # a rigid joint has no spring, so its load explains nothing
 
 
 def test_look_alikes_correlate_and_others_do_not(long):
