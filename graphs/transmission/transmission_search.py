@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 BLOCK = 1.0  # [s] fitted and validated in turn
 MATTERS = 0.05  # share of the squared error of the equations concerned that an effect must explain
+SEARCHED = 0.1  # the same for a ripple whose order is the best of hundreds
 SURE = 3.0  # [sigma] a size must be away from zero
 MOST_STEPS = 12
 
@@ -115,7 +116,8 @@ def _with_orders(model: TransmissionModel, equations: Sequence[Equation]) -> lis
 
 def _why_not(candidate: Candidate, equations: Sequence[Equation], names: Sequence[str], share: float) -> str:
     """Why a candidate is refused; empty if it is not."""
-    if share < MATTERS:
+    searched = candidate.effect == RIPPLE and candidate.order != 1.0
+    if share < (SEARCHED if searched else MATTERS):
         return f"explains {100 * max(share, 0.0):.1f} % of what is left in the seconds that were not fitted"
     own = [list(names).index(size) for size in candidate.sizes]
     sizes = fitted(parts(equations, names))[own]
