@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jointscope.graphs.calibrate import calibrate
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot_file import load_robot
@@ -94,6 +95,29 @@ def test_the_file_can_be_used_and_every_guess_is_marked_with_its_reason(doggy, b
     marked = [line for line in (tmp_path / "own.yaml").read_text().splitlines() if "GUESS: " in line]
     assert len(marked) == len(content["guesses"]) > 8
     assert all(guess in said for guess in content["guesses"])
+
+
+def test_joints_with_a_gyro_behind_them_get_a_spring(doggy, bag, tmp_path):
+    run(doggy.tree.urdf, bag, "-o", tmp_path / "own.yaml")
+    robot = load_robot(tmp_path / "own.yaml")
+    assert robot.choices.rigid_joints == ()
+    assert robot.parameters["joint2.stiffness"].value > 0.0
+
+
+def test_a_calibration_from_a_guessed_file_finds_the_truth(doggy, doggy_data, tmp_path):
+    """Of a robot made elsewhere, knowing its URDF, its supply and that its weight is compensated."""
+    run(doggy.tree.urdf, doggy_data / "clean" / "train", "-o", tmp_path / "own.yaml")
+    text = (tmp_path / "own.yaml").read_text()
+    text = text.replace("supply_voltage: 24.0", "supply_voltage: 32.0").replace("[0.0, 0.0, -9.81]", "[0.0, 0.0, 0.0]")
+    (tmp_path / "own.yaml").write_text(text)
+    robot = load_robot(tmp_path / "own.yaml")
+    found = calibrate(robot, [read_recording(doggy_data / "clean" / "train", robot)]).robot.parameters
+    true = json.loads((doggy_data / "clean" / "truth.json").read_text())["train"]["params"]
+    for j, joint in enumerate(doggy.joints):
+        for law, name in (("stiffness", "ks"), ("damping", "ds"), ("coulomb_torque", "mu")):
+            assert found[f"{joint}.{law}"].value == pytest.approx(true[name][j], rel=0.01)
+        for law, name in (("k_pwm", "kpwm"), ("k_mi", "kmi"), ("inertia", "b")):
+            assert found[f"{joint}.{law}"].value == pytest.approx(true[name], rel=0.01)
 
 
 def test_gyros_are_put_on_their_links_and_turned_as_they_are_mounted(doggy, bag):

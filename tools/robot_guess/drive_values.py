@@ -38,6 +38,7 @@ class DriveValues:
         inertia: of the motor [kg m2].
         sign: -1 where the command turns the joint backwards.
         confidence: how far the sign is from the other one [sigma].
+        link: inertia of everything behind the joint at the first posture [kg m2]; 1 where masses are not known.
     """
 
     k: float
@@ -46,6 +47,7 @@ class DriveValues:
     inertia: float
     sign: float
     confidence: float
+    link: float = 1.0
 
 
 def drive_values(
@@ -108,7 +110,7 @@ def _joint(
     least = SMALLEST * torque / np.where(size > 0, size, np.inf)
     k, k_mi, coulomb, b = np.maximum(values, least)
     k = float(k) if values[0] > 0 else torque / float(size[0] or 1.0)
-    return DriveValues(k, float(k_mi), float(coulomb), max(float(b), MATCHED * inertia), sign, confidence)
+    return DriveValues(k, float(k_mi), float(coulomb), max(float(b), MATCHED * inertia), sign, confidence, inertia)
 
 
 def _sign(load: Array, u: Array, minus_v: Array, minus_sign: Array, count: float) -> tuple[float, float]:

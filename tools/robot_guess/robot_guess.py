@@ -51,6 +51,7 @@ class RobotGuess:
         encoder_noise, link_noise, torque_noise: of the sensors.
         gyros: those that sit on a moving link.
         left_out: what the bag also holds and why it is not used.
+        elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
     """
 
     name: str
@@ -67,6 +68,7 @@ class RobotGuess:
     torque_noise: NoiseGuess | None
     gyros: list[GuessedGyro]
     left_out: list[str] = field(default_factory=list)
+    elastic: tuple[str, ...] = ()
 
     @property
     def free_links(self) -> bool:
@@ -128,7 +130,14 @@ def guess_robot(
         torque_noise=None if roles.joint_torque is None else _noise(roles.joint_torque, roles, "N m"),
         gyros=gyros,
         left_out=left_out,
+        elastic=_seen(tree, gyros) if masses else (),
     )
+
+
+def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
+    """Joints with a gyroscope behind them."""
+    seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
+    return tuple(name for j, name in enumerate(tree.joints) if j in seen)
 
 
 def _tree(urdf: Path, joints: tuple[str, ...]) -> tuple[RigidTree, bool]:

@@ -16,6 +16,7 @@ from jointscope.tools.robot_guess.signals import Signal
 
 GUESS = "GUESS"
 COLUMN = 48  # where comments begin
+RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -38,7 +39,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         _line(f"joints: {_list(joints)}", "moving joints of the URDF that the recording shows"),
         "",
         "model:",
-        *_model(free, joints),
+        *_model(free, tuple(joint for joint in joints if joint not in guess.elastic)),
         "",
         *_constants(guess),
         *_command(guess),
@@ -71,11 +72,12 @@ def _line(text: str, comment: str, sure: bool = True, indent: int = 0) -> str:
     return f"{place.ljust(COLUMN)} # {comment if sure else f'{GUESS}: {comment}'}"
 
 
-def _model(free: bool, joints: tuple[str, ...]) -> list[str]:
-    rigid = _line(f"rigid_joints: {_list(joints)}", "`jointscope discover` finds which joints are elastic", indent=2)
+def _model(free: bool, rigid_joints: tuple[str, ...]) -> list[str]:
+    said = "`jointscope discover` finds which joints are elastic"
+    rigid = [_line(f"rigid_joints: {_list(rigid_joints)}", said, indent=2)] if rigid_joints else []
     if free:
-        return [_line("link_dynamics: free", "the URDF has no inertias", indent=2), rigid]
-    return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", rigid]
+        return [_line("link_dynamics: free", "the URDF has no inertias", indent=2), *rigid]
+    return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", *rigid]
 
 
 def _constants(guess: RobotGuess) -> list[str]:
@@ -232,6 +234,10 @@ def _parameters(guess: RobotGuess) -> list[str]:
         rows = [("coulomb_torque", drive.coulomb, "N m"), ("inertia", drive.inertia, "kg m2")]
         if guess.command_unit[0] != "N m":
             rows += [("k_pwm", drive.k, "N m/V"), ("k_mi", drive.k_mi, "N m s/rad")]
+        if joint in guess.elastic:
+            omega = 2.0 * np.pi * RESONANCE
+            rows += [("stiffness", drive.link * omega**2, "N m/rad")]
+            rows += [("damping", 2.0 * DAMPING_RATIO * drive.link * omega, "N m s/rad")]
         for name, value, unit in rows:
             number = _number(value)
             spread = _number(2.0 * value)
