@@ -116,5 +116,6 @@ def sentence(text: str) -> str:
     text = text.strip().replace("+-", "±")
     first = text.split(" ", 1)[0]
     # names such as joint1.stiffness keep their spelling
-    start = text[:1].upper() if text[:1].isascii() and "." not in first and "_" not in first else text[:1]
+    name = any(mark in first for mark in "._@")  # of a parameter or an effect, which is written as it is
+    start = text[:1].upper() if text[:1].isascii() and not name else text[:1]
     return start + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
