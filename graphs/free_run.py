@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.runge_kutta import runge_kutta, stable_substeps
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
@@ -22,7 +23,6 @@ from jointscope.robots.state_rates import StateRates
 Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
-STABLE = 1.0  # largest step times rate of the friction; Runge-Kutta 4 is stable up to 2.8
 BACK_EMF = ".k_mi"
 
 
@@ -93,20 +93,13 @@ class _Stepper:
 
     def __init__(self, robot: Robot):
         self._rates = StateRates(robot)
-        friction = [robot.parameter(f"{j}.coulomb_torque").value for j in robot.joints]
-        inertia = [robot.drive_parameter(j, "inertia").value for j in robot.joints]
-        rate = robot.choices.friction_sharpness * float(np.max(np.array(friction) / np.array(inertia)))
-        self._substeps = max(int(np.ceil(STEP * rate / STABLE)), 1)
+        self._substeps = stable_substeps(robot, STEP)
 
     def step(self, x: Array, u: Array) -> Array:
         """The state one step later, shape (d,)."""
         h, torque = STEP / self._substeps, self._rates.command_torque(u)
         for _ in range(self._substeps):
-            k1 = self._rates.rates(x, torque)
-            k2 = self._rates.rates(x + 0.5 * h * k1, torque)
-            k3 = self._rates.rates(x + 0.5 * h * k2, torque)
-            k4 = self._rates.rates(x + h * k3, torque)
-            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            x = runge_kutta(lambda at: self._rates.rates(at, torque), x, h)
         return x
 
 

@@ -12,14 +12,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.runge_kutta import runge_kutta, stable_substeps
 from jointscope.graphs.timeline import Timeline
 from jointscope.robots.command_path import CommandPath
 from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
-
-STABLE = 1.0  # largest step times rate; Runge-Kutta 4 is stable up to 2.8
 
 
 class Predictor:
@@ -36,10 +35,7 @@ class Predictor:
         self._euler = robot.choices.integrator == "euler"
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         self._h, self._u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
-        friction = [robot.parameter(f"{j}.coulomb_torque").value for j in robot.joints]
-        inertia = [robot.drive_parameter(j, "inertia").value for j in robot.joints]
-        rate = robot.choices.friction_sharpness * float(np.max(np.array(friction) / np.array(inertia)))
-        self._substeps = max(int(np.ceil(float(np.median(self._h)) * rate / STABLE)), 1)
+        self._substeps = stable_substeps(robot, float(np.median(self._h)))
 
     def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States one tick later, shape (s, d).
@@ -53,11 +49,7 @@ class Predictor:
             return x + h * self._rate(x, u)
         h = h / self._substeps
         for _ in range(self._substeps):
-            k1 = self._rate(x, u)
-            k2 = self._rate(x + 0.5 * h * k1, u)
-            k3 = self._rate(x + 0.5 * h * k2, u)
-            k4 = self._rate(x + h * k3, u)
-            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            x = runge_kutta(lambda at: self._rate(at, u), x, h)
         return x
 
     def paths(self, x: Array, start: NDArray[np.intp], steps: int) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:

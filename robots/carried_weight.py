@@ -37,6 +37,10 @@ class CarriedWeight:
         """Whether any rigid joint carries a weight."""
         return bool(self._joints) and bool(np.any(self._tree.gravity))
 
+    def on(self, joint: str) -> CarriedWeight | None:
+        """This, if it is the load of a joint: one that is rigid and carries a weight."""
+        return self if self.some and joint not in self._layout.motors else None
+
     def torque(self, x: Array) -> Array:
         """tau_c of every joint, zero for elastic ones, at states of shape (m, d); shape (m, n) [N m]."""
         found = np.zeros((len(x), self._count))

@@ -61,8 +61,7 @@ class JointLawAtOneState:
             self._laws.append((here.effect.memory.rate, ((layout.n_link + layout.n_motor + index, 1.0),)))
         self._columns = np.array(columns, dtype=np.intp)
         self._stiffness, self._damping = float(springs.stiffness[j]), float(springs.damping[j])
-        weight = CarriedWeight(robot)
-        self._weight = weight if weight.some and here.owner not in layout.motors else None
+        self._weight = CarriedWeight(robot).on(here.owner)
         self._joint, self._q_link = j, layout.q_link
         # torque of the spring by (q_link, v_link, q_motor, v_motor); a set of signals for each and for the torque
         self._spring = np.array([self._stiffness, self._damping, -self._stiffness, -self._damping])

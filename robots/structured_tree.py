@@ -179,9 +179,14 @@ def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:
 
 def joint_axis(model: pin.Model, joint: int) -> Array:
     """Axis of a revolute joint in its own frame, shape (3,); zero for a prismatic one."""
+    return joint_motion_axis(model, joint)[3:]
+
+
+def joint_motion_axis(model: pin.Model, joint: int) -> Array:
+    """What a joint does at unit velocity, in its own frame: linear, then angular, shape (6,)."""
     jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
     # a single column comes back as a vector
-    return np.array(jacobian.reshape(6, model.nv)[3:, model.joints[joint].idx_v])
+    return np.array(jacobian.reshape(6, model.nv)[:, model.joints[joint].idx_v])
 
 
 def bearing_names(joint: str) -> tuple[str, str]:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.transmission.candidates import Candidate, candidates
 from jointscope.graphs.transmission.equation import Equation
-from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
 from jointscope.graphs.transmission.position_ripple import with_order
 from jointscope.graphs.transmission.regression import fitted, parts, spread
 from jointscope.graphs.transmission.transmission_model import TransmissionModel
@@ -31,9 +30,7 @@ def look_alikes(
     model: TransmissionModel, recordings: Sequence[Recording], found: Candidate
 ) -> tuple[tuple[str, ...], str]:
     """Labels of the effects that cannot be told from `found`, and a sentence about what it is."""
-    equations = model.equations(recordings)
-    if found.effect == RIPPLE:
-        equations = with_order(equations, found.owner, found.order)
+    equations = with_order(model.equations(recordings), found)
     labels = []
     for other in candidates(model.robot):
         if other == found or other in model.chosen:

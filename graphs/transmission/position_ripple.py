@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.transmission.candidates import Candidate
 from jointscope.graphs.transmission.equation import Equation
-from jointscope.graphs.transmission.regression import Choose, fitted, parts
+from jointscope.graphs.transmission.regression import Choose, parts
 
 Array = NDArray[np.float64]
 
@@ -31,24 +32,29 @@ def ripple_name(joint: str, part: str) -> str:
     return f"{joint}.{EFFECT}.{part}"
 
 
-def with_order(equations: Sequence[Equation], joint: str, order: float) -> list[Equation]:
-    """The equations with the ripple of one joint at an order."""
-    return [_at_order(e, joint, order) if e.name == f"{joint}.gear" else e for e in equations]
+def with_order(equations: Sequence[Equation], candidate: Candidate) -> list[Equation]:
+    """The equations with a ripple at its order; as they are for any other effect."""
+    if candidate.effect != EFFECT:
+        return list(equations)
+    gear = f"{candidate.owner}.gear"
+    return [_at_order(e, candidate.owner, candidate.order) if e.name == gear else e for e in equations]
 
 
-def strongest_order(equations: Sequence[Equation], names: Sequence[str], joint: str, choose: Choose) -> float | None:
+def strongest_order(
+    equations: Sequence[Equation], names: Sequence[str], sizes: Array, joint: str, choose: Choose
+) -> float | None:
     """Where the periodogram of a joint's gear equation is largest; None where no order can be seen.
 
     Args:
         equations: of all recordings.
         names: columns of the model.
+        sizes: of these columns, fitted to the same samples.
         joint: whose ripple.
         choose: samples to look at.
     """
     own = [e for e in equations if e.name == f"{joint}.gear" and e.position is not None]
     if not own:
         return None
-    sizes = fitted(parts(equations, names, choose))
     left = np.concatenate([piece.error - piece.columns @ sizes for piece in parts(own, names, choose)])
     q = np.concatenate([e.position[choose(e)] for e in own if e.position is not None])
     span, step = float(np.ptp(q)), max(_usual_step(e.position) for e in own if e.position is not None)

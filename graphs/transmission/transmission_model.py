@@ -48,8 +48,7 @@ class TransmissionModel:
         """The equations of recordings, gyro delays, mountings and orders of ripples in them."""
         found = [e for recording in recordings for e in equations(recording, self.robot, self.delays)]
         for candidate in self.chosen:
-            if candidate.effect == RIPPLE:
-                found = with_order(found, candidate.owner, candidate.order)
+            found = with_order(found, candidate)
         return found
 
     def size(self, name: str) -> float:

@@ -88,7 +88,7 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
     refused: dict[str, str] = {}
     for candidate in _with_orders(model, equations):
         names = columns_of(model.robot, (*model.chosen, candidate))
-        own = with_order(equations, candidate.owner, candidate.order) if candidate.effect == RIPPLE else equations
+        own = with_order(equations, candidate)
         after = _validated(own, names)
         concerned = {e.name for e in own if any(size in e.columns for size in candidate.sizes)}
         old, new = (sum(found[name] ** 2 for name in concerned) for found in (before, after))
@@ -107,8 +107,9 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
 def _with_orders(model: TransmissionModel, equations: Sequence[Equation]) -> list[Candidate]:
     """What may be added; a ripple both at one period per turn and at the order that stands out."""
     found = [c for c in candidates(model.robot) if may_be_added(c, model.chosen)]
+    sizes = fitted(parts(equations, model.names, fit_blocks))
     for candidate in [c for c in found if c.effect == RIPPLE]:
-        order = strongest_order(equations, model.names, candidate.owner, fit_blocks)
+        order = strongest_order(equations, model.names, sizes, candidate.owner, fit_blocks)
         if order is not None:
             found.append(Candidate(RIPPLE, candidate.owner, order))
     return found

@@ -25,8 +25,7 @@ def states(count=9):
 
 def test_the_weight_of_a_pendulum_is_that_of_its_mass(loaded):
     x = states()
-    q = x[:, loaded.layout.q_link[0] if hasattr(loaded.layout.q_link, "__len__") else loaded.layout.q_link]
-    q = np.ravel(q)
+    q = np.ravel(x[:, loaded.layout.q_link])
     found = CarriedWeight(loaded).torque(x)[:, 0]
     np.testing.assert_allclose(np.abs(found), MASS * G * LENGTH * np.abs(np.sin(q)), rtol=2e-3, atol=1e-4)
 

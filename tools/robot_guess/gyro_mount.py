@@ -8,7 +8,7 @@ link about one axis only and say nothing about the rotation around it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations, product
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from jointscope.robots.joint_motion import JointMotion, window_mean
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.units import si_factor
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class Mount:
         body: link of the URDF.
         R_imu_body: from body to sensor coordinates, shape (3, 3).
         left: share of the gyroscope's power that remains, 0 to 1.
-        degrees: whether its values must be deg/s.
+        unit: of its values, "rad/s" or "deg/s".
         square: whether it is mounted in right angles.
         open_axis: the link turned about one axis only: the rotation about it is not known.
         others: links that explain it as well.
@@ -47,7 +48,7 @@ class Mount:
     body: str
     R_imu_body: Array
     left: float
-    degrees: bool
+    unit: str
     square: bool
     open_axis: bool
     others: tuple[str, ...]
@@ -75,17 +76,17 @@ def find_mount(tree: RigidTree, motion: JointMotion, gyro: Stream) -> Mount | No
         if size < STANDS_STILL**2:
             continue
         ratio = float(np.sqrt(power / size))
-        degrees = DEGREES[0] < ratio < DEGREES[1]
-        scaled = measured * (np.pi / 180.0 if degrees else 1.0)
+        unit = "deg/s" if DEGREES[0] < ratio < DEGREES[1] else "rad/s"
+        scaled = measured * si_factor(unit)
         if np.mean(np.sum(scaled**2, axis=1)) < STANDS_STILL**2:
             continue
-        found.append(_mounted(body, scaled, rate, degrees))
+        found.append(_mounted(body, scaled, rate, unit))
     found.sort(key=lambda mount: mount.left)
     if not found or found[0].left > FITS:
         return None
     best = found[0]
     others = tuple(m.body for m in found[1:] if m.left < best.left + ALIKE)
-    return Mount(best.body, best.R_imu_body, best.left, best.degrees, best.square, best.open_axis, others)
+    return replace(best, others=others)
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def _one_body_per_joint(tree: RigidTree) -> list[str]:
     return list(seen.values())
 
 
-def _mounted(body: str, measured: Array, rate: Array, degrees: bool) -> Mount:
+def _mounted(body: str, measured: Array, rate: Array, unit: str) -> Mount:
     power = np.sum(measured**2)
     axes = np.linalg.svd(rate, compute_uv=False) ** 2
     open_axis = bool(axes[1] < ONE_AXIS * axes[0])
@@ -138,8 +139,8 @@ def _mounted(body: str, measured: Array, rate: Array, degrees: bool) -> Mount:
     free = _wahba(measured, rate)
     left_free = float(np.sum((measured - rate @ free.T) ** 2) / power)
     if left_free < left_square - CLEARLY:
-        return Mount(body, free, left_free, degrees, False, open_axis, ())
-    return Mount(body, square, left_square, degrees, True, open_axis, ())
+        return Mount(body, free, left_free, unit, False, open_axis, ())
+    return Mount(body, square, left_square, unit, True, open_axis, ())
 
 
 def _wahba(measured: Array, rate: Array) -> Array:

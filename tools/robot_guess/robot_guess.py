@@ -13,6 +13,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.joint_motion import joint_motion
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree, moving_joints
+from jointscope.robots.units import si_factor
 from jointscope.tools.bags.open_bag import Progress
 from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
@@ -102,7 +103,7 @@ def guess_robot(
             "them; add <inertial> to the links, or record a topic with the positions of the links"
         )
     unit = _angle_unit(tree, roles)
-    factor = np.pi / 180.0 if unit == "deg" else 1.0
+    factor = si_factor(unit)
     encoder = _stream(roles.motor_encoder, roles.joints, factor)
     streams = [s.stream(("x", "y", "z")) for s in roles.imus]
     # the links turn the gyroscopes, and their encoders know where zero is
@@ -179,8 +180,7 @@ def _gyros(
             left_out.append(f"{signal.topic}: stands still, or no link turns like it")
             continue
         name = _sensor_name(signal.topic, [gyro.name for gyro in found])
-        unit = "deg/s" if mount.degrees else "rad/s"
-        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.times, stream.values, unit)))
+        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.times, stream.values, mount.unit)))
     return found, left_out
 
 

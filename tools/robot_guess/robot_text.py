@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from jointscope.robots.units import si_factor, si_unit
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess
 from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, GuessedGyro, RobotGuess
 from jointscope.tools.robot_guess.roles import Chosen
@@ -144,43 +145,36 @@ def _command(guess: RobotGuess) -> list[str]:
 
 
 def _sigma(noise: NoiseGuess, unit: str) -> str:
-    sigma = noise.sigma if noise.sigma > 0 else 1e-4
+    """The line with a sensor's noise, which was found in a unit of the bag."""
+    sigma = si_factor(unit) * noise.sigma if noise.sigma > 0 else 1e-4
     reason = noise.reason if noise.sigma > 0 else "nothing to see in the recording; see the data sheet"
-    return _line(f"sigma: {_number(sigma)}", f"[{unit}] {reason}", False, 4)
+    return _line(f"sigma: {_number(sigma)}", f"[{si_unit(unit)}] {reason}", False, 4)
 
 
 def _motor_encoder(guess: RobotGuess) -> list[str]:
-    chosen = guess.roles.motor_encoder
-    factor = np.pi / 180.0 if guess.angle_unit == "deg" else 1.0
-    noise = NoiseGuess(factor * guess.encoder_noise.sigma, guess.encoder_noise.reason)
-    lines = [
-        "  motor_encoder:",
-        _line("kind: motor_encoder", chosen.reason, chosen.sure, 4),
-        *_source(chosen.signal, guess.angle_unit),
-        *_names(chosen, guess.roles.joints, 4),
-        *_wraps(chosen),
-        *_signs(guess.encoder_signs.signs, _turned_joints(guess.encoder_signs), 4),
-    ]
-    if guess.free_links:
-        zero = "counts from where the motor stood when it was switched on"
-        lines.append(_line("zero: unknown", zero, False, 4))
-    return [*lines, _sigma(noise, "rad")]
+    signs, noise = _turned_joints(guess.encoder_signs), guess.encoder_noise
+    zero = "counts from where the motor stood when it was switched on"
+    unknown = [_line("zero: unknown", zero, False, 4)] if guess.free_links else []
+    return _encoder("motor_encoder", guess.roles.motor_encoder, guess, signs, noise, unknown)
 
 
 def _link_encoder(guess: RobotGuess) -> list[str]:
-    chosen = guess.roles.link_encoder
-    if chosen is None or guess.link_noise is None:
+    chosen, noise = guess.roles.link_encoder, guess.link_noise
+    if chosen is None or noise is None:
         return []
-    factor = np.pi / 180.0 if guess.angle_unit == "deg" else 1.0
-    noise = NoiseGuess(factor * guess.link_noise.sigma, guess.link_noise.reason)
+    return _encoder("link_encoder", chosen, guess, "as the motor encoder", noise, [])
+
+
+def _encoder(kind: str, chosen: Chosen, guess: RobotGuess, signs: str, noise: NoiseGuess, zero: list[str]) -> list[str]:
     return [
-        "  link_encoder:",
-        _line("kind: link_encoder", chosen.reason, chosen.sure, 4),
+        f"  {kind}:",
+        _line(f"kind: {kind}", chosen.reason, chosen.sure, 4),
         *_source(chosen.signal, guess.angle_unit),
         *_names(chosen, guess.roles.joints, 4),
         *_wraps(chosen),
-        *_signs(guess.encoder_signs.signs, "as the motor encoder", 4),
-        _sigma(noise, "rad"),
+        *_signs(guess.encoder_signs.signs, signs, 4),
+        *zero,
+        _sigma(noise, guess.angle_unit),
     ]
 
 
@@ -199,16 +193,14 @@ def _torque(guess: RobotGuess) -> list[str]:
 
 def _gyro(gyro: GuessedGyro) -> list[str]:
     mount = gyro.mount
-    factor = np.pi / 180.0 if mount.degrees else 1.0
-    noise = NoiseGuess(factor * gyro.noise.sigma, gyro.noise.reason)
     R = [[round(float(x), 4) + 0.0 for x in row] for row in mount.R_imu_body]
     return [
         f"  {gyro.name}:",
         "    kind: gyro",
-        *_source(gyro.signal, "deg/s" if mount.degrees else "rad/s"),
+        *_source(gyro.signal, mount.unit),
         _line(f"body: {_plain(mount.body)}", _seat(mount), False, 4),
         "    form: full",
-        _sigma(noise, "rad/s"),
+        _sigma(gyro.noise, mount.unit),
         "    bias: {value: [0.0, 0.0, 0.0], prior_sigma: 0.1}",
         _line("R_imu_body:", _turned(mount), False, 4),
         f"      value: [{', '.join(_list(row) for row in R)}]",

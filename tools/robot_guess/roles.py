@@ -13,7 +13,7 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.wrapped_counter import continued, wrapping_jump
-from jointscope.tools.robot_guess.signals import JOINT_STATE, Signal
+from jointscope.tools.robot_guess.signals import Signal
 
 COMMAND = re.compile(r"command|cmd|desired|target|setpoint|reference|goal")
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
@@ -171,6 +171,3 @@ def command_unit(command: Chosen) -> tuple[str, str]:
         return "duty", f"it never exceeds {largest:.3g}"
     text = "volts, too, would be possible" if largest <= 60.0 else "too large for a duty cycle or volts"
     return "N m", f"it reaches {largest:.3g}; {text}"
-
-
-__all__ = ["IMU", "JOINT_STATE", "Chosen", "Roles", "assign_roles", "command_unit"]

@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.robot import Robot
+from jointscope.robots.structured_tree import joint_motion_axis
 from jointscope.tools.simulator.inertia import full_inertia
 from jointscope.tools.simulator.mujoco_module import load_mujoco
 
@@ -85,8 +86,7 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
 
 def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
     """Axis of a joint in its own frame, and whether it turns: what pinocchio made of the URDF's <axis>."""
-    jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), j)
-    column = jacobian.reshape(6, model.nv)[:, model.joints[j].idx_v]  # a single column comes back as a vector
+    column = joint_motion_axis(model, j)
     turns = bool(np.any(column[3:]))
     return (column[3:] if turns else column[:3]), turns
 
