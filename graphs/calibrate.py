@@ -20,6 +20,7 @@ from jointscope.graphs.batch_solver import Estimate, Progress, Solution, first_s
 from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
+from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.windows import windows_of
@@ -209,7 +210,8 @@ def approach(
     """
     states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
     loose = scaled(noise, np.maximum(APPROACH * LOOSE / densities(noise), 1.0))
-    now, start = [p.with_noise(loose) for p in problems], Estimate(tuple(states), tuple(calibrations))
+    now = [p.with_noise(loose) for p in problems]
+    start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
     estimate = first_step(now, start, hold)
     if total_cost(now, estimate) < total_cost(now, start):
         return estimate

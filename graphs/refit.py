@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
 from jointscope.graphs.batch_solver import Estimate, solve
@@ -28,7 +28,7 @@ from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-FIRST_ITERATIONS, LAST_ITERATIONS, NOISE_CYCLES = 8, 8, 6
+FOLLOWING, FIRST_ITERATIONS, LAST_ITERATIONS, NOISE_CYCLES = 6, 8, 8, 6
 ENOUGH = 0.3  # [sigma] last step of a refit
 SMALLEST_START = 0.05  # of the start value: where a logarithmic size begins if the score test wants less
 
@@ -70,6 +70,9 @@ def refit(base: BaseModel, spans: Sequence[Span], score: TrialScore | None, labe
     elif label:
         robot = add_effect(robot, label)
     problems, estimate = _pieces(base, robot, spans)
+    if score is not None or label:
+        # the states still are those of a model without the effect: they follow before all parameters move
+        estimate = solve(problems, estimate, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
     solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
     noise, estimate = robot.noise, solution.estimate
     if noise.estimate:
