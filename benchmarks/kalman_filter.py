@@ -44,7 +44,7 @@ class KalmanFilter:
         self.x = np.concatenate([np.zeros(d), *(gyro.bias for gyro in robot.gyros)])
         self.x[layout.joint_q] = self.x[layout.motor_q] = q - robot.motor_encoder.zero
         sigma = np.concatenate([np.full(d, STILL), *(np.full(3, g.bias_prior_sigma) for g in robot.gyros)])
-        sigma[layout.q_link], sigma[layout.q_motor] = DEFLECTION_SIGMA, robot.motor_encoder.sigma
+        sigma[layout.q_link], sigma[layout.q_motor] = DEFLECTION_SIGMA, robot.motor_encoder.sigmas
         self.P = np.diag(sigma**2)
 
     def predict(self, u: Array, h: float) -> None:
@@ -64,7 +64,7 @@ class KalmanFilter:
         H = np.zeros((len(message.values), len(self.x)))
         if message.stream == robot.motor_encoder.name:
             H[np.arange(robot.n), layout.motor_q] = 1.0
-            predicted, sigma = H @ self.x + robot.motor_encoder.zero, robot.motor_encoder.sigma
+            predicted, sigma = H @ self.x + robot.motor_encoder.zero, robot.motor_encoder.sigmas
         else:
             i = [gyro.name for gyro in robot.gyros].index(message.stream)
             bias, n = slice(d + 3 * i, d + 3 * i + 3), 2 * layout.n_link
@@ -125,7 +125,7 @@ def filtered(robot: Robot, recording: Recording, like_ours: bool, since: float =
         Times, shape (m,) [s], and states, shape (m, d).
     """
     name, messages = robot.motor_encoder.name, in_order(recording)
-    checks = SampleChecks(robot.n, robot.motor_encoder.sigma, False)
+    checks = SampleChecks(robot.motor_encoder.sigmas.tolist(), False)
     kalman = KalmanFilter(robot, recording.streams[name].values[0])
     u, now = np.zeros(robot.n), max(messages[0].stamp, since)
     times, states = list[float](), list[Array]()

@@ -63,5 +63,5 @@ def _made_up(robot: Robot, duration: float) -> Recording:
     streams = {"command": Stream("command", times, rng.uniform(-0.9, 0.9, (len(times), robot.n)), channels, "1", times)}
     for name, sensor in robot.sensors.items():
         values = 0.1 * rng.standard_normal((len(times), len(sensor.channels)))
-        streams[name] = Stream(name, times, values, sensor.channels, sensor.unit, times)
+        streams[name] = Stream(name, times, values, sensor.channels, sensor.units[0], times)
     return Recording("made up", "", 1_767_225_600_000_000_000, streams)

@@ -122,7 +122,7 @@ class SingleShooting:
 
     def _measured(self, path: Array, unknowns: Array) -> Array:
         """Residuals of a path."""
-        parts = [(path[:, 6:9] - self._encoder.values) / self._robot.motor_encoder.sigma]
+        parts = [(path[:, 6:9] - self._encoder.values) / self._robot.motor_encoder.sigmas]
         rotations, biases = unknowns[ROTATION].reshape(2, 3), unknowns[BIAS].reshape(2, 3)
         for gyro, omega_body, turn, bias in zip(self._robot.gyros, body_rates(path), rotations, biases, strict=True):
             R_imu_body = gyro.R_imu_body @ Rotation.from_rotvec(turn).as_matrix()

@@ -46,7 +46,7 @@ class SensorFactor(Generic[AnySensor]):
     @property
     def sigmas(self) -> Array:
         """Noise of each row, shape (r,), SI unit of the sensor."""
-        return np.full(len(self.rows), self.sensor.sigma)
+        return self.sensor.sigmas
 
     def select(self, samples: Samples) -> Self:
         """The same factor for some of the samples."""

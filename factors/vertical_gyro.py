@@ -44,6 +44,11 @@ class VerticalGyroFactor(SensorFactor[Gyro]):
         return (f"{self.name}.vertical",)
 
     @property
+    def sigmas(self) -> Array:
+        """Noise of the row: that of one component, as the axis has length 1."""
+        return self.sensor.sigmas[:1]
+
+    @property
     def blocks(self) -> tuple[str, ...]:
         """Rotation and bias of this gyro."""
         return (rotation_block(self.name), bias_block(self.name))

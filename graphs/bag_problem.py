@@ -135,7 +135,7 @@ def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.1) -> b
     part = encoder.between(t0, t0 + window)
     if len(part) < 4:
         return False
-    still = bool(np.all(_drift(part) < 4.0 * robot.motor_encoder.sigma))
+    still = bool(np.all(_drift(part) < 4.0 * robot.motor_encoder.sigmas))
     # friction may hold the motors while the links swing: the gyros must be still, too
     gyros = [(gyro, recording.streams[gyro.name].between(t0, t0 + window)) for gyro in robot.gyros]
     return still and all(

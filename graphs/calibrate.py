@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 LOOSE = 0.3  # [rad/s/sqrt(s)] densities at which every calibration begins; the paper's are 0.35 and 0.26
 APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approached
 NOISE_AGREES = 0.25  # relative difference of windows and whole recording that asks for no second pass
+NOISE_PASSES = 10  # at the most; where the noise of the windows was right, one does
 MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
 WINDOW_ITERATIONS = 12
 NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
@@ -185,7 +186,7 @@ def _whole_stage(
 ) -> Solved:
     """All samples: first with looser noise, then with the estimated one, checked against the whole."""
     estimate = approach(problems, noise, calibrations, hold)
-    for _ in range(3):
+    for _ in range(NOISE_PASSES):
         now = [p.with_noise(noise) for p in problems]
         solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
         history.add("all samples", solution)

@@ -80,7 +80,7 @@ class ResidualSeries:
 
     Attributes:
         channels: names of the columns.
-        unit: SI unit.
+        units: SI unit of each.
         times: shape (m,) [s].
         measured, predicted: shape (m, c) [unit].
         sigma: expected standard deviation of measured - predicted, shape (m, c) [unit].
@@ -88,7 +88,7 @@ class ResidualSeries:
     """
 
     channels: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]
     times: Array
     measured: Array
     predicted: Array

@@ -151,7 +151,9 @@ def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
             error = np.concatenate([s.measured[:, j] - s.predicted[:, j] for s in series])
             weights = np.array([len(s.times) for s in series], float)
             chi2 = float(np.average([s.chi2[j] for s in series], weights=weights))
-            found[channel] = ChannelFit(float(np.sqrt(np.mean(error**2))), sensor.sigma, chi2, sensor.unit)
+            found[channel] = ChannelFit(
+                float(np.sqrt(np.mean(error**2))), float(sensor.sigmas[j]), chi2, sensor.units[j]
+            )
     return found
 
 

@@ -71,11 +71,13 @@ def channel_errors(comparison: ModelComparison) -> list[ChannelErrors]:
             if np.sum(known) < FEWEST:
                 continue
             predicted = sensor.ahead[known, j]
-            floor = comparison.floors.get(channel, comparison.floor) * sensor.sigma
+            floor = comparison.floors.get(channel, comparison.floor) * sensor.sigmas[j]
             times, error = sensor.times[known], sensor.measured[known, j] - predicted
             separate = _separate(sensor, j, times, error)
             found.append(
-                ChannelErrors(channel, name, sensor.unit, sensor.sigma, floor, times, error, predicted, *separate)
+                ChannelErrors(
+                    channel, name, sensor.units[j], sensor.sigmas[j], floor, times, error, predicted, *separate
+                )
             )
     return found
 

@@ -23,15 +23,15 @@ MOST = 100.0  # samples that may share one error; at rest it would be all of the
 SMALLEST_CHANGE = 1e-12  # [rad] differences below this are rounding
 
 
-def shared_error(stream: Stream, sigma: float) -> Array | None:
+def shared_error(stream: Stream, sigmas: Array) -> Array | None:
     """Factor on the sigma of every sample, shape (m, c); None if no channel is quantized.
 
     Args:
         stream: of the encoder.
-        sigma: its standard deviation [rad].
+        sigmas: standard deviation of each channel, shape (c,).
     """
     step = encoder_steps(stream.values)
-    coarse = step > COARSE * sigma
+    coarse = step > COARSE * sigmas
     if len(stream) < SMOOTHING or not np.any(coarse):
         return None
     period = float(np.median(np.diff(stream.times)))

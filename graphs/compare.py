@@ -138,8 +138,8 @@ def _sensor_prediction(
         at_samples[horizon][ahead[horizon][sensor.name].sample] = ahead[horizon][sensor.name].predicted
     return SensorPrediction(
         sensor.channels,
-        sensor.unit,
-        sensor.sigma,
+        sensor.units,
+        sensor.sigmas,
         stream.times,
         stream.values,
         open_loop[sensor.name],
@@ -173,7 +173,7 @@ def _channels(
             y = measured[p.sample, j]
             spread = float(np.linalg.norm(y - y.mean())) if len(y) else 0.0
             fit = 100.0 * (1.0 - float(np.linalg.norm(y - p.predicted[:, j])) / spread) if spread > 0 else float("nan")
-            found[channel] = ChannelComparison(horizons, fit, sensor.sigma, sensor.unit)
+            found[channel] = ChannelComparison(horizons, fit, float(sensor.sigmas[j]), sensor.units[j])
     return found
 
 
@@ -186,7 +186,7 @@ def _worst_windows(sensors: dict[str, SensorPrediction]) -> tuple[WorstWindow, .
     """The windows with the largest share of the squared error in sigmas."""
     found, total = [], 0.0
     for sensor in sensors.values():
-        squares = ((sensor.measured - sensor.ahead) / sensor.sigma) ** 2
+        squares = ((sensor.measured - sensor.ahead) / sensor.sigmas) ** 2
         t0 = float(sensor.times[0])
         index = ((sensor.times - t0) / WINDOW).astype(int)
         for j, channel in enumerate(sensor.channels):

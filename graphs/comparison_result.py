@@ -59,8 +59,8 @@ class SensorPrediction:
 
     Attributes:
         channels: names of the columns.
-        unit: SI unit.
-        sigma: standard deviation of the sensor.
+        units: SI unit of each.
+        sigmas: standard deviation of the sensor's noise, shape (c,).
         times: sample times, shape (m,) [s].
         measured: shape (m, c).
         open_loop: predicted from the first state with the recorded commands alone, shape (m, c).
@@ -69,8 +69,8 @@ class SensorPrediction:
     """
 
     channels: tuple[str, ...]
-    unit: str
-    sigma: float
+    units: tuple[str, ...]
+    sigmas: Array
     times: Array
     measured: Array
     open_loop: Array

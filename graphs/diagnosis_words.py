@@ -48,7 +48,9 @@ def _verdict(d: Diagnosis) -> str:
 
 
 def _explains(c: Candidate, d: Diagnosis) -> str:
-    values = ", ".join(f"{name} {p.value:.4g} +- {p.sigma:.2g} {p.unit}" for name, p in c.parameters.items())
+    values = ", ".join(
+        f"{name} {p.value:.4g} +- {p.sigma:.2g} {p.unit}".removesuffix(" 1") for name, p in c.parameters.items()
+    )
     text = (
         f"{title(c)} explains {100 * c.share:.0f} % of the squared error above the floor on validation blocks "
         f"({d.validation_error:.3g} to {c.validation_error:.3g} sigma){': ' if values else ''}{values}."

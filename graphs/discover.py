@@ -201,7 +201,7 @@ class _Search:
 
 def _is_idle(robot: Robot, here: EffectAt) -> bool:
     """Whether every size of an effect is free and compatible with its null value."""
-    sizes = [p for p in here.effect.parameters_of(robot, here.owner) if not p.is_shape]
+    sizes = [p for p in here.effect.parameters_at(robot, here.owner) if not p.is_shape]
     values = [robot.parameters[here.parameter(p.name)] for p in sizes]
     return bool(sizes) and all(
         not v.fixed and v.sigma is not None and abs(v.value - p.null) < SURE * v.sigma
@@ -221,6 +221,6 @@ def _why(diagnosis: Diagnosis) -> str:
 def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> str:
     start = f"{candidate.owner}.{candidate.effect}."
     own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
-    values = ", ".join(f"{name} {p.value:.4g} {p.unit}" for name, p in own)
+    values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
     what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
     return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma."

@@ -29,10 +29,10 @@ class JointSignals:
         joints: names of the n joints.
         motion: predicted motion.
         command: commands, shape (k, n).
-        still: speed below which the sign of a velocity counts as zero [rad/s].
+        still: speed of each joint below which the sign of its velocity counts as zero, shape (n,) [rad/s].
     """
 
-    def __init__(self, joints: tuple[str, ...], motion: JointStates, command: Stream, still: float):
+    def __init__(self, joints: tuple[str, ...], motion: JointStates, command: Stream, still: Array):
         self._joints, self._motion, self._command, self._still = joints, motion, command, still
 
     def at(self, times: Array) -> dict[str, Array]:

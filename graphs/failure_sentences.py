@@ -147,11 +147,14 @@ def _motion(where: Concentration, robot: Robot, regimes: MotionRegimes) -> str:
         return f"{_listed(joints, 'or')} is within {100 * NEAR:.0f} % of its range from a limit"
     bounds = [regimes.thresholds[where.regime][j] for j in where.joints]
     if where.regime == "fast":
-        each = [f"{joint} moves faster than {bound:.2g} rad/s" for joint, bound in zip(joints, bounds, strict=True)]
+        each = [
+            f"{joint} moves faster than {bound:.2g} {robot.unit_at(joint, 'rad/s')}"
+            for joint, bound in zip(joints, bounds, strict=True)
+        ]
     else:
         bearer = "the spring of {} carries" if regimes.load_unit == "N m" else "{} accelerates by"
         each = [
-            f"{bearer.format(joint)} more than {bound:.2g} {regimes.load_unit}"
+            f"{bearer.format(joint)} more than {bound:.2g} {robot.unit_at(joint, regimes.load_unit)}"
             for joint, bound in zip(joints, bounds, strict=True)
         ]
     return _listed(each, "or")

@@ -20,6 +20,7 @@ from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.white_noise import separate_noise
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.robots.units import of_slide
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ class MissingTorque:
         tau_spring: torque of each spring, shape (m, n) [N m].
         tau_drive: torque of each motor without friction, shape (m, n) [N m].
         explained_by: curves of the best candidates: label to torque of the row it acts on, shape (m, 2n).
+        slides: names of the prismatic joints, whose torques are forces [N] and whose angles are lengths [m].
     """
 
     joints: tuple[str, ...]
@@ -54,6 +56,11 @@ class MissingTorque:
     tau_spring: Array
     tau_drive: Array
     explained_by: dict[str, Array]
+    slides: tuple[str, ...] = ()
+
+    def unit(self, row_or_signal: str, unit: str) -> str:
+        """Unit of a quantity of the joint that a row or signal belongs to; `unit` is that of a joint that turns."""
+        return of_slide(unit) if row_or_signal.split(".")[0] in self.slides else unit
 
 
 @in_solver_context
@@ -115,6 +122,7 @@ def _answer(
         tau_spring=tau_spring,
         tau_drive=tau_drive,
         explained_by={label: explained_torque(other, label, problem, own) for label, other in explained_by.items()},
+        slides=problem.robot.tree.slides,
     )
 
 

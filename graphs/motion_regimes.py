@@ -39,14 +39,14 @@ class MotionRegimes:
         times: shape (m,) [s].
         masks: by name of REGIMES, shape (m, n), one column per joint; shape (m, 1) for those of the whole robot.
         thresholds: lower bound of |v| for "fast" [rad/s] and of |load| for "loaded" [N m or rad/s^2], shape (n,).
-        still: speed below which a joint cannot be told from one that stands still [rad/s].
+        still: speed below which each joint cannot be told from one that stands still, shape (n,) [rad/s or m/s].
         load_unit: "N m" of the spring, or "rad/s^2" where the model has no springs.
     """
 
     times: Array
     masks: Mapping[str, Mask]
     thresholds: Mapping[str, Array]
-    still: float
+    still: Array
     load_unit: str
 
     def at(self, times: Array) -> dict[str, Mask]:
@@ -70,7 +70,7 @@ def motion_regimes(robot: Robot, motion: JointStates) -> MotionRegimes:
     loaded = _upper(np.where(np.any(speed > still, axis=1, keepdims=True), np.abs(load), np.nan))
     masks = {
         "standstill": np.all(speed <= still, axis=1, keepdims=True),
-        "reversal": np.column_stack([_reversals(motion.times, v, still) for v in motion.v.T]),
+        "reversal": np.column_stack([_reversals(motion.times, v, s) for v, s in zip(motion.v.T, still, strict=True)]),
         "fast": speed >= fast,
         "loaded": np.abs(load) >= loaded,
         "near limits": _near_limits(motion.q, robot.tree.limits),
@@ -79,10 +79,12 @@ def motion_regimes(robot: Robot, motion: JointStates) -> MotionRegimes:
     return MotionRegimes(motion.times, masks, {"fast": fast, "loaded": loaded}, still, load_unit)
 
 
-def slowest_visible_speed(robot: Robot) -> float:
-    """Speed that encoders over 50 ms, or a gyro, tell from zero [rad/s]."""
-    sigmas = [np.sqrt(2.0) * robot.motor_encoder.sigma / SPEED_WINDOW, *(gyro.sigma for gyro in robot.gyros)]
-    return SIGMAS * float(min(sigmas))
+def slowest_visible_speed(robot: Robot) -> Array:
+    """Speed that encoders over 50 ms, or a gyro, tell from zero, shape (n,) [rad/s, of a prismatic joint m/s]."""
+    by_encoder = np.sqrt(2.0) * robot.motor_encoder.sigmas / SPEED_WINDOW
+    by_gyro = min((gyro.sigma for gyro in robot.gyros), default=np.inf)
+    slides = np.isin(robot.joints, robot.tree.slides)
+    return SIGMAS * np.where(slides, by_encoder, np.minimum(by_encoder, by_gyro))
 
 
 def _load(motion: JointStates) -> tuple[Array, str]:

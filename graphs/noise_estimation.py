@@ -31,7 +31,7 @@ from jointscope.robots.robot import ProcessNoise
 
 Array = NDArray[np.float64]
 
-SMALLEST_DENSITY = 1e-3  # [rad/s/sqrt(s)] below this, rounding in the Hessian and the integration error take over
+SMALLEST_MEMORY = 1e-3  # density of a memory that is estimated, too
 CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
 FAR = 5.0  # [sigma times misfit] a Gauss-Newton step beyond this is checked and damped
 LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at the most
@@ -88,11 +88,13 @@ def scaled(noise: ProcessNoise, factors: Array, memories: int = 0) -> ProcessNoi
         factors, [len(noise.link_velocity), len(noise.link_velocity) + len(noise.motor_velocity)]
     )
     kept = len(noise.memory) - memories
-    free = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_DENSITY)
+    free = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_MEMORY)
+    velocities = np.concatenate([noise.link_velocity * link, noise.motor_velocity * motor])
+    links, motors = np.split(np.maximum(velocities, noise.smallest), [len(link)])
     return replace(
         noise,
-        link_velocity=np.maximum(noise.link_velocity * link, SMALLEST_DENSITY),
-        motor_velocity=np.maximum(noise.motor_velocity * motor, SMALLEST_DENSITY),
+        link_velocity=links,
+        motor_velocity=motors,
         memory=np.concatenate([noise.memory[:kept], free]),
     )
 

@@ -71,6 +71,6 @@ def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, 
     found = []
     for name, sensor in problem.robot.sensors.items():
         factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
-        J = factor.linearize((x,), calibration).by_state[0] / sensor.sigma
+        J = factor.linearize((x,), calibration).by_state[0] / sensor.sigmas[:, None]
         found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
     return np.hstack(found)

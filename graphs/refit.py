@@ -17,7 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
 from jointscope.graphs.batch_solver import Estimate, solve
-from jointscope.graphs.noise_estimation import estimate_noise
+from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
 from jointscope.graphs.posterior import posteriors
 from jointscope.graphs.score_test import TrialScore
 from jointscope.robots.effect_editing import add_effect
@@ -29,6 +29,7 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 
 FOLLOWING, FIRST_ITERATIONS, LAST_ITERATIONS, NOISE_CYCLES = 6, 8, 8, 6
+EASY = 0.05  # [rad/s/sqrt(s), m/s/sqrt(s)] smallest densities with which a refit begins
 ENOUGH = 0.3  # [sigma] last step of a refit
 SMALLEST_START = 0.05  # of the start value: where a logarithmic size begins if the score test wants less
 
@@ -69,12 +70,14 @@ def refit(base: BaseModel, spans: Sequence[Span], score: TrialScore | None, labe
         robot = add_effect(robot, score.trial.label, start_of(score, robot))
     elif label:
         robot = add_effect(robot, label)
-    problems, estimate = _pieces(base, robot, spans)
+    # noise that is next to nothing holds the states where the model without the effect has them
+    noise = scaled(robot.noise, np.maximum(EASY / densities(robot.noise), 1.0)) if robot.noise.estimate else robot.noise
+    problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
     if score is not None or label:
         # the states still are those of a model without the effect: they follow before all parameters move
         estimate = solve(problems, estimate, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
     solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
-    noise, estimate = robot.noise, solution.estimate
+    estimate = solution.estimate
     if noise.estimate:
         noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
     if any(isinstance(here.effect, TimeShift) for here in robot.effects):
@@ -100,7 +103,7 @@ def start_of(score: TrialScore, robot: Robot) -> dict[str, float]:
     here, start = score.trial.here, {}
     for size, value in zip(score.trial.sizes, score.estimate, strict=True):
         start[size.name] = max(float(value), SMALLEST_START * size.start) if size.logarithmic else float(value)
-    known = {p.name for p in here.effect.parameters_of(robot, here.owner)}
+    known = {p.name for p in here.effect.parameters_at(robot, here.owner)}
     start |= {name: value for name, value in score.trial.shapes.items() if name in known}
     if isinstance(here.effect, Structure) and here.effect.form == "bearing":
         start |= _bearing_start(score, robot)
@@ -111,7 +114,7 @@ def _bearing_start(score: TrialScore, robot: Robot) -> dict[str, float]:
     """Inertia and damping that give the best resonance with the predicted compliance."""
     here, start = score.trial.here, {}
     omega, ratio = 2.0 * np.pi * score.trial.shapes["frequency"], score.trial.shapes["damping_ratio"]
-    usual = {p.name: p.start for p in here.effect.parameters_of(robot, here.owner)}
+    usual = {p.name: p.start for p in here.effect.parameters_at(robot, here.owner)}
     for axis, size, value in zip("xy", score.trial.sizes, score.estimate, strict=True):
         compliance = max(float(value), SMALLEST_START * size.start)
         inertia = float(

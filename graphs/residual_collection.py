@@ -40,13 +40,15 @@ class SensorResiduals:
     freedom: Array
 
     @staticmethod
-    def of(part: ResidualPart, sigma: float) -> SensorResiduals:
-        """Residuals of a factor's part against the sensor's own sigma.
+    def of(part: ResidualPart, sensor: Sensor) -> SensorResiduals:
+        """Residuals of a factor's part against the sensor's own sigmas.
 
         Samples of a quantized encoder that share one error count for less in the fit; each of them alone still has
         the sensor's sigma, and the fit hardly follows it.
         """
         sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
+        own = dict(zip(sensor.channels, sensor.sigmas.tolist(), strict=True))
+        sigma = np.array([own.get(row, sensor.sigmas[0]) for row in part.factor.rows])  # a gyro's forms have own rows
         residual = part.residual * sigmas
         freedom = np.where(sigmas > sigma * (1.0 + 1e-9), 1.0, 1.0 - part.leverage)
         expected = np.minimum(sigmas, sigma) * np.sqrt(np.clip(freedom, 1e-6, 1.0))
@@ -95,9 +97,7 @@ def collect(
             rates = problem.robot.layout.n_rates
             collected.process.append(((part.residual * sigmas)[:, :rates], expected[:, :rates]))
         elif part.factor.name in collected.series:
-            collected.series[part.factor.name].append(
-                SensorResiduals.of(part, problem.robot.sensors[part.factor.name].sigma)
-            )
+            collected.series[part.factor.name].append(SensorResiduals.of(part, problem.robot.sensors[part.factor.name]))
     return collected
 
 
@@ -105,6 +105,7 @@ def series_of(problem: BagProblem, sensor: Sensor, parts: list[SensorResiduals])
     """Residuals of one sensor in the order of time."""
     rows = parts[0].rows
     channels = sensor.channels if set(rows) <= set(sensor.channels) else rows
+    units = dict(zip(sensor.channels, sensor.units, strict=True))
     stream = problem.recording.streams[sensor.name]
     times = np.concatenate([p.times for p in problem.sensors if p.factor.name == sensor.name])
     table = np.full((3, len(stream), len(channels)), np.nan)
@@ -121,7 +122,7 @@ def series_of(problem: BagProblem, sensor: Sensor, parts: list[SensorResiduals])
     residual, expected, measured = table[:, seen]
     return ResidualSeries(
         channels=channels,
-        unit=sensor.unit,
+        units=tuple(units.get(channel, sensor.units[0]) for channel in channels),
         times=stream.times[seen],
         measured=measured,
         predicted=measured + residual,

@@ -36,6 +36,7 @@ class ResidualMap:
         centers: of the bins that hold enough samples, shape (k,) [unit].
         low, median, high: quartiles of the torque, shape (k,) each [N m].
         explained: median of what a candidate explains, by label, shape (k,) each [N m].
+        torque_unit: of the torque, a force at a prismatic joint.
         telling: share of the variance between the bins beyond that of shifted signals, -1 to 1.
     """
 
@@ -48,6 +49,7 @@ class ResidualMap:
     high: Array
     explained: Mapping[str, Array]
     telling: float
+    torque_unit: str = "N m"
 
     @property
     def own(self) -> bool:
@@ -63,7 +65,7 @@ def residual_maps(missing: MissingTorque) -> list[ResidualMap]:
         torque = missing.torque[::stride, i]
         explained = {label: curve[::stride, i] for label, curve in missing.explained_by.items() if np.any(curve[:, i])}
         for name, unit, values in _signals(missing, row.rsplit(".", 1)[-1]):
-            found = _map(row, name, unit, values[::stride], torque, explained)
+            found = _map(missing.unit(row, "N m"), row, name, unit, values[::stride], torque, explained)
             if found is not None:
                 maps.append(found)
     return sorted(maps, key=lambda m: -m.telling)
@@ -78,11 +80,15 @@ def _signals(missing: MissingTorque, side: str) -> list[tuple[str, str, Array]]:
         ("deflection", "rad", missing.q_link - missing.q_motor),
         ("load", "N m", missing.tau_spring),
     )
-    return [(f"{joint}.{name}", unit, x[:, j]) for j, joint in enumerate(missing.joints) for name, unit, x in kinds]
+    return [
+        (f"{joint}.{name}", missing.unit(joint, unit), x[:, j])
+        for j, joint in enumerate(missing.joints)
+        for name, unit, x in kinds
+    ]
 
 
 def _map(
-    row: str, name: str, unit: str, signal: Array, torque: Array, explained: Mapping[str, Array]
+    torque_unit: str, row: str, name: str, unit: str, signal: Array, torque: Array, explained: Mapping[str, Array]
 ) -> ResidualMap | None:
     edges = _edges(signal)
     if edges is None:
@@ -96,7 +102,7 @@ def _map(
     centers = 0.5 * (edges[1:] + edges[:-1])[bins]
     by_chance = max(_between(np.roll(place, round(s * len(place))), torque, len(edges) - 1) for s in SHIFTS)
     telling = _between(place, torque, len(edges) - 1) - by_chance
-    return ResidualMap(row, name, unit, centers, low, median, high, curves, telling)
+    return ResidualMap(row, name, unit, centers, low, median, high, curves, telling, torque_unit)
 
 
 def _edges(signal: Array) -> Array | None:

@@ -82,7 +82,7 @@ def _place_on_time(
     h = timeline.h[step]
     nearest = step + (fraction > 0.5)
     distance = np.abs(stream.times - timeline.ticks[nearest])
-    aligned = distance * _rate_of_change(stream) < ALIGNED * sensor.sigma
+    aligned = np.all(distance[:, None] * _rate_of_change(stream) < ALIGNED * sensor.sigmas, axis=1)
     placed = []
     if np.any(aligned):
         factor = _some(_sensor_factor(robot, recording, name, stream, aligned), channels, sensor)
@@ -106,16 +106,16 @@ def _values(robot: Robot) -> dict[str, float]:
 
 
 def _rate_of_change(stream: Stream) -> Array:
-    """How fast the fastest channel changes around each sample, shape (m,) [unit/s]."""
+    """How fast each channel changes around each sample, shape (m, c) [unit/s]."""
     if len(stream) < 3:
-        return np.full(len(stream), np.inf)
-    return np.abs(np.gradient(stream.values, stream.times, axis=0)).max(axis=1)
+        return np.full(stream.values.shape, np.inf)
+    return np.abs(np.gradient(stream.values, stream.times, axis=0))
 
 
 def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
     sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
     if isinstance(sensor, MotorEncoder | LinkEncoder):
-        factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigma)
+        factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)
         return factor if shared is None else RescaledFactor(factor, shared[chosen])
     assert isinstance(sensor, Gyro)
     if sensor.form == "full":

@@ -58,7 +58,7 @@ def trials_of(robot: Robot, scanned_orders: Mapping[str, Sequence[float]] | None
             if isinstance(effect, Structure) and effect.form == "integration":
                 found.append(Trial(here, (WHOLE_DEFECT,)))
                 continue
-            parameters = effect.parameters_of(robot, owner)
+            parameters = effect.parameters_at(robot, owner)
             sizes = tuple(p for p in parameters if not p.is_shape)
             for shapes in _grid(here, parameters, scanned_orders or {}):
                 found.append(Trial(here, sizes, shapes))

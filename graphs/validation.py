@@ -83,7 +83,7 @@ def _squares(problem: BagProblem, ahead: dict[str, Ahead], span: Span, horizon: 
         stream, p = problem.recording.streams[name], ahead[name]
         times = stream.times[p.sample]
         inside = (times >= span.t0 + horizon) & (times <= span.t1)
-        error = (stream.values[p.sample[inside]] - p.predicted[inside]) / sensor.sigma
+        error = (stream.values[p.sample[inside]] - p.predicted[inside]) / sensor.sigmas
         good = np.isfinite(error)
         columns.append(np.array([np.sum(np.where(good, error, 0.0) ** 2, axis=0), np.sum(good, axis=0)]))
     return np.hstack(columns)

@@ -69,7 +69,7 @@ def judge(
     robot, refit = trialled.refit.robot, trialled.refit
     parameters = {
         p.name: EffectEstimate(robot.parameters[here.parameter(p.name)].value, refit.sigmas.get(p.name, np.nan), p.unit)
-        for p in here.effect.parameters_of(robot, here.owner)
+        for p in here.effect.parameters_at(robot, here.owner)
     }
     share = excess_share(base.error, trialled.validation.error, SENSOR_FLOOR)
     bic = _bic(base.error, trialled.validation.error, len(parameters), seconds)

@@ -16,7 +16,7 @@ from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
-from jointscope.robots.noise_section import HINGE_DENSITY
+from jointscope.robots.noise_section import HINGE_DENSITY, smallest_densities
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.robot import ProcessNoise, Robot
 from jointscope.robots.yaml_comments import remove_at
@@ -47,7 +47,7 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
     parameters = dict(robot.parameters)
     document = copy.deepcopy(robot.document)
     document.setdefault("effects", CommentedSeq()).append(label)
-    for p in effect.parameters_of(robot, owner):
+    for p in effect.parameters_at(robot, owner):
         parameter = parameter_of(here, p, (start or {}).get(p.name, p.start))
         parameters[parameter.name] = parameter
         document["parameters"][parameter.name] = _entry(parameter)
@@ -141,6 +141,7 @@ def carried_noise(old: Robot, new: Robot) -> ProcessNoise:
         link_velocity=np.array([link.get(name, HINGE_DENSITY) for name in after.links]),
         motor_velocity=np.array([motor.get(name, link.get(name, HINGE_DENSITY)) for name in after.motors]),
         memory=np.array([memory.get(label, m.noise) for label, m in new.memories.items()]),
+        smallest=smallest_densities(new),
     )
 
 

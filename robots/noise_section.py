@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.robot import ProcessNoise, Robot
 from jointscope.robots.yaml_section import Section
 
+Array = NDArray[np.float64]
+
+SMALLEST_TURNING, SMALLEST_SLIDING = 1e-3, 1e-5  # [rad/s/sqrt(s)], [m/s/sqrt(s)]
 HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
 
 
@@ -45,4 +49,11 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
         motor_velocity=np.array([motor[name] for name in layout.motors]),
         position=section.number("position", positive=True) if model == "independent" else 0.0,
         memory=np.array(memory),
+        smallest=smallest_densities(robot),
     )
+
+
+def smallest_densities(robot: Robot) -> Array:
+    """Densities below which none is estimated, link before motor, shape (n_link + n_motor,)."""
+    slides = np.isin([*robot.layout.links, *robot.layout.motors], robot.tree.slides)
+    return np.where(slides, SMALLEST_SLIDING, SMALLEST_TURNING)

@@ -42,8 +42,9 @@ def position_controller(section: Section, source: Topic, joints: tuple[str, ...]
     Raises:
         RobotError: not an angle, another number of gains than of joints, or gains and a limit that are not positive.
     """
-    if si_unit(source.unit) != "rad":
-        raise RobotError(f"{section.place}.unit: a goal position is an angle, got {source.unit!r}")
+    for unit in source.units or (source.unit,):
+        if si_unit(unit) not in ("rad", "m"):
+            raise RobotError(f"{section.place}.unit: a goal position is an angle or a length, got {unit!r}")
     gain = section.array("gain", (len(joints),))
     if np.any(gain <= 0.0):
         raise RobotError(f"{section.place}.gain: expected numbers above zero")

@@ -73,6 +73,12 @@ class RigidTree:
         return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
 
     @property
+    def slides(self) -> tuple[str, ...]:
+        """Names of the prismatic joints, whose positions are lengths [m] and whose torques are forces [N]."""
+        kinds = {name: joint.shortname() for name, joint in zip(self.model.names, self.model.joints, strict=True)}
+        return tuple(joint for joint in self.joints if kinds[joint].startswith("JointModelP"))
+
+    @property
     def limits(self) -> Array:
         """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none."""
         lower, upper = np.array(self.model.lowerPositionLimit), np.array(self.model.upperPositionLimit)

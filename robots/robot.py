@@ -26,6 +26,7 @@ from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.state_layout import StateLayout
 from jointscope.robots.structured_tree import bearing_names, with_bearings
+from jointscope.robots.units import joined, of_slide
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,8 @@ class ProcessNoise:
         motor_velocity: density of each motor equation, shape (n_motor,) [rad/s/sqrt(s)].
         memory: density of each memory of the state, shape (n_memory,).
         position: density of the positions for model "independent" [rad/sqrt(s)].
+        smallest: of link and motor velocities, below which rounding in the Hessian and the integration error take over,
+            shape (n_link + n_motor,).
     """
 
     estimate: bool
@@ -74,6 +77,7 @@ class ProcessNoise:
     motor_velocity: Array
     position: float = 0.0
     memory: Array = field(default_factory=lambda: np.zeros(0))
+    smallest: Array = field(default_factory=lambda: np.array(1e-3))
 
 
 @dataclass(frozen=True)
@@ -183,6 +187,14 @@ class Robot:
         """States that effects bring along, by the label of the effect, in the order of the layout."""
         laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
         return {label: law.memory for label, law in laws if law.memory is not None}
+
+    def unit_at(self, joint: str, unit: str) -> str:
+        """The unit of a quantity at a joint, where `unit` is that at a joint that turns."""
+        return of_slide(unit) if joint in self.tree.slides else unit
+
+    def unit(self, unit: str) -> str:
+        """The units of a quantity of all joints, where `unit` is that at joints that turn: "rad", "m" or "rad, m"."""
+        return joined([self.unit_at(joint, unit) for joint in self.joints])
 
     def has_effect(self, effect_id: str, owner: str) -> bool:
         """Whether an effect is part of the robot."""

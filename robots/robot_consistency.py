@@ -31,6 +31,7 @@ def check_robot(robot: Robot) -> None:
                 f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
             )
     _check_names(robot, place)
+    _check_positions(robot, place)
     _check_gyro_forms(robot, place)
     if not any(isinstance(sensor, MotorEncoder) for sensor in robot.sensors.values()):
         raise RobotError(f"{place}: sensors: none of kind motor_encoder; the motor positions are needed")
@@ -76,6 +77,21 @@ def _check_names(robot: Robot, place: str) -> None:
         raise RobotError(f"{place}: sensors: expected one of kind motor_encoder, got {', '.join(encoders)}")
 
 
+def _check_positions(robot: Robot, place: str) -> None:
+    """Encoders measure angles of joints that turn and lengths of those that slide."""
+    for sensor in robot.sensors.values():
+        if not isinstance(sensor, MotorEncoder | LinkEncoder):
+            continue
+        given = sensor.source.units or (sensor.source.unit,) * robot.n
+        for joint, unit, got in zip(robot.joints, sensor.units, given, strict=True):
+            if unit != robot.unit_at(joint, "rad"):
+                kind, wanted = ("prismatic", "m or mm") if unit == "rad" else ("no prismatic joint", "rad, deg or turn")
+                raise RobotError(
+                    f"{place}: sensors.{sensor.name}.unit: {joint} is {kind} in {robot.tree.urdf.name}; expected "
+                    f"{wanted} for it, got {got!r}; where joints differ give one unit for each, as unit: [rad, m]"
+                )
+
+
 def _check_gyro_forms(robot: Robot, place: str) -> None:
     """The forms of the paper hold only where the first joint, and no other, moves the gyro or its reference."""
     by_name = {gyro.name: gyro for gyro in robot.gyros}
@@ -92,10 +108,13 @@ def _check_gyro_forms(robot: Robot, place: str) -> None:
 
 def _check_parameters(robot: Robot, place: str) -> None:
     """All parameters known, in their units, and none missing."""
-    units = {f"{owner}.{name}": unit for owner in ("motor", *robot.joints) for name, unit in DRIVE_PARAMETERS.items()}
-    units |= {f"{joint}.{name}": unit for joint in robot.joints for name, unit in JOINT_PARAMETERS.items()}
+    turning = next((joint for joint in robot.joints if joint not in robot.tree.slides), robot.joints[0])
+    units = {f"motor.{name}": robot.unit_at(turning, unit) for name, unit in DRIVE_PARAMETERS.items()}
+    for joint in robot.joints:
+        for name, unit in (DRIVE_PARAMETERS | JOINT_PARAMETERS).items():
+            units[f"{joint}.{name}"] = robot.unit_at(joint, unit)
     of_effects = {
-        here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_of(robot, here.owner)
+        here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_at(robot, here.owner)
     }
     units |= of_effects
     for name, parameter in robot.parameters.items():

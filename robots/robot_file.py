@@ -111,7 +111,7 @@ def with_effects(robot: Robot, labels: Sequence[str]) -> Robot:
         found.append(EffectAt(effect, owner))
     parameters = dict(robot.parameters)
     for here in found:
-        for p in here.effect.parameters_of(robot, here.owner):
+        for p in here.effect.parameters_at(robot, here.owner):
             name = here.parameter(p.name)
             if name in parameters:
                 null = None if p.is_shape else p.null

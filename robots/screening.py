@@ -70,7 +70,7 @@ def joints_without_motion(recording: Recording, robot: Robot) -> tuple[str, ...]
     """Joints whose motor encoder shows nothing but noise."""
     encoder = robot.motor_encoder
     span = np.ptp(recording.streams[encoder.name].values, axis=0)
-    moved = span > max(MOVED_ANGLE, MOVED_SIGMAS * encoder.sigma)
+    moved = span > np.maximum(MOVED_ANGLE, MOVED_SIGMAS * encoder.sigmas)
     return tuple(joint for joint, yes in zip(robot.joints, moved, strict=True) if not yes)
 
 
@@ -162,10 +162,11 @@ def _check_changes(recording: Recording, stream: Stream, robot: Robot) -> None:
     constant = np.ptp(stream.values, axis=0) == 0
     if stream.name == robot.motor_encoder.name:
         constant &= np.ptp(recording.command.values, axis=0) > 0
-    for dead, channel, value in zip(constant, stream.channels, stream.values[0], strict=True):
+    units = robot.sensors[stream.name].units
+    for dead, channel, unit, value in zip(constant, stream.channels, units, stream.values[0], strict=True):
         if dead:
             raise RecordingError(
-                f"{channel} never changes: {value:.6g} {stream.unit} in all {len(stream)} samples; expected at least "
+                f"{channel} never changes: {value:.6g} {unit} in all {len(stream)} samples; expected at least "
                 "noise: the sensor is dead or another field holds its values"
             )
 
@@ -174,29 +175,30 @@ def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
     """Angles and speeds against the limits of the URDF: degrees instead of radians show here."""
     limits = robot.tree.limits
     notices = []
-    for what, unit, seen, allowed in (
+    for what, turning_unit, seen, allowed in (
         ("spans", "rad", np.ptp(motion.q, axis=0), limits[:, 1] - limits[:, 0]),
         ("moves at", "rad/s", np.abs(motion.v).max(axis=0), robot.tree.velocity_limits),
     ):
         share = seen / allowed
         k = int(np.argmax(share))
-        channel = f"{robot.joints[k]}.motor_position"
+        channel, unit = f"{robot.joints[k]}.motor_position", robot.unit_at(robot.joints[k], turning_unit)
         text = f"{channel} {what} {seen[k]:.4g} {unit}; {robot.tree.urdf.name} allows {allowed[k]:.4g} {unit}"
         if share[k] > IMPOSSIBLE:
-            raise RecordingError(f"{text}; {_unit_hint(robot, float(share[k]))}")
+            raise RecordingError(f"{text}; {_unit_hint(robot, k, float(share[k]))}")
         if share[k] > BEYOND_LIMIT:
             notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
     return notices
 
 
-def _unit_hint(robot: Robot, excess: float) -> str:
-    """Which unit would bring the angles back to what is allowed."""
-    source = robot.motor_encoder.source
-    place = f"`unit` of sensors.{robot.motor_encoder.name} in the robot file (now {source.unit})"
+def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
+    """Which unit would bring the positions of a joint back to what is allowed."""
+    encoder = robot.motor_encoder
+    now = (encoder.source.units or (encoder.source.unit,) * robot.n)[joint]
+    place = f"`unit` of sensors.{encoder.name} in the robot file (now {now})"
     for unit in UNITS:
-        if si_unit(unit) == "rad" and excess * si_factor(unit) / si_factor(source.unit) <= BEYOND_LIMIT:
+        if si_unit(unit) == si_unit(now) and excess * si_factor(unit) / si_factor(now) <= BEYOND_LIMIT:
             word = {"deg": "degrees", "rad": "radians"}.get(unit, unit)
-            return f"the angles look like {word}: set {place} to {unit}"
+            return f"the {'angles' if si_unit(now) == 'rad' else 'positions'} look like {word}: set {place} to {unit}"
     return f"check {place}"
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +32,28 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     Raises:
         RobotError: another number of names than of joints.
     """
-    unit = section.text("unit", choices=units or tuple(UNITS))
+    known = units or tuple(UNITS)
+    each = _unit_of_each(section, joints, known) if scaled else ()
+    unit = each[0] if each else section.text("unit", choices=known)
     names = section.texts("names", joints)
     if joints and len(names) != len(joints):
         raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
     scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
     wraps = section.number("wraps", None, positive=True) if scaled else None
     place = section.text("topic"), section.text("type"), section.text("field")
-    return Topic(*place, unit, names, scale, wraps or 0.0)
+    return Topic(*place, unit, names, scale, wraps or 0.0, each)
+
+
+def _unit_of_each(section: Section, joints: tuple[str, ...], known: tuple[str, ...]) -> tuple[str, ...]:
+    """Units given joint by joint, as turning and sliding ones need; empty where there is one for all."""
+    if isinstance(section.raw("unit"), str) or "unit" not in section:
+        return ()
+    each = section.texts("unit")
+    wrong = [unit for unit in each if unit not in known]
+    if wrong or len(each) != len(joints):
+        got = repr(wrong[0]) if wrong else f"{len(each)} units"
+        raise RobotError(f"{section.place}.unit: expected one unit or {len(joints)} of {', '.join(known)}, got {got}")
+    return each
 
 
 def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
@@ -61,21 +75,31 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
     return make
 
 
-def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
+def _position(section: Section, joints: tuple[str, ...]) -> tuple[Topic, Array]:
+    """Topic of an encoder, and its sigma for each joint: one number for all, or a list."""
     source = topic(section, joints, scaled=True)
-    if si_unit(source.unit) != "rad":
-        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
+    for unit in source.units or (source.unit,):
+        if si_unit(unit) not in ("rad", "m"):
+            raise RobotError(f"{section.place}.unit: an encoder measures an angle or a length, got {unit!r}")
+    if not isinstance(section.raw("sigma"), Sequence):
+        return source, np.full(len(joints), section.number("sigma", positive=True))
+    sigmas = section.array("sigma", (len(joints),))
+    if np.any(sigmas <= 0.0):
+        raise RobotError(f"{section.place}.sigma: expected numbers above zero")
+    return source, sigmas
+
+
+def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
+    source, sigmas = _position(section, joints)
     zero_known = section.raw("zero") != UNKNOWN
     zero = section.array("zero", (len(joints),), np.zeros(len(joints))) if zero_known else np.zeros(len(joints))
-    return MotorEncoder(name, source, section.number("sigma", positive=True), zero, joints, zero_known)
+    return MotorEncoder(name, source, sigmas, zero, joints, zero_known)
 
 
 def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:
-    source = topic(section, joints, scaled=True)
-    if si_unit(source.unit) != "rad":
-        raise RobotError(f"{section.place}.unit: an encoder measures an angle, got {source.unit!r}")
+    source, sigmas = _position(section, joints)
     zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
-    return LinkEncoder(name, source, section.number("sigma", positive=True), zero, joints)
+    return LinkEncoder(name, source, sigmas, zero, joints)
 
 
 def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> TorqueSensor:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.units import si_factor, si_unit
+
 AXES = ("x", "y", "z")
 
 
@@ -20,6 +22,7 @@ class Topic:
         msgtype: ROS type, for example "sensor_msgs/msg/JointState".
         field: field of the message that holds the sample, dots descend ("angular_velocity").
         unit: unit in the bag; converted to SI when read.
+        units: unit of each joint where they are not all the same; empty where `unit` is that of all.
         names: name in the message for each joint of the robot, in the robot's order; empty for streams without names.
         scale: factor on the value of each joint, such as the ratio of its gear; empty for none.
         wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
@@ -32,6 +35,17 @@ class Topic:
     names: tuple[str, ...] = ()
     scale: tuple[float, ...] = ()
     wraps: float = 0.0
+    units: tuple[str, ...] = ()
+
+    @property
+    def factor(self) -> NDArray[np.float64]:
+        """From values in the bag to SI units, shape (c,) or ()."""
+        by_unit = np.array([si_factor(unit) for unit in self.units]) if self.units else np.array(si_factor(self.unit))
+        return by_unit * np.asarray(self.scale or 1.0)
+
+    def si_units(self, channels: int) -> tuple[str, ...]:
+        """SI unit of each of the channels."""
+        return tuple(si_unit(unit) for unit in self.units or (self.unit,) * channels)
 
 
 @dataclass(frozen=True)
@@ -41,15 +55,15 @@ class MotorEncoder:
     Attributes:
         name: key in the robot file.
         source: topic.
-        sigma: standard deviation of the noise [rad].
-        zero: reading at q_motor = 0, shape (n_joints,) [rad].
+        sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
+        zero: reading at q_motor = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
         zero_known: False for an incremental encoder, whose zero is another one in each recording.
     """
 
     name: str
     source: Topic
-    sigma: float
+    sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
     zero_known: bool = True
@@ -60,9 +74,9 @@ class MotorEncoder:
         return tuple(f"{joint}.motor_position" for joint in self.joints)
 
     @property
-    def unit(self) -> str:
-        """SI unit of a sample."""
-        return "rad"
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each channel."""
+        return self.source.si_units(len(self.joints))
 
 
 @dataclass(frozen=True)
@@ -72,14 +86,14 @@ class LinkEncoder:
     Attributes:
         name: key in the robot file.
         source: topic.
-        sigma: standard deviation of the noise [rad].
-        zero: reading at q_link = 0, shape (n_joints,) [rad].
+        sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
+        zero: reading at q_link = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
     """
 
     name: str
     source: Topic
-    sigma: float
+    sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
 
@@ -89,9 +103,9 @@ class LinkEncoder:
         return tuple(f"{joint}.link_position" for joint in self.joints)
 
     @property
-    def unit(self) -> str:
-        """SI unit of a sample."""
-        return "rad"
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each channel."""
+        return self.source.si_units(len(self.joints))
 
 
 @dataclass(frozen=True)
@@ -116,9 +130,14 @@ class TorqueSensor:
         return tuple(f"{joint}.joint_torque" for joint in self.joints)
 
     @property
-    def unit(self) -> str:
-        """SI unit of a sample."""
-        return "N m"
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each channel."""
+        return ("N m",) * len(self.joints)
+
+    @property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Standard deviation of the noise of each channel, shape (n_joints,) [N m]."""
+        return np.full(len(self.joints), self.sigma)
 
 
 @dataclass(frozen=True)
@@ -161,9 +180,14 @@ class Gyro:
         return tuple(f"{self.name}.{axis}" for axis in AXES)
 
     @property
-    def unit(self) -> str:
-        """SI unit of a sample."""
-        return "rad/s"
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each channel."""
+        return ("rad/s",) * 3
+
+    @property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Standard deviation of the noise of each channel, shape (3,) [rad/s]."""
+        return np.full(3, self.sigma)
 
 
 Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro

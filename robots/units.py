@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 UNITS: dict[str, tuple[str, float]] = {
     "rad": ("rad", 1.0),
     "deg": ("rad", math.pi / 180.0),
     "turn": ("rad", 2.0 * math.pi),
+    "m": ("m", 1.0),
+    "mm": ("m", 1e-3),
     "rad/s": ("rad/s", 1.0),
     "deg/s": ("rad/s", math.pi / 180.0),
     "rpm": ("rad/s", 2.0 * math.pi / 60.0),
@@ -18,6 +21,33 @@ UNITS: dict[str, tuple[str, float]] = {
     "N m": ("N m", 1.0),
 }
 """Unit in a bag: its SI unit and the factor that turns a value into it."""
+
+
+OF_SLIDES: dict[str, str] = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "rad/s^2": "m/s^2",
+    "rad/rad": "1",
+    "rad/(N m)": "m/N",
+    "N m": "N",
+    "N m/V": "N/V",
+    "N m/A": "N/A",
+    "N m/rad": "N/m",
+    "N m/rad^3": "N/m^3",
+    "N m s/rad": "N s/m",
+    "kg m2": "kg",
+}
+"""Units of a turning joint's quantities and what they are for a sliding one; all others are the same."""
+
+
+def joined(units: Sequence[str]) -> str:
+    """Different units once each, as one text: "rad, m"."""
+    return ", ".join(dict.fromkeys(units))
+
+
+def of_slide(unit: str) -> str:
+    """The unit of the same quantity at a prismatic joint."""
+    return OF_SLIDES.get(unit, unit)
 
 
 def si_unit(unit: str) -> str:

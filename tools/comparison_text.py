@@ -61,7 +61,7 @@ def _free_runs(result: ComparisonResult) -> str:
     lines = []
     for model in result.models:
         if model.free_run is not None:
-            factor, unit = prefixed(max(model.free_run.mean_abs.values()), "rad")
+            factor, unit = prefixed(max(model.free_run.mean_abs.values()), model.robot.unit("rad"))
             said = [f"{name} {significant(factor * e)} {unit}" for name, e in model.free_run.mean_abs.items()]
             lines.append(f"  {model.label}: {', '.join(said)}")
     return "\n".join(["Simulated with its position controller, mean absolute error:", *lines]) if lines else ""

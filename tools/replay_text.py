@@ -52,7 +52,7 @@ def _sensors(result: ReplayResult) -> str:
         for j, channel in enumerate(series.channels):
             r, s = series.residual[series.used, j], series.sigma[series.used, j]
             expected = float(np.nanmedian(s)) if np.isfinite(s).any() else float("nan")
-            factor, unit = prefixed(expected, series.unit)
+            factor, unit = prefixed(expected, series.units[j])
             rms = float(np.sqrt(np.nanmean(r**2))) if np.isfinite(r).any() else float("nan")
             nis = significant(series.channel_nis.get(channel, float("nan")))
             rows.append([channel, significant(factor * rms), significant(factor * expected), unit, nis])
@@ -66,7 +66,7 @@ def _states(result: ReplayResult) -> str:
     for i, name in enumerate(state_names(result.robot.layout)):
         now = float(np.median(result.states.sigma[:, i]))
         lagged = float(np.nanmedian(result.lagged.sigma[:, i])) if len(result.lagged.times) else float("nan")
-        factor, unit = prefixed(now, state_unit(name))
+        factor, unit = prefixed(now, state_unit(result.robot, name))
         rows.append([name, significant(factor * now), significant(factor * lagged), unit])
     return f"Sigma of the states, median:\n{text_table(['state', 'now', 'at the lag', 'unit'], rows, '<>><')}"
 

@@ -81,7 +81,7 @@ def checked_densities(robot: Robot, densities: Mapping[str, float]) -> dict[str,
         here.parameter(p.name): here.label
         for here in robot.effects
         if isinstance(here.effect, ReadingEffect | TimeShift | CommandEffect)
-        for p in here.effect.parameters_of(robot, here.owner)
+        for p in here.effect.parameters_at(robot, here.owner)
     }
     for name, density in densities.items():
         if name not in robot.parameters:

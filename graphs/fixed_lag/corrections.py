@@ -24,7 +24,7 @@ class Correction:
 
     Attributes:
         name: of the quantity.
-        unit: its SI unit.
+        unit: its SI unit at joints that turn.
         times: instants that both tell of, shape (m,) [s].
         difference: shape (m, n).
         sigma: of the newest state, shape (m, n).

@@ -87,13 +87,13 @@ def first_state(
         samples: encoder samples, in the order of time.
         walking: an earlier estimate whose biases and parameters go on; None for their priors.
     """
-    own, sigma = layout.robot, robot.motor_encoder.sigma
+    own, sigma = layout.robot, robot.motor_encoder.sigmas
     t = np.array([s.time for s in samples])
     q = np.array([s.q for s in samples])
     now, span = float(t[-1]), float(max(t[-1] - t[0], 1e-4))
     rests = bool(np.all(np.ptp(q, axis=0) < STILL * sigma))
     v = np.zeros(robot.n) if rests else np.polyfit(t - now, q, 1)[0]
-    v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span)
+    v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * float(np.max(sigma)) / span, 0.5 * ACCELERATION * span)
     mean, variance = np.zeros(layout.size), np.zeros(layout.size)
     mean[own.motor_q], mean[own.motor_v] = q[-1], v
     mean[own.joint_q], mean[own.joint_v] = q[-1], v

@@ -49,7 +49,7 @@ class InnovationSeries:
 
     Attributes:
         channels: names.
-        unit: of residual and sigma.
+        units: of residual and sigma of each channel.
         times: stamps, shape (m,) [s].
         residual: measured - predicted, shape (m, c) [unit]; NaN where a channel was not looked at.
         sigma: expected standard deviation, shape (m, c) [unit].
@@ -63,7 +63,7 @@ class InnovationSeries:
     """
 
     channels: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]
     times: Array
     residual: Array
     sigma: Array

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 CERTAIN = 1e-6  # probability of as many equal samples in a row by chance, below which a channel is saturated or dead
 FEWEST_EQUAL, MOST_EQUAL = 2, 20  # samples that repeat the one before
@@ -20,13 +21,12 @@ class SampleChecks:
     """Checks of one stream.
 
     Args:
-        channels: number of channels.
-        sigma: standard deviation of a sample; zero for commands.
+        sigmas: standard deviation of each channel of a sample; zeros for commands.
         noisy: whether equal samples in a row are impossible (a gyro).
     """
 
-    def __init__(self, channels: int, sigma: float, noisy: bool):
-        self._sigma, self._noisy = sigma, noisy
+    def __init__(self, sigmas: Sequence[float], noisy: bool):
+        self._sigmas, self._noisy, channels = tuple(sigmas), noisy, len(sigmas)
         self._stamps: set[float] = set()
         self._order: deque[float] = deque()
         self._last: list[float] = [float("nan")] * channels
@@ -93,7 +93,10 @@ class SampleChecks:
             self._recent.append((t, values, self._samples))
         enough = len(self._recent) > SMOOTHING
         # a reading that has never changed repeats one error, however large the encoder's step is
-        coarse = [step > COARSE * self._sigma and (enough or math.isinf(step)) for step in self._step]
+        coarse = [
+            step > COARSE * sigma and (enough or math.isinf(step))
+            for step, sigma in zip(self._step, self._sigmas, strict=True)
+        ]
         if not any(coarse):
             return None
         _, first, begin = self._recent[0]

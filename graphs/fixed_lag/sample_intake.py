@@ -38,11 +38,11 @@ class SampleIntake:
     def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
         self._robot, self._status, self._log, self._clock = robot, status, log, clock
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        self._checks = {"command": SampleChecks(robot.n, 0.0, False)}
-        self._sigmas = {name: np.full(len(s.channels), s.sigma) for name, s in robot.sensors.items()}
+        self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
+        self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
         for name, sensor in robot.sensors.items():
-            self._checks[name] = SampleChecks(len(sensor.channels), sensor.sigma, isinstance(sensor, Gyro))
+            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro))
 
     def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one."""

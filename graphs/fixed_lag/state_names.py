@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from jointscope.robots.robot import Robot
 from jointscope.robots.state_layout import StateLayout
 
 
@@ -17,6 +18,8 @@ def state_names(layout: StateLayout) -> tuple[str, ...]:
     )
 
 
-def state_unit(name: str) -> str:
+def state_unit(robot: Robot, name: str) -> str:
     """SI unit of a component; memories of effects have units of their own, which are not told."""
-    return {"q_link": "rad", "q_motor": "rad", "v_link": "rad/s", "v_motor": "rad/s"}.get(name.rsplit(".", 1)[-1], "")
+    owner, quantity = name.rsplit(".", 1)
+    turning = {"q_link": "rad", "q_motor": "rad", "v_link": "rad/s", "v_motor": "rad/s"}.get(quantity, "")
+    return robot.unit_at(owner, turning)

@@ -81,7 +81,7 @@ class TickLog:
     def innovations(self) -> dict[str, InnovationSeries]:
         """By sensor, in the order of the robot."""
         sensors = self._robot.sensors
-        return {n: self._innovations[n].series(sensors[n].unit) for n in sensors if n in self._innovations}
+        return {n: self._innovations[n].series(sensors[n].units) for n in sensors if n in self._innovations}
 
     def covariances(self) -> CovarianceSeries:
         """Covariance matrices of the newest states."""
@@ -184,7 +184,7 @@ class InnovationLog:
             row[4:] = np.nan
             row[4 : 4 + c][looked_at], row[4 + c :][looked_at] = innovation.residual, innovation.sigma
 
-    def series(self, unit: str) -> InnovationSeries:
+    def series(self, units: tuple[str, ...]) -> InnovationSeries:
         """The rows taken apart."""
         rows, c = self._rows.rows, len(self._channels)
         rows = rows[np.argsort(rows[:, 0], kind="stable")]  # late samples came after newer ones
@@ -192,7 +192,7 @@ class InnovationLog:
             by_channel = self._squares / self._used
         return InnovationSeries(
             channels=self._channels,
-            unit=unit,
+            units=units,
             times=rows[:, 0],
             residual=rows[:, 4 : 4 + c],
             sigma=rows[:, 4 + c :],

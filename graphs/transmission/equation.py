@@ -101,10 +101,12 @@ def gear_equation(s: JointSignals, robot: Robot, j: int) -> Equation:
         if robot.torque_sensor is None:  # friction stays on the motor's side of the gear
             columns[f"{joint}.motor_viscous.coefficient"] = -v
             columns[f"{joint}.coulomb_torque"] = -np.tanh(robot.choices.friction_sharpness * v)
-    sigma = float(np.hypot(robot.motor_encoder.sigma, encoder.sigma))
+    sigma = float(np.hypot(robot.motor_encoder.sigmas[j], encoder.sigmas[j]))
     constants = np.ones((len(q), 1, 1))
     shaped = {name: column[:, None] for name, column in columns.items()}
-    return Equation(f"{joint}.gear", "rad", sigma, s.times, s.deflection[:, [j]], constants, shaped, q)
+    return Equation(
+        f"{joint}.gear", robot.unit_at(joint, "rad"), sigma, s.times, s.deflection[:, [j]], constants, shaped, q
+    )
 
 
 def gyro_equation(recording: Recording, robot: Robot, gyro: Gyro, delay: float) -> Equation:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ class Effect(ABC):
         card: what a user reads.
         parameters: of every instance; kinds whose parameters depend on the owner override `parameters_of`.
         owners: kinds of owners: some of "joint", "gyro", "link_encoder", "robot".
+        turning: whether it can act only on joints that turn, not on prismatic ones.
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
     """
 
@@ -95,6 +96,7 @@ class Effect(ABC):
     card: Card
     parameters: tuple[EffectParameter, ...] = ()
     owners: tuple[str, ...] = ("joint",)
+    turning: bool = False
     example: Mapping[str, float] = field(default_factory=dict)
 
     def may_act_on(self, robot: Robot, owner: str) -> str:
@@ -106,9 +108,14 @@ class Effect(ABC):
         """Everything in a robot that the effect can act on."""
         on_links = () if robot.link_encoder is None else (robot.link_encoder.name,)
         gyros = tuple(g.name for g in robot.gyros)
-        by_kind = {"joint": robot.joints, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
+        joints = tuple(joint for joint in robot.joints if not (self.turning and joint in robot.tree.slides))
+        by_kind = {"joint": joints, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
         return tuple(owner for kind in self.owners for owner in by_kind[kind])
 
     def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
-        """Parameters of the instance at one owner."""
+        """Parameters of the instance at one owner, in the units of a joint that turns."""
         return self.parameters
+
+    def parameters_at(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+        """The same in the units of the owner."""
+        return tuple(replace(p, unit=robot.unit_at(owner, p.unit)) for p in self.parameters_of(robot, owner))

@@ -67,6 +67,7 @@ def _product(name: str) -> EffectParameter:
 
 EFFECT = BearingFlexibility(
     id="bearing_flexibility",
+    turning=True,
     form="bearing",
     parameters=(
         *(_size(f"compliance_{axis}", "rad/(N m)", 1.0 / 3000.0) for axis in "xy"),

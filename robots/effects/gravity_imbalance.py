@@ -19,6 +19,7 @@ def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
 
 EFFECT = JointTorque(
     id="gravity_imbalance",
+    turning=True,
     side="link",
     law=law,
     parameters=(

@@ -27,6 +27,7 @@ def change(inertia: Array) -> dict[str, Array]:
 
 EFFECT = InertiaEffect(
     id="inertia_error",
+    turning=True,
     change=change,
     parameters=tuple(EffectParameter(name, "kg m2", start=0.0, prior_sigma=10.0) for name in PLACES),
     example={"ixx": 0.03, "iyy": 0.04, "izz": 0.02},

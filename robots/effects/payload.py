@@ -28,6 +28,7 @@ def change(inertia: Array) -> dict[str, Array]:
 
 EFFECT = InertiaEffect(
     id="payload",
+    turning=True,
     change=change,
     last_only=True,
     parameters=(EffectParameter("inertia", "kg m2", start=0.01, prior_sigma=10.0, sign="+"),),

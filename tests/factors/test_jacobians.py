@@ -55,7 +55,7 @@ def _factors():
     encoder = MotorEncoderFactor(ROBOT.motor_encoder, rng.normal(size=(M, 3)), layout)
     gyro = GyroFactor(imu2, rates, tree, layout)
     yield "encoder", encoder
-    links = LinkEncoder("links", ROBOT.motor_encoder.source, 1e-4, rng.normal(size=3), ROBOT.joints)
+    links = LinkEncoder("links", ROBOT.motor_encoder.source, np.full(ROBOT.n, 1e-4), rng.normal(size=3), ROBOT.joints)
     yield "link encoder", LinkEncoderFactor(links, rng.normal(size=(M, 3)), layout)
     yield "gyro on the first body", GyroFactor(imu1, rates, tree, layout)
     yield "gyro on the last body", gyro

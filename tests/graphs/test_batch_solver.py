@@ -202,7 +202,9 @@ def test_filter_does_not_look_ahead(moving):
     cut = float(recording.command.times[120])
     streams = dict(recording.streams)
     encoder = streams["motor_encoder"]
-    changed = encoder.values + np.where(encoder.times[:, None] > cut, 20.0 * problems[0].robot.motor_encoder.sigma, 0.0)
+    changed = encoder.values + np.where(
+        encoder.times[:, None] > cut, 20.0 * problems[0].robot.motor_encoder.sigmas, 0.0
+    )
     streams["motor_encoder"] = Stream("motor_encoder", encoder.times, changed, encoder.channels, encoder.unit)
     other = BagProblem.of(problems[0].robot, Recording("changed", "", 0, streams))
     results = []

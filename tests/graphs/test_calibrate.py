@@ -165,7 +165,7 @@ def test_joint_that_never_moves_is_an_error_that_names_its_parameters(simulated,
     encoder, command = streams["motor_encoder"], streams["command"]
     rng = np.random.default_rng(0)
     still = encoder.values.copy()
-    still[:, 1] = rng.normal(size=len(still)) * doggy.motor_encoder.sigma
+    still[:, 1] = rng.normal(size=len(still)) * doggy.motor_encoder.sigmas[1]
     streams["motor_encoder"] = Stream("motor_encoder", encoder.times, still, encoder.channels, encoder.unit)
     streams["command"] = command
     with pytest.raises(

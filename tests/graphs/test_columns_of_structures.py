@@ -23,7 +23,7 @@ def test_a_rigid_joint_that_becomes_elastic_leads_its_link_by_compliance_times_t
     """With motors that run ahead as the regressor says, the spring accelerates the links as the rigid joint did."""
     segment, x = base("joint 2 rigid")
     (trial,) = [trial for _, trial in one_trial_each("joint 2 rigid", ("joint_elasticity",))]
-    columns, sigma = regressors(segment, trial), segment.problem.robot.motor_encoder.sigma
+    columns, sigma = regressors(segment, trial), segment.problem.robot.motor_encoder.sigmas[0]
     lead = sigma * columns["motor_encoder joint2.motor_position"][:, 0]
     compliance, count = 1e-9, len(lead)
     robot = add_effect(segment.problem.robot, trial.label, {"compliance": compliance, "damping": 1e-3})

@@ -37,14 +37,14 @@ def synthetic(doggy, error=None, seconds=20.0, seed=0, states=True):
     sensors = {}
     for name, sensor in doggy.sensors.items():
         clean = q if name == doggy.motor_encoder.name else 0.5 * v
-        measured = clean + sensor.sigma * rng.standard_normal(clean.shape)
+        measured = clean + sensor.sigmas * rng.standard_normal(clean.shape)
         if error is not None:
             measured = measured + error(name, motion)
-        streams[name] = Stream(name, t, measured, sensor.channels, sensor.unit)
+        streams[name] = Stream(name, t, measured, sensor.channels, sensor.units[0])
         ahead, soon = np.full(clean.shape, np.nan), np.full(clean.shape, np.nan)
         ahead[600::10], soon[600::10] = clean[600::10], clean[600::10]
         sensors[name] = SensorPrediction(
-            sensor.channels, sensor.unit, sensor.sigma, t, measured, clean, ahead, soon if states else None
+            sensor.channels, sensor.units, sensor.sigmas, t, measured, clean, ahead, soon if states else None
         )
     recording = Recording("synthetic", "", 0, streams)
     kept = {"motion": motion, "predicted_motion": motion.at(t[600::10])} if states else {}

@@ -17,7 +17,9 @@ def robot():
     """Doggy with encoders on its links, which do not read zero at zero, and no gyro."""
     doggy = load_robot("doggy")
     motors = doggy.motor_encoder
-    links = LinkEncoder("links", replace(motors.source, topic="/link_states"), 1e-4, np.full(3, 0.2), doggy.joints)
+    links = LinkEncoder(
+        "links", replace(motors.source, topic="/link_states"), np.full(3, 1e-4), np.full(3, 0.2), doggy.joints
+    )
     return replace(doggy, sensors={motors.name: motors, "links": links})
 
 

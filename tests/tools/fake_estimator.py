@@ -79,7 +79,7 @@ class FakeEstimator:
 
     def innovation(self, name, t):
         sensor = self.robot.sensors[name]
-        sigma = np.full(3, 1.3 * sensor.sigma)
+        sigma = 1.3 * sensor.sigmas
         factor = 5.0 if name in self.sick and t > 0.5 * self.truth[0][-1] else 1.0
         if factor > 1 and not self.alarmed:
             self.alarmed = True

@@ -52,7 +52,11 @@ def fake_recording(robot, x, t, rng, name="runs/train <1>.mcap"):
     streams = {
         "command": Stream("command", t, np.sign(x[:, 3 * n :]) * 0.6, tuple(f"{j}.command" for j in robot.joints), "1"),
         encoder.name: Stream(
-            encoder.name, t, x[:, 2 * n : 3 * n] + rng.normal(0, encoder.sigma, (len(t), n)), encoder.channels, "rad"
+            encoder.name,
+            t,
+            x[:, 2 * n : 3 * n] + rng.normal(0, encoder.sigmas[0], (len(t), n)),
+            encoder.channels,
+            "rad",
         ),
     }
     for gyro in robot.gyros:
@@ -76,8 +80,8 @@ def fake_bag_fit(robot, recording, x, t, rng):
     for name, sensor in robot.sensors.items():
         stream = recording.streams[name]
         predicted = x[:, 2 * n : 3 * n] if name == robot.motor_encoder.name else predicted_rate(robot, sensor, x)
-        sigma = np.full(stream.values.shape, sensor.sigma)
-        residuals[name] = ResidualSeries(stream.channels, stream.unit, t, stream.values, predicted, sigma)
+        sigma = np.broadcast_to(sensor.sigmas, stream.values.shape).copy()
+        residuals[name] = ResidualSeries(stream.channels, sensor.units, t, stream.values, predicted, sigma)
     size = np.repeat([8e-5, 9e-3, 4e-5, 7e-3], n)
     sigmas = size * (1.0 + 0.2 * np.sin(t[:, None] + np.arange(4 * n)))
     process_sigma = np.full((m - 1, 2 * n), 3e-3)
@@ -140,7 +144,7 @@ def fake_calibration(seconds=2.0, seed=0, bags=1):
         "motor.k_pwm, motor.k_mi, motor.inertia and the friction torques scale together, ±6.2 %.",
     )
     channels = {
-        c: ChannelFit(s.sigma * 1.01, s.sigma, 1.0 + 0.04 * k, s.unit)
+        c: ChannelFit(s.sigmas[0] * 1.01, s.sigmas[0], 1.0 + 0.04 * k, s.units[0])
         for s in robot.sensors.values()
         for k, c in enumerate(s.channels)
     }
@@ -177,14 +181,14 @@ def fake_model(label, robot, recording, x, t, quality, rng):
         encoder = name == robot.motor_encoder.name
         clean = x[:, 2 * robot.n : 3 * robot.n] if encoder else predicted_rate(robot, sensor, x)
         drift = quality * (2e-2 * t[:, None] if encoder else 0.03 * np.sin(9 * t[:, None]))
-        ahead = clean + quality * 2 * sensor.sigma * np.sin(40 * t[:, None]) * (1 + (t[:, None] > 0.7 * t[-1]))
+        ahead = clean + quality * 2 * sensor.sigmas * np.sin(40 * t[:, None]) * (1 + (t[:, None] > 0.7 * t[-1]))
         ahead[t < 0.1] = np.nan
         sensors[name] = SensorPrediction(
-            stream.channels, stream.unit, sensor.sigma, t, stream.values, clean + drift, ahead
+            stream.channels, sensor.units, sensor.sigmas, t, stream.values, clean + drift, ahead
         )
         for k, channel in enumerate(stream.channels):
-            sizes = {h: sensor.sigma * (1.1 + quality * (1 + 0.2 * k) * 6**i) for i, h in enumerate(HORIZONS)}
-            channels[channel] = ChannelComparison(sizes, 99.5 - 8 * quality, sensor.sigma, stream.unit)
+            sizes = {h: sensor.sigmas[k] * (1.1 + quality * (1 + 0.2 * k) * 6**i) for i, h in enumerate(HORIZONS)}
+            channels[channel] = ChannelComparison(sizes, 99.5 - 8 * quality, sensor.sigmas[k], sensor.units[k])
     end = float(t[-1])
     worst = tuple(
         WorstWindow(c, end * a, end * a + 0.25, s)

@@ -132,7 +132,7 @@ def test_gyros_are_put_on_their_links_and_turned_as_they_are_mounted(doggy, bag)
 
 def test_noise_is_found_from_steps_and_from_roughness(doggy, bag):
     guess = guess_robot(doggy.tree.urdf, bag)
-    assert guess.encoder_noise.sigma == pytest.approx(STEP / np.sqrt(12.0), rel=1e-3)
+    assert guess.encoder_noise[0].sigma == pytest.approx(STEP / np.sqrt(12.0), rel=1e-3)
     assert guess.gyros[0].noise.sigma == pytest.approx(GYRO_SIGMA, rel=0.15)
 
 

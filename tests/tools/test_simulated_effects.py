@@ -82,7 +82,7 @@ def changes(one, other) -> dict[str, float]:
     for name, sensor in DOGGY.sensors.items():
         a, b = one.recording.streams[name].values, other.recording.streams[name].values
         count = min(len(a), len(b))
-        found[name] = float(np.sqrt(np.mean((a[:count] - b[:count]) ** 2)) / sensor.sigma)
+        found[name] = float(np.sqrt(np.mean((a[:count] - b[:count]) ** 2)) / sensor.sigmas[0])
     return found
 
 

@@ -80,7 +80,7 @@ def test_the_controller_gets_the_old_angles_of_late_encoders_but_knows_nothing_o
         assert free.sum() > 100 and (constant.mean() > 0.95) == held
     late = recorded("encoder_delay@joint2:delay=0.004")
     others = late.recording.streams["motor_encoder"].values[:, [0, 2]] - late.states[:, [6, 8]]
-    assert others.std() == pytest.approx(DOGGY.motor_encoder.sigma, rel=0.05)
+    assert others.std() == pytest.approx(DOGGY.motor_encoder.sigmas[0], rel=0.05)
 
 
 def encoder_change(text: str) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +94,7 @@ def test_an_eccentric_disc_shows_the_catalogue_law_to_first_order_and_more():
     first = 2e-3 * np.cos(10 * q) - 1e-3 * np.sin(10 * q)
     e = 10 * np.hypot(2e-3, 1e-3)
     rest = (error - first).std()
-    assert rest < 1.2 * np.hypot(e**2 / 20 / np.sqrt(2), DOGGY.motor_encoder.sigma)
+    assert rest < 1.2 * np.hypot(e**2 / 20 / np.sqrt(2), DOGGY.motor_encoder.sigmas[0])
     assert np.corrcoef(error, first)[0, 1] > 0.99
 
 

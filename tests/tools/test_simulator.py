@@ -213,7 +213,7 @@ def test_encoders_have_the_sigma_of_the_robot_file(doggy, quantized):
     simulation = simulate(doggy, seconds=6.0, seed=5, quantized=quantized)
     moving = np.abs(simulation.states[:, 9:12]).min(1) > 0.05
     error = simulation.recording.streams["motor_encoder"].values - simulation.states[:, 6:9]
-    assert error[moving].std() == pytest.approx(doggy.motor_encoder.sigma, rel=0.05)
+    assert error[moving].std() == pytest.approx(doggy.motor_encoder.sigmas[0], rel=0.05)
     steps = np.unique(np.round(np.diff(np.unique(simulation.recording.streams["motor_encoder"].values[:, 0])), 9))
     assert (steps.min() > 1e-4) == quantized
 
@@ -236,8 +236,8 @@ def test_a_jittered_sample_carries_the_value_of_its_own_time(doggy):
     assert (stream.times - t).std() == pytest.approx(2e-4, rel=0.1)
     inside = slice(1, -1)
     at_stamp = np.column_stack([np.interp(stream.times, t, simulation.states[:, k]) for k in (6, 7, 8)])
-    assert (stream.values - at_stamp)[inside].std() == pytest.approx(doggy.motor_encoder.sigma, rel=0.1)
-    assert (stream.values - simulation.states[:, 6:9])[inside].std() > 2 * doggy.motor_encoder.sigma
+    assert (stream.values - at_stamp)[inside].std() == pytest.approx(doggy.motor_encoder.sigmas[0], rel=0.1)
+    assert (stream.values - simulation.states[:, 6:9])[inside].std() > 2 * doggy.motor_encoder.sigmas[0]
     assert not np.array_equal(stream.times, simulation.recording.streams["imu1"].times)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.robot import Robot
 from jointscope.robots.screening import screen
+from jointscope.robots.units import joined
 from jointscope.tools.bags.bag_description import (
     BagDescription,
     FieldDescription,
@@ -183,7 +184,17 @@ def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple
         except RecordingError as err:
             problem = str(err)
         candidates = tuple(topic for topic in bag.topics if bag.type_names(topic) == (msgtype,))
-        needs.append(NeedDescription(need.name, source.topic, msgtype, source.field, source.unit, problem, candidates))
+        needs.append(
+            NeedDescription(
+                need.name,
+                source.topic,
+                msgtype,
+                source.field,
+                joined(source.units or (source.unit,)),
+                problem,
+                candidates,
+            )
+        )
     return tuple(needs)
 
 

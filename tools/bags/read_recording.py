@@ -14,7 +14,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Topic
-from jointscope.robots.units import si_factor, si_unit
+from jointscope.robots.units import joined
 from jointscope.robots.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.columns import Columns
@@ -140,7 +140,7 @@ def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64
         values: as they stand in the bag, shape (n, m).
         before: what the last sample before them became, shape (m,); None for the first ones.
     """
-    factor = si_factor(source.unit) * np.asarray(source.scale or 1.0)
+    factor = source.factor
     if not source.wraps:
         return values * factor
     return continued(values, source.wraps, None if before is None else before / factor) * factor
@@ -219,6 +219,6 @@ def _stream(need: StreamSource, samples: TimedSamples, start_ns: int) -> Stream:
         times=(samples.stamps - start_ns) / 1e9,
         values=samples.values,
         channels=need.channels,
-        unit=si_unit(need.source.unit),
+        unit=joined(need.source.si_units(len(need.channels))),
         received=(samples.received - start_ns) / 1e9,
     )

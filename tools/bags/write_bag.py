@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
-from jointscope.robots.units import si_factor
 from jointscope.tools.bags.message_template import fill_messages
 from jointscope.tools.bags.message_type import MessageType, known_message_type
 from jointscope.tools.bags.open_bag import Progress, one_line, storage_files
@@ -126,8 +125,7 @@ def _messages(recording: Recording, topic: str, needs: list[StreamSource], ros2:
 
 
 def _in_bag_unit(need: StreamSource, stream: Stream) -> NDArray[np.float64]:
-    scale = np.asarray(need.source.scale or 1.0)
-    return stream.values / (si_factor(need.source.unit) * scale)
+    return stream.values / need.source.factor
 
 
 def _nanoseconds(times: NDArray[np.float64], start_ns: int) -> NDArray[np.int64]:

@@ -13,6 +13,8 @@ SMALLEST_P = 1e-12  # smaller ones mean nothing: no noise is so well known
 VERDICT_LEVELS = {"missing": "bad", "possible": "warn", "absent": "good", "untestable": "info"}
 NOTHING = "—"
 
+STIFFNESS_UNITS = {"rad/(N m)": "N m/rad", "m/N": "N/m"}  # of a compliance, and of its inverse
+
 Row = tuple[str, str, str, str]  # name, value, sigma, unit
 
 
@@ -49,9 +51,9 @@ def effect_rows(robot: Robot) -> list[Row]:
 def value_rows(name: str, value: float, sigma: float, unit: str) -> list[Row]:
     """One row; for a compliance a second one with the stiffness, which is what people know."""
     rows = [(name, *with_sigma(value, sigma), "" if unit == "1" else unit)]
-    if unit == "rad/(N m)" and "compliance" in name and value > 0.0:
+    if unit in STIFFNESS_UNITS and "compliance" in name and value > 0.0:
         stiffness = with_sigma(1.0 / value, sigma / value**2)
-        rows.append((name.replace("compliance", "stiffness"), *stiffness, "N m/rad"))
+        rows.append((name.replace("compliance", "stiffness"), *stiffness, STIFFNESS_UNITS[unit]))
     return rows
 
 

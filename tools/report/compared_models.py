@@ -10,6 +10,7 @@ from jointscope.graphs.comparison_result import ComparisonResult, ModelCompariso
 from jointscope.graphs.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.units import joined
 
 
 def of_diagnosis(result: Diagnosis) -> ComparisonResult | None:
@@ -32,7 +33,7 @@ def _recording(model: ModelComparison, heldout: Recording | None, training: Sequ
     if heldout is not None or training:
         return heldout or training[0]
     streams = {
-        name: Stream(name, sensor.times, sensor.measured, sensor.channels, sensor.unit)
+        name: Stream(name, sensor.times, sensor.measured, sensor.channels, joined(sensor.units))
         for name, sensor in model.sensors.items()
     }
     return Recording("", "", 0, streams)

@@ -62,7 +62,7 @@ def prefixed(largest: float, unit: str) -> tuple[float, str]:
     if not math.isfinite(largest) or largest <= 0.0 or largest >= 0.1 or unit in ("", "1"):
         return 1.0, unit
     exponent = max(3 * math.floor(math.log10(largest) / 3.0), min(PREFIXES))
-    return 10.0**-exponent, PREFIXES[exponent] + unit
+    return 10.0**-exponent, ", ".join(PREFIXES[exponent] + each for each in unit.split(", "))
 
 
 def minus(text: str) -> str:

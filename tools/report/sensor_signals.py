@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult
 from jointscope.robots.sensors import Gyro
+from jointscope.robots.units import joined
 
 Array = NDArray[np.float64]
 
@@ -47,16 +48,22 @@ def signal_rows(result: CalibrationResult, bag: BagFit) -> list[SignalRow]:
     encoder = bag.residuals.get(robot.motor_encoder.name)
     if encoder is not None:
         t = encoder.times
-        rows.append(SignalRow("motor position", "rad", robot.joints, t, encoder.measured, t, encoder.predicted))
+        rows.append(
+            SignalRow("motor position", robot.unit("rad"), robot.joints, t, encoder.measured, t, encoder.predicted)
+        )
         rate_times, rate = central_difference(t, encoder.measured)
         v_motor = bag.states[:, robot.layout.motor_v]
-        rows.append(SignalRow("motor velocity", "rad/s", robot.joints, rate_times, rate, bag.ticks, v_motor))
+        rows.append(
+            SignalRow("motor velocity", robot.unit("rad/s"), robot.joints, rate_times, rate, bag.ticks, v_motor)
+        )
     for gyro in reversed(robot.gyros):
         series = bag.residuals.get(gyro.name)
         if series is not None:
             parts = tuple(channel.rsplit(".", 1)[-1] for channel in series.channels)
             t = series.times
-            rows.append(SignalRow(_gyro_title(gyro), series.unit, parts, t, series.measured, t, series.predicted))
+            rows.append(
+                SignalRow(_gyro_title(gyro), joined(series.units), parts, t, series.measured, t, series.predicted)
+            )
     return rows
 
 

@@ -74,7 +74,7 @@ def correction_views(robot: Robot, states: StateSeries, lagged: StateSeries) -> 
     rows = corrections(robot, states, lagged)
     return rrb.Horizontal(
         *(
-            rrb.Vertical(*(view(joint, i, c.name, c.unit, c.sigma) for c in rows))
+            rrb.Vertical(*(view(joint, i, c.name, robot.unit_at(joint, c.unit), c.sigma) for c in rows))
             for i, joint in enumerate(robot.joints)
         ),
         name="newest - smoothed",
@@ -85,10 +85,10 @@ def estimate_views(robot: Robot) -> rrb.Horizontal:
     """One column per joint, one row per quantity."""
     import rerun.blueprint as rrb
 
-    return rrb.Horizontal(*(joint_views(joint) for joint in robot.joints), name="states")
+    return rrb.Horizontal(*(joint_views(robot, joint) for joint in robot.joints), name="states")
 
 
-def joint_views(joint: str) -> rrb.Vertical:
+def joint_views(robot: Robot, joint: str) -> rrb.Vertical:
     """The states of one joint."""
     import rerun.blueprint as rrb
 
@@ -96,7 +96,7 @@ def joint_views(joint: str) -> rrb.Vertical:
         *(
             rrb.TimeSeriesView(
                 origin="/" + entity("states", joint, name),
-                name=viewer_text(f"{joint} {name} [{unit}]"),
+                name=viewer_text(f"{joint} {name} [{robot.unit_at(joint, unit)}]"),
                 plot_legend=rrb.PlotLegend(visible=False),
             )
             for name, unit in QUANTITIES
@@ -114,7 +114,7 @@ def sigma_views(robot: Robot, states: StateSeries | None = None) -> rrb.Vertical
         if states is not None and len(states.times):
             top = settled_reach(states.times, _sigmas(robot, states)[name])
             axis = rrb.ScalarAxis(range=(0.0, top)) if top > 0.0 else None
-        title = viewer_text(f"sigma of {name} [{unit}]")
+        title = viewer_text(f"sigma of {name} [{robot.unit(unit)}]")
         views.append(rrb.TimeSeriesView(origin="/" + entity("sigma", name), name=title, axis_y=axis))
     return rrb.Vertical(*views, name="sigmas")
 

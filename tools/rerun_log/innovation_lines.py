@@ -65,7 +65,7 @@ def innovation_views(robot: Robot, innovations: Innovations | None = None) -> rr
                 *(
                     rrb.TimeSeriesView(
                         origin="/" + entity("residuals", name, channel),
-                        name=viewer_text(f"{channel} [{sensor.unit}]"),
+                        name=viewer_text(f"{channel} [{sensor.units[j]}]"),
                         plot_legend=rrb.PlotLegend(visible=False),
                         axis_y=rrb.ScalarAxis(range=_range(sensor, (innovations or {}).get(name), j)),
                     )
@@ -98,5 +98,5 @@ def nis_views(robot: Robot, name: str = "NIS", legend: bool = True) -> rrb.Verti
 
 def _range(sensor: Sensor, series: InnovationSeries | None, j: int) -> tuple[float, float]:
     """Limits of an axis: the usual band and nearly all residuals; the first sigmas are far larger."""
-    far = LIVE_REACH * sensor.sigma if series is None or not np.any(series.used) else reach(series, j)
+    far = LIVE_REACH * float(sensor.sigmas[j]) if series is None or not np.any(series.used) else reach(series, j)
     return -far, far

@@ -63,7 +63,7 @@ def replay_blueprint(robot: Robot, adapted: tuple[str, ...] = (), result: Replay
 
     overview = rrb.Horizontal(
         rrb.Vertical(robot_view(robot, ""), event_view(), row_shares=[3, 1]),
-        joint_views(robot.joints[0]),
+        joint_views(robot, robot.joints[0]),
         nis_views(robot, legend=False),
         column_shares=[3, 3, 3],
         name="overview",

@@ -37,9 +37,9 @@ def prediction_views(result: ComparisonResult) -> list[rrb.Horizontal]:
             rrb.Vertical(
                 *(
                     rrb.TimeSeriesView(
-                        origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{p.unit}]")
+                        origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{unit}]")
                     )
-                    for c in p.channels
+                    for c, unit in zip(p.channels, p.units, strict=True)
                 )
             )
             for p in sensors.values()
@@ -68,5 +68,5 @@ def _send_channel(stream: rr.RecordingStream, result: ComparisonResult, sensor: 
     for kind, values, rows in (("ahead", ahead, some), ("open_loop", free, np.ones_like(some))):
         send_lines(stream, entity(kind, channel, "measured"), first.times, measured, ["measured"], [GREY], 2.5)
         send_lines(stream, entity(kind, channel, "predicted"), first.times[rows], values[rows], labels, colours, 1.2)
-    error = ((measured - ahead) / first.sigma)[some]
+    error = ((measured - ahead) / first.sigmas[i])[some]
     send_lines(stream, entity("error", channel), first.times[some], error, labels, colours)

@@ -37,10 +37,10 @@ def sensor_views(fit: BagFit, root: str, kind: str) -> rrb.Horizontal:
             *(
                 rrb.TimeSeriesView(
                     origin="/" + entity(root, kind, name, channel),
-                    name=viewer_text(f"{channel} [{series.unit}]"),
+                    name=viewer_text(f"{channel} [{unit}]"),
                     plot_legend=rrb.PlotLegend(visible=kind == "signals"),
                 )
-                for channel in series.channels
+                for channel, unit in zip(series.channels, series.units, strict=True)
             ),
             name=viewer_text(name),
         )

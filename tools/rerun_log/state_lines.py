@@ -52,7 +52,8 @@ def state_views(robot: Robot, root: str) -> rrb.Horizontal:
             rrb.Vertical(
                 *(
                     rrb.TimeSeriesView(
-                        origin="/" + entity(root, "states", joint, name), name=viewer_text(f"{joint} {name} [{unit}]")
+                        origin="/" + entity(root, "states", joint, name),
+                        name=viewer_text(f"{joint} {name} [{robot.unit_at(joint, unit)}]"),
                     )
                     for name, unit in PLOTS
                 )

@@ -50,7 +50,9 @@ def torque_views(missing: MissingTorque, root: str, name: str) -> list[rrb.Conta
     columns = [
         rrb.Vertical(
             *(
-                rrb.TimeSeriesView(origin="/" + entity(root, "torque", row), name=viewer_text(f"{row} [N m]"))
+                rrb.TimeSeriesView(
+                    origin="/" + entity(root, "torque", row), name=viewer_text(f"{row} [{missing.unit(row, 'N m')}]")
+                )
                 for row in missing.rows[side * n : (side + 1) * n]
             )
         )
@@ -108,8 +110,8 @@ def _send_map(stream: rr.RecordingStream, path: str, m: ResidualMap, missing: Mi
     strips = [place(m.centers, y) for y, _, _ in curves]
     stream.log(f"{path}/lines", lines(strips, [c for _, c, _ in curves], [w for _, _, w in curves]), static=True)
     texts = {
-        (0.0, -0.12 * HEIGHT): f"{high:.3g} N m",
-        (0.0, HEIGHT + 0.05): f"{low:.3g} N m at {m.signal} = {left:.3g} {m.unit}",
+        (0.0, -0.12 * HEIGHT): f"{high:.3g} {m.torque_unit}",
+        (0.0, HEIGHT + 0.05): f"{low:.3g} {m.torque_unit} at {m.signal} = {left:.3g} {m.unit}",
         (WIDTH, HEIGHT + 0.05): f"{right:.3g} {m.unit}",
     }
     labels = rr.Points2D(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.joint_motion import joint_motion
@@ -20,6 +21,8 @@ from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount
 from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
+
+Array = NDArray[np.float64]
 
 GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] ROS: z of the base points up
 SUPPLY = 24.0  # [V]
@@ -45,7 +48,7 @@ class RobotGuess:
         bag: path of the bag.
         roles: which signal is what.
         masses: whether the URDF has inertias for all moving bodies.
-        angle_unit: of the encoders, "rad" or "deg".
+        position_units: of the encoders in the bag, by joint: "rad" or "deg", of a prismatic joint "m" or "mm".
         encoder_signs: which way the joints' encoders count.
         command_unit: unit of the drive and why.
         drives: start values by joint.
@@ -60,16 +63,17 @@ class RobotGuess:
     bag: str
     roles: Roles
     masses: bool
-    angle_unit: str
+    position_units: tuple[str, ...]
     encoder_signs: SignGuess
     command_unit: tuple[str, str]
     drives: list[DriveValues]
-    encoder_noise: NoiseGuess
-    link_noise: NoiseGuess | None
+    encoder_noise: tuple[NoiseGuess, ...]
+    link_noise: tuple[NoiseGuess, ...] | None
     torque_noise: NoiseGuess | None
     gyros: list[GuessedGyro]
     left_out: list[str] = field(default_factory=list)
     elastic: tuple[str, ...] = ()
+    slides: tuple[str, ...] = ()
 
     @property
     def free_links(self) -> bool:
@@ -102,8 +106,8 @@ def guess_robot(
             f"{urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected one of "
             "them; add <inertial> to the links, or record a topic with the positions of the links"
         )
-    unit = _angle_unit(tree, roles)
-    factor = si_factor(unit)
+    units = _position_units(tree, roles)
+    factor = np.array([si_factor(unit) for unit in units])
     encoder = _stream(roles.motor_encoder, roles.joints, factor)
     streams = [s.stream(("x", "y", "z")) for s in roles.imus]
     # the links turn the gyroscopes, and their encoders know where zero is
@@ -122,23 +126,24 @@ def guess_robot(
         bag=str(bag),
         roles=roles,
         masses=masses,
-        angle_unit=unit,
+        position_units=units,
         encoder_signs=signs,
         command_unit=drive,
         drives=drive_values(tree, turned, command, per_unit, torque, masses),
-        encoder_noise=_noise(roles.motor_encoder, roles, unit),
-        link_noise=None if roles.link_encoder is None else _noise(roles.link_encoder, roles, unit),
-        torque_noise=None if roles.joint_torque is None else _noise(roles.joint_torque, roles, "N m"),
+        encoder_noise=_noises(roles.motor_encoder, roles, units),
+        link_noise=None if roles.link_encoder is None else _noises(roles.link_encoder, roles, units),
+        torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
+        slides=tree.slides,
         elastic=_seen(tree, gyros) if masses else (),
     )
 
 
 def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
-    """Joints with a gyroscope behind them."""
+    """Joints that turn with a gyroscope behind them."""
     seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
-    return tuple(name for j, name in enumerate(tree.joints) if j in seen)
+    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
 
 
 def _tree(urdf: Path, joints: tuple[str, ...]) -> tuple[RigidTree, bool]:
@@ -150,20 +155,27 @@ def _tree(urdf: Path, joints: tuple[str, ...]) -> tuple[RigidTree, bool]:
         return RigidTree(urdf, joints, gravity, inertias=False), False
 
 
-def _angle_unit(tree: RigidTree, roles: Roles) -> str:
-    """Degrees where the angles are far beyond the limits of the URDF."""
+def _position_units(tree: RigidTree, roles: Roles) -> tuple[str, ...]:
+    """Degrees, or millimetres, where joints that turn, or slide, go far beyond the limits of the URDF."""
     names = roles.motor_encoder.names or roles.joints
     span = np.ptp(roles.motor_encoder.signal.stream(names).values, axis=0)
-    limits = tree.limits
-    return "deg" if np.any(span > 5.0 * (limits[:, 1] - limits[:, 0])) else "rad"
+    beyond = span > 5.0 * (tree.limits[:, 1] - tree.limits[:, 0])
+    slides = np.isin(tree.joints, tree.slides)
+    turning, sliding = "deg" if np.any(beyond & ~slides) else "rad", "mm" if np.any(beyond & slides) else "m"
+    return tuple(sliding if slide else turning for slide in slides)
 
 
-def _noise(chosen: Chosen, roles: Roles, unit: str) -> NoiseGuess:
+def _noises(chosen: Chosen, roles: Roles, units: tuple[str, ...]) -> tuple[NoiseGuess, ...]:
+    """Noise of each joint's encoder; those that measure in the same unit have the same."""
     stream = _stream(chosen, roles.joints)
-    return guess_noise(stream.times, stream.values, unit)
+    by_unit = {
+        unit: guess_noise(stream.times, stream.values[:, [j for j, u in enumerate(units) if u == unit]], unit)
+        for unit in dict.fromkeys(units)
+    }
+    return tuple(by_unit[unit] for unit in units)
 
 
-def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float = 1.0) -> Stream:
+def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
     return chosen.signal.stream(chosen.names or joints, factor)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from jointscope.robots.units import si_factor, si_unit
+from jointscope.robots.units import joined, of_slide, si_factor, si_unit
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess
 from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, GuessedGyro, RobotGuess
 from jointscope.tools.robot_guess.roles import Chosen
@@ -151,6 +151,15 @@ def _sigma(noise: NoiseGuess, unit: str) -> str:
     return _line(f"sigma: {_number(sigma)}", f"[{si_unit(unit)}] {reason}", False, 4)
 
 
+def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
+    """The line with the noise of encoders, a list where they measure in different units."""
+    if len(set(units)) == 1:
+        return _sigma(noises[0], units[0])
+    values = [f"{_number(si_factor(unit) * (n.sigma or 1e-4))}" for n, unit in zip(noises, units, strict=True)]
+    reasons = "; ".join(dict.fromkeys(n.reason for n in noises))
+    return _line(f"sigma: [{', '.join(values)}]", f"[{joined([si_unit(u) for u in units])}] {reasons}", False, 4)
+
+
 def _motor_encoder(guess: RobotGuess) -> list[str]:
     signs, noise = _turned_joints(guess.encoder_signs), guess.encoder_noise
     zero = "counts from where the motor stood when it was switched on"
@@ -165,16 +174,19 @@ def _link_encoder(guess: RobotGuess) -> list[str]:
     return _encoder("link_encoder", chosen, guess, "as the motor encoder", noise, [])
 
 
-def _encoder(kind: str, chosen: Chosen, guess: RobotGuess, signs: str, noise: NoiseGuess, zero: list[str]) -> list[str]:
+def _encoder(
+    kind: str, chosen: Chosen, guess: RobotGuess, signs: str, noise: tuple[NoiseGuess, ...], zero: list[str]
+) -> list[str]:
+    units = guess.position_units
     return [
         f"  {kind}:",
         _line(f"kind: {kind}", chosen.reason, chosen.sure, 4),
-        *_source(chosen.signal, guess.angle_unit),
+        *_source(chosen.signal, units[0] if len(set(units)) == 1 else _list(units)),
         *_names(chosen, guess.roles.joints, 4),
         *_wraps(chosen),
         *_signs(guess.encoder_signs.signs, signs, 4),
         *zero,
-        _sigma(noise, guess.angle_unit),
+        _sigmas(noise, units),
     ]
 
 
@@ -230,7 +242,8 @@ def _parameters(guess: RobotGuess) -> list[str]:
             omega = 2.0 * np.pi * RESONANCE
             rows += [("stiffness", drive.link * omega**2, "N m/rad")]
             rows += [("damping", 2.0 * DAMPING_RATIO * drive.link * omega, "N m s/rad")]
-        for name, value, unit in rows:
+        for name, value, turning_unit in rows:
+            unit = of_slide(turning_unit) if joint in guess.slides else turning_unit
             number = _number(value)
             spread = _number(2.0 * value)
             lines.append(f"  {joint}.{name}: {{value: {number}, unit: {unit}, prior_sigma: {spread}}}")

@@ -59,7 +59,7 @@ class Signal:
         index = [self.names.index(name) for name in names] if self.names else list(range(len(names)))
         return self.values[:, index]
 
-    def stream(self, names: tuple[str, ...], factor: float = 1.0) -> Stream:
+    def stream(self, names: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)

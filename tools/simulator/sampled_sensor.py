@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.recording import Stream
 from jointscope.robots.sensors import LinkEncoder, MotorEncoder, Sensor
+from jointscope.robots.units import joined
 from jointscope.tools.simulator.engine import Engine
 from jointscope.tools.simulator.hooks import age, distort, logged, taken_at
 from jointscope.tools.simulator.random_streams import random_stream
@@ -55,7 +56,9 @@ class SampledSensor:
         values = logged(self._effects, self.sensor, self.given_out(trajectory, slice(None)))
         kept = (self.taken <= trajectory.end) & self.kept
         sensor = self.sensor
-        return Stream(sensor.name, self.stamps[kept], values[kept], sensor.channels, sensor.unit, self.received[kept])
+        return Stream(
+            sensor.name, self.stamps[kept], values[kept], sensor.channels, joined(sensor.units), self.received[kept]
+        )
 
 
 class SampledEncoder(SampledSensor):

@@ -103,6 +103,6 @@ def read_encoder(encoder: MotorEncoder | LinkEncoder, q_motor: Array, noise: Arr
         Readings, shape (m, n_joints) [rad].
     """
     if not quantized:
-        return q_motor + encoder.zero + encoder.sigma * noise
-    step = np.sqrt(12.0 * (1.0 - ANALOG_SHARE**2)) * encoder.sigma
-    return step * np.rint((q_motor + encoder.zero + ANALOG_SHARE * encoder.sigma * noise) / step)
+        return q_motor + encoder.zero + encoder.sigmas * noise
+    step = np.sqrt(12.0 * (1.0 - ANALOG_SHARE**2)) * encoder.sigmas
+    return step * np.rint((q_motor + encoder.zero + ANALOG_SHARE * encoder.sigmas * noise) / step)

@@ -32,7 +32,12 @@ def commands(result: CalibrationResult) -> Section:
         panels.append(plot(axes, above))
         if encoder:
             below = [_curve(j, i, encoder.times, encoder.measured[:, i], points) for i, j in enumerate(joints)]
-            panels.append(plot(Axes("measured motor position [rad]", x_range=_limits(bag), height=200), below))
+            panels.append(
+                plot(
+                    Axes(f"measured motor position [{result.robot.unit('rad')}]", x_range=_limits(bag), height=200),
+                    below,
+                )
+            )
         return figure(panels, [Key(j, COLOURS[i % 6]) for i, j in enumerate(joints)], group=group)
 
     lead = (

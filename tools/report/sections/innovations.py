@@ -54,7 +54,7 @@ def reach(series: InnovationSeries, j: int) -> float:
 def _row(series: InnovationSeries, j: int) -> list[str]:
     used = series.used
     expected = _median(series.sigma[used, j])
-    factor, unit = prefixed(expected, series.unit)
+    factor, unit = prefixed(expected, series.units[j])
     nis = series.channel_nis.get(series.channels[j], float("nan"))
     tone = f'<span class="{nis_level(nis)}" style="color:var(--tone)">{significant(nis)}</span>'
     rms = significant(factor * _rms(series.residual[used, j]))
@@ -65,7 +65,7 @@ def _row(series: InnovationSeries, j: int) -> list[str]:
 def _as_residuals(series: InnovationSeries) -> ResidualSeries:
     kept = np.where(series.used[:, None], series.residual, np.nan)
     sigma = np.where(np.isfinite(series.sigma), series.sigma, np.nanmedian(series.sigma, axis=0, keepdims=True))
-    return ResidualSeries(series.channels, series.unit, series.times, kept, np.zeros_like(kept), sigma)
+    return ResidualSeries(series.channels, series.units, series.times, kept, np.zeros_like(kept), sigma)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -38,7 +38,7 @@ def channel_marks(
             prediction = model.sensors[sensor]
             times, values = joined(prediction.times, getattr(prediction, kind)[:, i])
             marks.append(Curve(model.label, times, values, model_colour(k), "dashed", points))
-    return f"{first.channels[i]} [{first.unit}]", marks
+    return f"{first.channels[i]} [{first.units[i]}]", marks
 
 
 def _sensor(result: ComparisonResult, name: str, kind: str, points: int) -> str:
@@ -63,7 +63,7 @@ def _sensor(result: ComparisonResult, name: str, kind: str, points: int) -> str:
 def _readable(sensor: SensorPrediction, i: int, marks: list[Mark]) -> tuple[float, float]:
     """Limits that follow the measurement; a prediction that runs away may leave the picture."""
     low, high = float(np.nanmin(sensor.measured[:, i])), float(np.nanmax(sensor.measured[:, i]))
-    span = max(high - low, 20.0 * sensor.sigma)
+    span = max(high - low, 20.0 * float(sensor.sigmas[i]))
     values = np.concatenate([m.y[np.isfinite(m.y)] for m in marks if isinstance(m, Curve)])
     return (
         max(float(values.min()), low - 0.75 * span) - 0.06 * span,

@@ -56,7 +56,7 @@ def _closer(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
     panels = []
     for k, (title, unit, value, sigma) in enumerate(rows):
         seen = (now.times >= limits[0]) & (now.times <= limits[1])
-        factor, unit = prefixed(float(np.max(np.abs(value[seen]), initial=0.0)), unit)
+        factor, unit = prefixed(float(np.max(np.abs(value[seen]), initial=0.0)), result.robot.unit(unit))
         marks: list[Mark] = []
         for i, joint in enumerate(result.robot.joints):
             y, s = factor * value[:, i], 3.0 * factor * sigma[:, i]
@@ -77,7 +77,7 @@ def _corrections(result: ReplayResult, limits: Limits) -> list[str]:
         for i, joint in enumerate(result.robot.joints):
             y, s = found.difference[seen, i], 3.0 * found.sigma[seen, i]
             largest = max(np.max(np.abs(y), initial=0.0), np.max(s, initial=0.0))
-            factor, unit = prefixed(float(largest), found.unit)
+            factor, unit = prefixed(float(largest), result.robot.unit_at(joint, found.unit))
             marks: list[Mark] = [
                 Band("±3 sigma", t, -factor * s, factor * s, COLOURS[i % 6]),
                 Curve(joint, t, factor * y, COLOURS[i % 6]),
@@ -98,7 +98,7 @@ def _sigmas(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
     ]
     panels = []
     for k, (title, unit, sigma) in enumerate(rows):
-        factor, unit = prefixed(float(np.median(sigma)), unit)
+        factor, unit = prefixed(float(np.median(sigma)), result.robot.unit(unit))
         curves = [
             Curve(joint, result.states.times, factor * sigma[:, i], COLOURS[i % 6], points=500)
             for i, joint in enumerate(result.robot.joints)

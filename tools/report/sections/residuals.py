@@ -58,7 +58,7 @@ def residuals(result: CalibrationResult) -> Section:
 def over_time(series: ResidualSeries, i: int, points: int, reach: float | None = None) -> str:
     """Residuals of a channel with their band; the axis goes to +- reach [unit], by default around all of it."""
     r, sigma = series.measured[:, i] - series.predicted[:, i], series.sigma[:, i]
-    factor, unit = prefixed(float(np.median(sigma)) * 3.0, series.unit)
+    factor, unit = prefixed(float(np.median(sigma)) * 3.0, series.units[i])
     whitened = r / sigma
     outside = float(np.mean(np.abs(whitened[np.isfinite(whitened)]) > 3.0)) if len(r) else 0.0
     title = f"{series.channels[i]} [{unit}], outside 3 sigma: {percent(outside)}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.graphs.calibration_result import BagFit, CalibrationResult
+from jointscope.robots.robot import Robot
 from jointscope.tools.report.numbers import prefixed
 from jointscope.tools.report.page import Key, Section, figure
 from jointscope.tools.report.plot import Axes, Band, Curve, Mark, plot
@@ -31,9 +32,9 @@ def states(result: CalibrationResult) -> Section:
         closer = liveliest(bag.ticks, bag.states[:, 3 * len(joints) :])
         return (
             "<h3>A closer look</h3>"
-            + figure(_with_bands(bag, joints, closer, points), band, group=f"{group} closer")
+            + figure(_with_bands(bag, result.robot, closer, points), band, group=f"{group} closer")
             + "<h3>Sigma over the whole recording</h3>"
-            + figure(_sigmas(bag, joints, whole), keys, group=group)
+            + figure(_sigmas(bag, result.robot, whole), keys, group=group)
         )
 
     lead = (
@@ -43,16 +44,25 @@ def states(result: CalibrationResult) -> Section:
     return Section("states", "States and their sigmas", per_bag(result, draw), lead)
 
 
-def _with_bands(bag: BagFit, joints: tuple[str, ...], limits: Limits, points: int) -> list[str]:
-    n = len(joints)
+def _with_bands(bag: BagFit, robot: Robot, limits: Limits, points: int) -> list[str]:
+    joints, n = robot.joints, robot.n
     q_link, v_link, q_motor = (bag.states[:, k * n : (k + 1) * n] for k in range(3))
     deflection = q_link - q_motor
-    factor, unit = prefixed(float(np.max(np.abs(deflection), initial=0.0)), "rad")
+    factor, unit = prefixed(float(np.max(np.abs(deflection), initial=0.0)), robot.unit("rad"))
     panels = [
         _panel(
             f"deflection [{unit}]", bag, factor * deflection, factor * bag.sigmas[:, :n], joints, limits, points, ""
         ),
-        _panel("link velocity [rad/s]", bag, v_link, bag.sigmas[:, n : 2 * n], joints, limits, points, "time [s]"),
+        _panel(
+            f"link velocity [{robot.unit('rad/s')}]",
+            bag,
+            v_link,
+            bag.sigmas[:, n : 2 * n],
+            joints,
+            limits,
+            points,
+            "time [s]",
+        ),
     ]
     return panels
 
@@ -75,14 +85,14 @@ def _panel(
     return plot(Axes(title, x_label, height=190 + 28 * bool(x_label), x_range=limits), marks)
 
 
-def _sigmas(bag: BagFit, joints: tuple[str, ...], limits: Limits) -> list[str]:
-    n = len(joints)
+def _sigmas(bag: BagFit, robot: Robot, limits: Limits) -> list[str]:
+    joints, n = robot.joints, robot.n
     panels = []
     for k, (title, unit) in enumerate(
         (("q_link", "rad"), ("v_link", "rad/s"), ("q_motor", "rad"), ("v_motor", "rad/s"))
     ):
         sigma = bag.sigmas[:, k * n : (k + 1) * n]
-        factor, prefix_unit = prefixed(float(np.median(sigma)), unit)
+        factor, prefix_unit = prefixed(float(np.median(sigma)), robot.unit(unit))
         curves = [
             Curve(joint, bag.ticks, factor * sigma[:, i], COLOURS[i % 6], points=500) for i, joint in enumerate(joints)
         ]

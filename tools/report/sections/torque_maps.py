@@ -74,5 +74,5 @@ def map_picture(m: ResidualMap, missing: MissingTorque) -> str:
         Curve(label, m.centers, y, candidate_colour(missing, label), "dashed") for label, y in m.explained.items()
     ]
     marks.append(Curve("", m.centers, np.zeros(len(m.centers)), "soft", "hair"))
-    axes = Axes(f"{m.row} [N m], {percent(max(m.telling, 0.0))}", f"{m.signal} [{m.unit}]", 360, 230)
+    axes = Axes(f"{m.row} [{m.torque_unit}], {percent(max(m.telling, 0.0))}", f"{m.signal} [{m.unit}]", 360, 230)
     return plot(axes, marks)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.missing_torque import MissingTorque
+from jointscope.robots.units import joined
 from jointscope.tools.report.numbers import significant
 from jointscope.tools.report.page import Key, Section, figure, foldable
 from jointscope.tools.report.plot import Axes, Band, Curve, Mark, plot
@@ -51,7 +52,8 @@ def _panels(missing: MissingTorque, rows: list[int]) -> list[str]:
             if np.any(curve[:, i]):
                 marks.append(Curve(label, t, curve[:, i], candidate_colour(missing, label), "dashed"))
         last = k == len(rows) - 1
-        title = f"{missing.rows[i]} [N m], rms {rms} N m"
+        unit = missing.unit(missing.rows[i], "N m")
+        title = f"{missing.rows[i]} [{unit}], rms {rms} {unit}"
         panels.append(plot(Axes(title, "time [s]" if last else "", height=150 + 28 * last, x_range=limits), marks))
     return panels
 
@@ -64,5 +66,6 @@ def _spectra(missing: MissingTorque, order: list[int]) -> str:
         Curve(missing.rows[i], f, np.maximum(density[:, i], 1e-12), f"k{i % 6}", "thick" if k == 0 else "solid")
         for k, i in enumerate(order)
     ]
-    axes = Axes("spectral density [N m/√Hz]", "frequency [Hz]", height=250, log_x=True, log_y=True)
+    units = joined([f"{missing.unit(row, 'N m')}/√Hz" for row in missing.rows])
+    axes = Axes(f"spectral density [{units}]", "frequency [Hz]", height=250, log_x=True, log_y=True)
     return figure([plot(axes, curves)], [Key(missing.rows[i], f"k{i % 6}") for i in order])

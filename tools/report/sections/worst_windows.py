@@ -58,6 +58,6 @@ def _errors(result: ComparisonResult, sensor: str, i: int) -> list[Mark]:
     for k, model in enumerate(result.models):
         if sensor in model.sensors:
             p = model.sensors[sensor]
-            times, error = joined(p.times, (p.measured[:, i] - p.ahead[:, i]) / p.sigma)
+            times, error = joined(p.times, (p.measured[:, i] - p.ahead[:, i]) / p.sigmas[i])
             curves.append(Curve(model.label, times, error, model_colour(k), "solid"))
     return curves
