@@ -34,4 +34,5 @@ class InertiaEffect(Effect):
 
     def owners_of(self, robot: Robot) -> tuple[str, ...]:
         """All joints, or the last one."""
-        return robot.joints[-1:] if self.last_only else super().owners_of(robot)
+        owners = super().owners_of(robot)
+        return tuple(joint for joint in owners if not self.last_only or joint == robot.joints[-1])
