@@ -18,7 +18,7 @@ from jointscope.factors.factor import Factor
 from jointscope.factors.priors import DynamicsPrior, RotationPrior
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
-from jointscope.graphs.convergence import Iteration, has_converged, is_flat, measured_rows, short_step
+from jointscope.graphs.convergence import Iteration, has_converged, is_crawling, is_flat, measured_rows, short_step
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.robots.errors import SolveError
@@ -133,6 +133,8 @@ def solve(
         if solution.converged or solution.flat:
             break
         damping = max(damping / LAMBDA_FACTOR, 1e-12)
+    else:
+        solution.flat = bool(solution.iterations) and is_crawling(solution.iterations, measured)
     return solution
 
 

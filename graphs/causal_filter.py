@@ -25,6 +25,7 @@ from jointscope.graphs.banded_solver import eliminate
 from jointscope.graphs.normal_equations import build, whitened
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.sensor_placement import Placed
+from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,20 @@ def filter_states(problem: BagProblem, x: Array, calibration: Calibration) -> Fi
         problem: the factors, with the noise to use.
         x: smoothed states, shape (m, d); only the starts of the pieces come from a filter linearised around them.
         calibration: shared values; biases are those of the recording.
+
+    Raises:
+        SolveError: the filter ran away, as it may under a model that contradicts the recording.
     """
+    try:
+        return _filtered(problem, x, calibration)
+    except np.linalg.LinAlgError as err:
+        raise SolveError(
+            f"{problem.robot.name} cannot follow the recording: the filter of its states ran away; the model contradicts "
+            "the recording: check rigid_joints, start values and units"
+        ) from err
+
+
+def _filtered(problem: BagProblem, x: Array, calibration: Calibration) -> FilteredStates:
     begin = filter_around(problem, x, calibration)
     m, h = len(x), float(np.median(problem.timeline.h))
     piece, early = max(int(PIECE / h), 1), int(BURN_IN / h)

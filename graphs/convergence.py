@@ -72,6 +72,12 @@ def is_flat(iterations: Sequence[Iteration], measured: int) -> bool:
     return contradicts and len(last) == FLAT_STEPS and all(i.fall < FLAT for i in last)
 
 
+def is_crawling(iterations: Sequence[Iteration], measured: int) -> bool:
+    """Whether such a model still gains, but so little that more iterations would not settle it."""
+    last = iterations[-1]
+    return misfit(last.cost_after, measured) > CONTRADICTS and last.fall < SMALL_FALL
+
+
 def _remaining(iterations: Sequence[Iteration]) -> float:
     """How far the minimum may still be, in sigmas, if the steps go on shrinking as the last one did."""
     last = iterations[-1].step_in_sigmas
