@@ -61,8 +61,8 @@ def filter_states(problem: BagProblem, x: Array, calibration: Calibration) -> Fi
         return _filtered(problem, x, calibration)
     except np.linalg.LinAlgError as err:
         raise SolveError(
-            f"{problem.robot.name} cannot follow the recording: the filter of its states ran away; the model contradicts "
-            "the recording: check rigid_joints, start values and units"
+            f"{problem.robot.name} cannot follow the recording: the filter of its states ran away; the model "
+            "contradicts the recording: check rigid_joints, start values and units"
         ) from err
 
 

@@ -33,7 +33,7 @@ from jointscope.graphs.noise_floor import channel_floors
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.solver_context import in_solver_context
-from jointscope.robots.errors import RobotError
+from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Sensor
@@ -104,7 +104,7 @@ def _free_run(robot: Robot, recording: Recording) -> FreeRun | None:
         return None
     try:
         return free_run(robot, recording)
-    except RobotError:
+    except (RobotError, RecordingError):
         return None
 
 

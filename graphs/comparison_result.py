@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.free_run import FreeRun
+from jointscope.graphs.free_run import FreeRun, loop_error
 from jointscope.graphs.joint_states import JointStates
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -18,6 +18,8 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 
 OPEN_LOOP = "open_loop"
+AHEAD, LOOP = "0.1 s ahead", "of the loop simulated from its goals"  # what a model is judged by
+SENSOR_NOISE = 1.0  # [sigma]
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,21 @@ class ModelComparison:
     motion: JointStates | None = None
     predicted_motion: JointStates | None = None
     free_run: FreeRun | None = None
+
+    @property
+    def judged_by(self) -> str:
+        """Whose error tells how good the model is: predictions, or the loop where it was simulated."""
+        return AHEAD if self.free_run is None else LOOP
+
+    @property
+    def judged_error(self) -> float:
+        """That error, root mean square over its channels in sensor sigmas."""
+        return self.error if self.free_run is None else loop_error(self.free_run, self.robot)
+
+    @property
+    def judged_floor(self) -> float:
+        """What it would be at best: of a simulated loop no more is known than the noise of its sensor."""
+        return self.floor if self.free_run is None else SENSOR_NOISE
 
 
 @dataclass(frozen=True)

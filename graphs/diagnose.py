@@ -21,7 +21,7 @@ from jointscope.graphs.missing_torque import MissingTorque, estimate_missing_tor
 from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
-from jointscope.graphs.validation import ValidationError, heldout_error, validation_error
+from jointscope.graphs.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.verdicts import MATTERS, SAME, SENSOR_FLOOR, Trialled, excess_share, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recording import Recording
@@ -92,8 +92,8 @@ def diagnose(
     comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
-    spans = base.spans()[1]
-    before = validation or validation_error(base, base.robot, base.calibrations, spans)
+    spans = fit_and_judge(base)[1]
+    before = validation or judged_error(base, base.robot, base.calibrations, spans)
     trialled, failed = _refit_leaders(base, scored, before.error, holdout, leaders, report)
     clock.stage("refits")
     seconds = sum(span.t1 - span.t0 for span in spans)
@@ -104,7 +104,7 @@ def diagnose(
     share = unexplained(comparison)
     if best is not None:
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
-        share = unexplained_share(after, comparison.floor)
+        share = unexplained_share(after, comparison.judged_floor)
     refits = {label: t.refit.robot for label, t in trialled.items()}
     missing = None
     if missing_torque:
@@ -116,8 +116,8 @@ def diagnose(
         candidates=tuple(candidates),
         adequate=best is None and max(share, *_elsewhere(base, holdout)) < ADEQUATE,
         unexplained_share=share,
-        error=comparison.error,
-        floor=comparison.floor,
+        error=comparison.judged_error,
+        floor=comparison.judged_floor,
         validation_error=before.error,
         failure=failure,
         missing=missing,
@@ -163,7 +163,7 @@ def _elsewhere(base: BaseModel, holdout: Recording | None) -> list[float]:
 
 def unexplained(comparison: ModelComparison) -> float:
     """Share of a comparison's squared error that its floor does not explain."""
-    return unexplained_share(comparison.error, comparison.floor)
+    return unexplained_share(comparison.judged_error, comparison.judged_floor)
 
 
 def unexplained_share(error: float, floor: float) -> float:
@@ -191,7 +191,7 @@ def _refit_leaders(
         if candidate.plausible < enough or (i >= leaders and helped):
             break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
-        trial = _trial(base, candidate, *base.spans(), holdout)
+        trial = _trial(base, candidate, *fit_and_judge(base), holdout)
         if trial is None:
             failed.add(candidate.label)
             continue
@@ -210,7 +210,7 @@ def _trial(
 ) -> Trialled | None:
     try:
         found = refit(base, fit, candidate.best)
-        errors: ValidationError = validation_error(base, found.robot, found.biases, spans)
+        errors: ValidationError = judged_error(base, found.robot, found.biases, spans)
     except (JointscopeError, np.linalg.LinAlgError):
         return None
     return Trialled(found, errors, _heldout(found.robot, holdout))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.comparison_result import ModelComparison
+from jointscope.graphs.comparison_result import AHEAD, ModelComparison
 from jointscope.graphs.failure_analysis import FailureAnalysis
 from jointscope.graphs.missing_torque import MissingTorque
 from jointscope.robots.recording import Recording
@@ -115,6 +115,11 @@ class Diagnosis:
     wall_seconds: Mapping[str, float] = field(default_factory=dict)
     recordings: tuple[Recording, ...] = field(default=(), repr=False)
     heldout: Recording | None = field(default=None, repr=False)
+
+    @property
+    def judged_by(self) -> str:
+        """Whose error `error` is: "0.1 s ahead", or of a simulated loop."""
+        return self.comparison.judged_by if self.comparison is not None else AHEAD
 
     def to_json(self) -> dict[str, Any]:
         """The JSON of the verb `diagnose`."""

@@ -26,19 +26,19 @@ def _verdict(d: Diagnosis) -> str:
     missing = [c for c in d.candidates if c.verdict == "missing" and not c.numerics]
     if missing:
         return (
-            f"The model lacks {title(missing[0])}: predictions 0.1 s ahead miss by {d.error:.3g} sigma where noise "
+            f"The model lacks {title(missing[0])}: its error {d.judged_by} is {d.error:.3g} sigma where noise "
             f"and state uncertainty allow {d.floor:.3g}."
         )
     numerics = [c for c in d.candidates if c.verdict == "missing" and c.numerics]
     if numerics:
         return (
-            f"Before any physics: {title(numerics[0])}. It spoils predictions 0.1 s ahead ({d.error:.3g} sigma) and "
+            f"Before any physics: {title(numerics[0])}. It spoils the error {d.judged_by} ({d.error:.3g} sigma) and "
             "hides what else may be missing; take the better integrator (`model: integrator: simpson`) and diagnose "
             "again."
         )
     if d.adequate:
         return (
-            f"The model is adequate: it predicts 0.1 s ahead to {d.error:.3g} sigma, noise and state uncertainty alone "
+            f"The model is adequate: its error {d.judged_by} is {d.error:.3g} sigma, noise and state uncertainty alone "
             f"leave {d.floor:.3g}, and no effect of the catalogue would lower that."
         )
     return (

@@ -17,7 +17,7 @@ from jointscope.graphs.diagnose import ADEQUATE, diagnose, unexplained
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.solver_context import in_solver_context
-from jointscope.graphs.validation import ValidationError, validation_error
+from jointscope.graphs.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.verdicts import MATTERS, SURE
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_editing import remove_effect
@@ -159,8 +159,8 @@ class _Search:
             removed=removed,
             robot=base.robot,
             train_error=errors.error,
-            heldout_error=comparison.error if self.holdout is not None else float("nan"),
-            floor=comparison.floor,
+            heldout_error=comparison.judged_error if self.holdout is not None else float("nan"),
+            floor=comparison.judged_floor,
             diagnosis=None,
             comparison=comparison,
             paragraph=paragraph,
@@ -192,7 +192,7 @@ class _Search:
         self.steps[-1] = replace(self.steps[-1], diagnosis=diagnosis)
 
     def _training_errors(self, base: BaseModel) -> ValidationError:
-        return validation_error(base, base.robot, base.calibrations, base.spans()[1])
+        return judged_error(base, base.robot, base.calibrations, fit_and_judge(base)[1])
 
     def _part(self, start: float) -> Progress:
         width = 1.0 / (self.max_steps + 1)

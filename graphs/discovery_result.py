@@ -94,6 +94,11 @@ class Discovery:
     heldout: Recording | None = field(default=None, repr=False)
 
     @property
+    def judged_by(self) -> str:
+        """Whose errors the steps tell: "0.1 s ahead", or of a simulated loop."""
+        return self.steps[0].comparison.judged_by
+
+    @property
     def robot(self) -> Robot:
         """The last model."""
         return self.steps[-1].robot

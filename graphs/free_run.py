@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.runge_kutta import runge_kutta, stable_substeps
+from jointscope.robots.controller_gain import controller_of
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
@@ -62,7 +63,7 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         RobotError: no controller, or effects on the command, which act before the controller's output is known.
         RecordingError: the recording holds no goals.
     """
-    controller, goal = robot.controller, recording.goal
+    controller, goal = controller_of(robot, recording), recording.goal
     if controller is None:
         raise RobotError(f"{robot.name} has no section `controller`; without it the loop cannot be simulated")
     if goal is None:
@@ -86,6 +87,12 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
     simulated = np.column_stack([np.interp(encoder.times, times, column) for column in positions.T])
     return FreeRun(encoder.channels, encoder.times, simulated, encoder.values)
+
+
+def loop_error(run: FreeRun, robot: Robot) -> float:
+    """Root mean square over all channels and the whole recording, in sensor sigmas."""
+    rms = np.array([run.rms[channel] for channel in robot.motor_encoder.channels])
+    return float(np.sqrt(np.mean((rms / robot.motor_encoder.sigmas) ** 2)))
 
 
 class _Stepper:

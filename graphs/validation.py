@@ -19,6 +19,8 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
 from jointscope.graphs.causal_filter import filter_states
 from jointscope.graphs.compare import HORIZON, Ahead, predict_ahead, smooth
+from jointscope.graphs.free_run import free_run, loop_error
+from jointscope.graphs.loop_validation import judged_by_loop, loop_squares
 from jointscope.graphs.prediction import Predictor
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -76,6 +78,36 @@ def validation_error(
     return ValidationError(_root_mean(long), _root_mean(short), by_span, by_channel)
 
 
+def fit_and_judge(base: BaseModel) -> tuple[list[Span], list[Span]]:
+    """Spans of the training recordings on which a refit is fitted, and those on which it is judged.
+
+    Predictions are judged where the refit has not been. A loop is not what is fitted: there whole recordings may be
+    used for both, and short ones can be judged, which cut in pieces would leave too little to fit.
+    """
+    fit, validation = base.spans()
+    if not judged_by_loop(base.robot, base.recordings):
+        return fit, validation
+    ticks = [base.problem_ticks(bag) for bag in range(len(base.recordings))]
+    return [Span(bag, float(t[0]), float(t[-1])) for bag, t in enumerate(ticks)], fit + validation
+
+
+def judged_error(
+    base: BaseModel, robot: Robot, biases: Sequence[Calibration], spans: Sequence[Span]
+) -> ValidationError:
+    """What a model is judged by: the loop simulated from its goals where that can be done, else predictions.
+
+    Arguments as in `validation_error`. Without predictions, `short` is not known.
+    """
+    if not judged_by_loop(base.robot, base.recordings):
+        return validation_error(base, robot, biases, spans)
+    squares = loop_squares(robot, base.recordings, spans)
+    channels = robot.motor_encoder.channels
+    mean = _mean_by_channel([squares], len(channels))
+    by_span = np.array([_root_mean(_mean_by_channel([[part]], len(channels))) for part in squares])
+    by_channel = dict(zip(channels, map(float, np.sqrt(mean)), strict=True))
+    return ValidationError(_root_mean(mean), float("nan"), by_span, by_channel)
+
+
 def _squares(problem: BagProblem, ahead: dict[str, Ahead], span: Span, horizon: float) -> Array:
     """Sum and count of squared errors per channel, shape (2, c)."""
     columns = []
@@ -99,7 +131,9 @@ def _root_mean(squares: Array) -> float:
 
 
 def heldout_error(robot: Robot, recording: Recording) -> float:
-    """The error 0.1 s ahead of `compare` on a recording that no fit has seen; biases are fitted to it."""
+    """The error by which `compare` judges a model on a recording that no fit has seen; biases are fitted to it."""
+    if judged_by_loop(robot, [recording]):
+        return loop_error(free_run(robot, recording), robot)
     problem, x, calibration = smooth(robot, recording)
     causal = filter_states(problem, x, calibration)
     ahead = predict_ahead(problem, calibration, Predictor(problem.robot, problem.timeline), causal, HORIZON)

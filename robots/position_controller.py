@@ -15,6 +15,8 @@ from jointscope.robots.yaml_section import Section
 
 Array = NDArray[np.float64]
 
+MEASURED = "measured"  # instead of a gain: each recording tells its own
+
 
 @dataclass(frozen=True)
 class PositionController:
@@ -22,16 +24,18 @@ class PositionController:
 
     Attributes:
         source: where the goals are in a bag [rad]; a goal that is NaN switches the drive off.
-        gain: command per angle of each joint, shape (n,) [unit of the command / rad].
+        gain: command per angle of each joint, shape (n,) [unit of the command / rad]; None where each recording tells
+            its own, see controller_gain.py.
         limit: largest command [unit of the command].
     """
 
     source: Topic
-    gain: tuple[float, ...]
+    gain: tuple[float, ...] | None
     limit: float
 
     def command(self, goal: Array, reading: Array) -> Array:
         """Command of every joint, zero where its drive is off; goal and reading of shape (n,) [rad]."""
+        assert self.gain is not None
         wanted = np.clip(np.array(self.gain) * (goal - reading), -self.limit, self.limit)
         return np.where(np.isfinite(goal), wanted, 0.0)
 
@@ -45,7 +49,10 @@ def position_controller(section: Section, source: Topic, joints: tuple[str, ...]
     for unit in source.units or (source.unit,):
         if si_unit(unit) not in ("rad", "m"):
             raise RobotError(f"{section.place}.unit: a goal position is an angle or a length, got {unit!r}")
+    limit = section.number("limit", 1.0, positive=True)
+    if section.raw("gain") == MEASURED:
+        return PositionController(source, None, limit)
     gain = section.array("gain", (len(joints),))
     if np.any(gain <= 0.0):
         raise RobotError(f"{section.place}.gain: expected numbers above zero")
-    return PositionController(source, tuple(gain.tolist()), section.number("limit", 1.0, positive=True))
+    return PositionController(source, tuple(gain.tolist()), limit)

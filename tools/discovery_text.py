@@ -38,7 +38,8 @@ def waterfall_text(result: Discovery) -> str:
         for k, step in enumerate(result.steps)
     ]
     head = ["step", "change", "training", "held out", "floor", "unexplained", "robot file"]
-    title = "Error 0.1 s ahead in sensor sigmas, on the training recordings (fitted to) and on the held-out recording:"
+    where = "on the training recordings (fitted to) and on the held-out recording"
+    title = f"Error {result.judged_by} in sensor sigmas, {where}:"
     return f"{title}\n{text_table(head, rows, '><>>>><')}"
 
 

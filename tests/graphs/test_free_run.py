@@ -22,7 +22,8 @@ OFF = 2.0  # [s] from when the drive is off
 
 @pytest.fixture(scope="module")
 def servo():
-    return load_robot("xl330_pendulum")
+    robot = load_robot("xl330_pendulum")
+    return replace(robot, controller=replace(robot.controller, gain=(0.28774,)))
 
 
 def pendulum(servo, switched_off=False, seconds=3.0):

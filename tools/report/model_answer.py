@@ -26,7 +26,7 @@ def diagnosis_answer(result: Diagnosis) -> Answer:
     """What a diagnosis says about its base model."""
     fitted = "" if result.heldout is not None else ", which the model was fitted to,"
     why = (
-        f"0.1 s ahead on the {judged_recording(result)}{fitted} the error is {significant(result.error)} sensor "
+        f"The error {result.judged_by} on the {judged_recording(result)}{fitted} is {significant(result.error)} sensor "
         f"sigmas, noise alone would give {significant(result.floor)}; {percent(base_unexplained_share(result))} of the "
         "squared error is unexplained."
     )

@@ -21,7 +21,7 @@ def diagnosis_verdict(result: Diagnosis) -> Section:
     missing, untestable = of_verdict(result, "missing"), of_verdict(result, "untestable")
     sigma = "<small>σ</small>"
     figures = [
-        (f"{significant(result.error)} {sigma}", f"error 0.1 s ahead on the {judged_recording(result)}"),
+        (f"{significant(result.error)} {sigma}", f"error {result.judged_by} on the {judged_recording(result)}"),
         (f"{significant(result.floor)} {sigma}", "what sensor noise and the uncertainty of the state alone would give"),
         (share_text(base_unexplained_share(result)), "of the squared error is unexplained"),
         (str(len(result.candidates)), f"effects tried: {len(missing)} missing, {len(untestable)} not testable here"),

@@ -18,7 +18,7 @@ def discovery_verdict(result: Discovery) -> Section:
     before, after = significant(judged_error(first)), significant(judged_error(last))
     arrow = f"{before} → {after}" if len(result.steps) > 1 else after
     figures = [
-        (f"{arrow} <small>σ</small>", f"error 0.1 s ahead on the {judged}"),
+        (f"{arrow} <small>σ</small>", f"error {result.judged_by} on the {judged}"),
         (f"{significant(last.floor)} <small>σ</small>", "what noise and the uncertainty of the state alone would give"),
         (share_text(unexplained_share(last)), "of the squared error is still unexplained"),
         (str(len(changes(result))), f"effects changed, {len(result.steps)} models calibrated"),

@@ -23,9 +23,9 @@ TRAINING, HELD_OUT = "m0", "m1"
 def waterfall(result: Discovery) -> Section:
     """Bars and the same as a table."""
     lead = (
-        "Error 0.1 s ahead, root mean square over all channels, in sensor sigmas. Training: on the recordings that "
-        "every step was calibrated with, nothing left out. The held-out recording is scored once per step and never "
-        "chooses. Mark: the floor, what noise and the uncertainty of the state alone would give."
+        f"Error {result.judged_by}, root mean square over all channels, in sensor sigmas. Training: on the "
+        "recordings that every step was calibrated with, nothing left out. The held-out recording is scored once per "
+        "step and never chooses. Mark: the floor, what noise and the uncertainty of the state alone would give."
     )
     keys = [Key("training recordings", TRAINING, "thick")]
     keys += [Key("held-out recording", HELD_OUT, "thick")] if result.held_out else []
