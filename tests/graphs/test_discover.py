@@ -56,7 +56,8 @@ class MadeUp:
         patch.setattr(search, "BaseModel", SimpleNamespace(of=self.calibrate))
         patch.setattr(search, "diagnose", self.diagnose)
         patch.setattr(search, "compare_model", lambda label, robot, recording: self.compare(robot))
-        patch.setattr(search, "validation_error", lambda base, robot, *rest: SimpleNamespace(error=self.error(robot)))
+        patch.setattr(search, "judged_error", lambda base, robot, *rest: SimpleNamespace(error=self.error(robot)))
+        patch.setattr(search, "fit_and_judge", lambda base: ([], []))
 
     def labels(self, robot):
         return [here.label for here in robot.effects]
@@ -65,7 +66,7 @@ class MadeUp:
         return 8.0 * 0.5 ** len(set(self.labels(robot)) & set(self.hidden))
 
     def compare(self, robot):
-        return SimpleNamespace(error=self.error(robot), floor=1.0)
+        return SimpleNamespace(judged_error=self.error(robot), judged_floor=1.0)
 
     def calibrate(self, robot, recordings, start=None):
         self.calibrated.append(self.labels(robot))

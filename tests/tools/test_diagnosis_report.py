@@ -37,7 +37,7 @@ def test_every_section_is_there_in_order_and_holds_only_numbers(page):
 
 def test_the_answer_names_the_effect_and_its_numbers(page):
     assert "The model is not adequate: it lacks bearing_flexibility@joint1." in page.text
-    told = "0.1 s ahead on the held-out recording the error is 13.2 sensor sigmas, noise alone would give 1.20; 99 %"
+    told = "The error 0.1 s ahead on the held-out recording is 13.2 sensor sigmas, noise alone would give 1.20; 99 %"
     assert told in page.text
 
 
@@ -73,7 +73,7 @@ def test_an_adequate_model_is_called_adequate_and_has_nothing_to_add():
     page.check()
     assert "The model is adequate: no physical effect is missing." in page.text
     assert "jointscope add" not in page.text
-    assert "on the training recording, which the model was fitted to, the error is 1.23 sensor sigmas" in page.text
+    assert "on the training recording, which the model was fitted to, is 1.23 sensor sigmas" in page.text
     assert "the base model, which was fitted to them, too, has 1.26 σ" in page.text
 
 
