@@ -116,8 +116,12 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
 
 
 def parameter_of(here: EffectAt, p: EffectParameter, value: float) -> Parameter:
-    """A parameter of an added effect: prior about the null value, or about the start where it has none."""
-    centre = p.start if p.is_shape or p.logarithmic else p.null
+    """A parameter of an added effect: prior about the null value, or about the start where it has none.
+
+    The shape of a law (the order of a ripple) was chosen among several: its prior is about the chosen value.
+    """
+    chosen = p.is_shape and not isinstance(here.effect, Structure)
+    centre = value if chosen else p.start if p.is_shape or p.logarithmic else p.null
     return Parameter(
         name=here.parameter(p.name),
         value=value,

@@ -181,3 +181,10 @@ def test_an_effect_that_is_not_there_is_answered_with_those_that_are(robot):
     with pytest.raises(EffectError) as error:
         remove_effect(robot, "cogging@joint2")
     assert str(error.value) == f"doggy does not have the effect 'cogging@joint2'; it has {OFFSET}, {DRAG}, {MEMORY}"
+
+
+def test_the_prior_of_a_shape_is_about_the_chosen_value():
+    robot = add_effect(load_robot("doggy"), "encoder_eccentricity@joint1", {"cos": 2e-4, "order": 42.092})
+    order, cos = (robot.parameters[f"joint1.encoder_eccentricity.{name}"] for name in ("order", "cos"))
+    assert (order.value, order.prior) == (42.092, 42.092)
+    assert (cos.value, cos.prior) == (2e-4, 0.0)
