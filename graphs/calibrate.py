@@ -21,7 +21,7 @@ from jointscope.graphs.calibration_result import CalibrationResult, IterationRec
 from jointscope.graphs.calibration_summary import Solved, summarize
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.memory_start import with_filled_memories
-from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
+from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
@@ -210,7 +210,7 @@ def approach(
     Where that one step leads away, as it may under a model that lacks much, several checked ones are taken.
     """
     states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
-    loose = scaled(noise, np.maximum(APPROACH * LOOSE / densities(noise), 1.0))
+    loose = not_below(noise, APPROACH * LOOSE)
     now = [p.with_noise(loose) for p in problems]
     start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
     estimate = first_step(now, start, hold)
@@ -221,7 +221,7 @@ def approach(
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:
     """Noise with which any start value can be approached; the estimation goes down from there."""
-    return scaled(noise, np.maximum(LOOSE / densities(noise), 1.0))
+    return not_below(noise, LOOSE)
 
 
 def _must_converge(solution: Solution, enough: float) -> None:

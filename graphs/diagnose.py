@@ -92,9 +92,9 @@ def diagnose(
     comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
-    spans = fit_and_judge(base)[1]
+    fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
-    trialled, failed = _refit_leaders(base, scored, before.error, holdout, leaders, report)
+    trialled, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report)
     clock.stage("refits")
     seconds = sum(span.t1 - span.t0 for span in spans)
     candidates = _ranked(
@@ -175,6 +175,7 @@ def _refit_leaders(
     base: BaseModel,
     scored: ScoredCandidates,
     error: float,
+    spans: tuple[Sequence[Span], Sequence[Span]],
     holdout: Recording | None,
     leaders: int,
     report: Progress,
@@ -191,7 +192,7 @@ def _refit_leaders(
         if candidate.plausible < enough or (i >= leaders and helped):
             break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
-        trial = _trial(base, candidate, *fit_and_judge(base), holdout)
+        trial = _trial(base, candidate, *spans, holdout)
         if trial is None:
             failed.add(candidate.label)
             continue

@@ -99,6 +99,11 @@ def scaled(noise: ProcessNoise, factors: Array, memories: int = 0) -> ProcessNoi
     )
 
 
+def not_below(noise: ProcessNoise, smallest: float) -> ProcessNoise:
+    """Noise with the smaller densities raised; those of memories stay."""
+    return scaled(noise, np.maximum(smallest / densities(noise), 1.0))
+
+
 def densities(noise: ProcessNoise) -> Array:
     """All densities, link before motor before memories, shape (r,)."""
     return np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])

@@ -17,7 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
 from jointscope.graphs.batch_solver import Estimate, solve
-from jointscope.graphs.noise_estimation import densities, estimate_noise, scaled
+from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.posterior import posteriors
 from jointscope.graphs.score_test import TrialScore
 from jointscope.robots.effect_editing import add_effect
@@ -71,7 +71,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: TrialScore | None, labe
     elif label:
         robot = add_effect(robot, label)
     # noise that is next to nothing holds the states where the model without the effect has them
-    noise = scaled(robot.noise, np.maximum(EASY / densities(robot.noise), 1.0)) if robot.noise.estimate else robot.noise
+    noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
     problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
     if score is not None or label:
         # the states still are those of a model without the effect: they follow before all parameters move

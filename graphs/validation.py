@@ -72,10 +72,8 @@ def validation_error(
             for i, span in enumerate(spans):
                 if span.bag == bag:
                     target[i].append(_squares(problem, ahead, span, horizon))
-    long, short = (_mean_by_channel(parts, len(channels)) for parts in (squares[HORIZON], squares[SHORT]))
-    by_span = np.array([_root_mean(_mean_by_channel([parts], len(channels))) for parts in squares[HORIZON]])
-    by_channel = dict(zip(channels, map(float, np.sqrt(long)), strict=True))
-    return ValidationError(_root_mean(long), _root_mean(short), by_span, by_channel)
+    short = _root_mean(_mean_by_channel(squares[SHORT], len(channels)))
+    return _summed(squares[HORIZON], short, channels)
 
 
 def fit_and_judge(base: BaseModel) -> tuple[list[Span], list[Span]]:
@@ -100,12 +98,16 @@ def judged_error(
     """
     if not judged_by_loop(base.robot, base.recordings):
         return validation_error(base, robot, biases, spans)
-    squares = loop_squares(robot, base.recordings, spans)
-    channels = robot.motor_encoder.channels
-    mean = _mean_by_channel([squares], len(channels))
-    by_span = np.array([_root_mean(_mean_by_channel([[part]], len(channels))) for part in squares])
+    squares = [[part] for part in loop_squares(robot, base.recordings, spans)]
+    return _summed(squares, float("nan"), robot.motor_encoder.channels)
+
+
+def _summed(squares: Sequence[Sequence[Array]], short: float, channels: tuple[str, ...]) -> ValidationError:
+    """From sums and counts of squared errors by span, and the error at the short horizon."""
+    mean = _mean_by_channel(squares, len(channels))
+    by_span = np.array([_root_mean(_mean_by_channel([parts], len(channels))) for parts in squares])
     by_channel = dict(zip(channels, map(float, np.sqrt(mean)), strict=True))
-    return ValidationError(_root_mean(mean), float("nan"), by_span, by_channel)
+    return ValidationError(_root_mean(mean), short, by_span, by_channel)
 
 
 def _squares(problem: BagProblem, ahead: dict[str, Ahead], span: Span, horizon: float) -> Array:

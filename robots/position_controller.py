@@ -46,7 +46,7 @@ def position_controller(section: Section, source: Topic, joints: tuple[str, ...]
     Raises:
         RobotError: not an angle, another number of gains than of joints, or gains and a limit that are not positive.
     """
-    for unit in source.units or (source.unit,):
+    for unit in source.bag_units(len(joints)):
         if si_unit(unit) not in ("rad", "m"):
             raise RobotError(f"{section.place}.unit: a goal position is an angle or a length, got {unit!r}")
     limit = section.number("limit", 1.0, positive=True)

@@ -82,7 +82,7 @@ def _check_positions(robot: Robot, place: str) -> None:
     for sensor in robot.sensors.values():
         if not isinstance(sensor, MotorEncoder | LinkEncoder):
             continue
-        given = sensor.source.units or (sensor.source.unit,) * robot.n
+        given = sensor.source.bag_units(robot.n)
         for joint, unit, got in zip(robot.joints, sensor.units, given, strict=True):
             if unit != robot.unit_at(joint, "rad"):
                 kind, wanted = ("prismatic", "m or mm") if unit == "rad" else ("no prismatic joint", "rad, deg or turn")

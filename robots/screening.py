@@ -193,7 +193,7 @@ def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
 def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
     """Which unit would bring the positions of a joint back to what is allowed."""
     encoder = robot.motor_encoder
-    now = (encoder.source.units or (encoder.source.unit,) * robot.n)[joint]
+    now = encoder.source.bag_units(robot.n)[joint]
     place = f"`unit` of sensors.{encoder.name} in the robot file (now {now})"
     for unit in UNITS:
         if si_unit(unit) == si_unit(now) and excess * si_factor(unit) / si_factor(now) <= BEYOND_LIMIT:

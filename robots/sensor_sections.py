@@ -78,7 +78,7 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
 def _position(section: Section, joints: tuple[str, ...]) -> tuple[Topic, Array]:
     """Topic of an encoder, and its sigma for each joint: one number for all, or a list."""
     source = topic(section, joints, scaled=True)
-    for unit in source.units or (source.unit,):
+    for unit in source.bag_units(len(joints)):
         if si_unit(unit) not in ("rad", "m"):
             raise RobotError(f"{section.place}.unit: an encoder measures an angle or a length, got {unit!r}")
     if not isinstance(section.raw("sigma"), Sequence):

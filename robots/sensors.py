@@ -43,9 +43,13 @@ class Topic:
         by_unit = np.array([si_factor(unit) for unit in self.units]) if self.units else np.array(si_factor(self.unit))
         return by_unit * np.asarray(self.scale or 1.0)
 
+    def bag_units(self, channels: int) -> tuple[str, ...]:
+        """Unit in the bag of each of the channels."""
+        return self.units or (self.unit,) * channels
+
     def si_units(self, channels: int) -> tuple[str, ...]:
         """SI unit of each of the channels."""
-        return tuple(si_unit(unit) for unit in self.units or (self.unit,) * channels)
+        return tuple(si_unit(unit) for unit in self.bag_units(channels))
 
 
 @dataclass(frozen=True)

@@ -190,7 +190,7 @@ def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple
                 source.topic,
                 msgtype,
                 source.field,
-                joined(source.units or (source.unit,)),
+                joined(source.bag_units(1)),
                 problem,
                 candidates,
             )
