@@ -36,6 +36,8 @@ class Steps:
         weight: W of each step, shape (m, n_link, n_link); None for the identity.
         path: how the commands act, where effects change them; None where they act as logged.
         index: place of each step in the path, shape (m,).
+        slack: factor on the standard deviations of each step, shape (m,); None for 1. Large where something acts that
+            does not belong to the robot.
     """
 
     h: Array
@@ -45,6 +47,7 @@ class Steps:
     weight: Array | None = None
     path: CommandPath | None = None
     index: NDArray[np.intp] | None = None
+    slack: Array | None = None
 
     def __len__(self) -> int:
         return len(self.h)
@@ -53,7 +56,8 @@ class Steps:
         """Some of the steps."""
         weight = None if self.weight is None else self.weight[samples]
         index = None if self.index is None else self.index[samples]
-        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index)
+        slack = None if self.slack is None else self.slack[samples]
+        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index, slack=slack)
 
     def acting(self, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
         """Commands that act, shape (m, n), and their derivatives by parameters of effects, by full name.
@@ -76,6 +80,8 @@ class Steps:
         """Standard deviations of the rows (velocities, memories, positions; link before motor), shape (m, d)."""
         density = np.concatenate([self.noise.link_velocity, self.noise.motor_velocity, self.noise.memory])
         root = np.sqrt(self.h)[:, None]
+        if self.slack is not None:
+            root = root * self.slack[:, None]
         rates = density * root
         velocity = rates[:, : len(self.layout.velocities)]
         if self.integrated:

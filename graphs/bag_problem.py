@@ -41,6 +41,7 @@ INTEGRATORS: dict[str, type[DynamicsFactor]] = {
 }
 DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
+SLACK = 1e3  # on the process noise where something unknown acts; the sensors alone tell the states there
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
 
 
@@ -74,7 +75,8 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, path if path.changes else None, index)
+        acting, slack = path if path.changes else None, _slack(recording, timeline)
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory.spread for memory in robot.memories.values())
@@ -117,6 +119,13 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     M_at_zero = tree.mass_matrix(np.zeros((1, layout.n_link)))[0]
     alone = 1.0 / np.diag(np.linalg.inv(M_at_zero))
     return M / alone[:, None]
+
+
+def _slack(recording: Recording, timeline: Timeline) -> Array | None:
+    """Steps that touch a stretch that is left out bind the motion no more; None where there are none."""
+    if not recording.left_out:
+        return None
+    return np.where(recording.are_judged(timeline.ticks[1:], timeline.h), 1.0, SLACK)
 
 
 def first_command_time(recording: Recording) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.isolated_torque import IsolatedTorque
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import ProcessNoise, Robot
 
@@ -110,6 +111,7 @@ class BagFit:
         residuals: by sensor name.
         process: residual of the dynamics, one column per equation (link, motor, memories), shape (m - 1, r) [rad/s].
         process_sigma: its standard deviation, shape (m - 1, r) [rad/s].
+        isolated: moments in which a torque acts that the motion does not ask for at other times.
     """
 
     recording: Recording
@@ -121,6 +123,7 @@ class BagFit:
     residuals: dict[str, ResidualSeries]
     process: Array
     process_sigma: Array
+    isolated: tuple[IsolatedTorque, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from jointscope.graphs.calibration_result import (
 )
 from jointscope.graphs.findings import findings
 from jointscope.graphs.identifiability import weak_directions
+from jointscope.graphs.isolated_torque import isolated_torques_of
 from jointscope.graphs.noise_estimation import NoiseEvidence
 from jointscope.graphs.posterior import StatePosterior, posteriors
 from jointscope.graphs.residual_collection import BagResiduals, collect, series_of
@@ -128,17 +129,18 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
             residuals[name] = series_of(problem, sensor, collector.series[name])
     process = np.concatenate([r for r, _ in collector.process])
     process_sigma = np.concatenate([s for _, s in collector.process])
-    u = problem.timeline.u
+    u, states = problem.timeline.u, solution.estimate.states[i]
     return BagFit(
         recording=problem.recording,
         calibration=solution.estimate.calibrations[i],
         ticks=problem.timeline.ticks,
         commands=np.vstack([u, u[-1:]]),
-        states=solution.estimate.states[i],
+        states=states,
         sigmas=posterior.sigmas,
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,
+        isolated=isolated_torques_of(problem, states, process),
     )
 
 

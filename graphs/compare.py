@@ -28,6 +28,7 @@ from jointscope.graphs.comparison_result import (
 )
 from jointscope.graphs.free_run import FreeRun, free_run
 from jointscope.graphs.initial_guess import initial_biases
+from jointscope.graphs.isolated_torque import isolated_torques_of
 from jointscope.graphs.joint_states import JointStates
 from jointscope.graphs.noise_floor import channel_floors
 from jointscope.graphs.prediction import Predictor
@@ -83,6 +84,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
     channels = _channels(robot, recording, ahead, open_loop)
     error = float(np.sqrt(np.mean([(c.horizons[str(HORIZON)] / c.noise_sigma) ** 2 for c in channels.values()])))
     floors = channel_floors(problem, states, calibration, HORIZON)
+    defects = problem.dynamics.residual((states[:-1], states[1:]), calibration)
     return ModelComparison(
         label=label,
         robot=robot,
@@ -95,6 +97,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         motion=JointStates.of(robot, problem.timeline.ticks, states),
         predicted_motion=_predicted_motion(robot, recording, ahead[HORIZONS[0]]),
         free_run=_free_run(robot, recording),
+        isolated=isolated_torques_of(problem, states, defects),
     )
 
 

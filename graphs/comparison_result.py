@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.free_run import FreeRun, loop_error
+from jointscope.graphs.isolated_torque import IsolatedTorque
 from jointscope.graphs.joint_states import JointStates
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
@@ -96,6 +97,7 @@ class ModelComparison:
         motion: smoothed motion of the joints at all ticks; None where it was not kept.
         predicted_motion: motion 0.01 s ahead of the causal states; None where it was not kept.
         free_run: the whole recording simulated with the position controller; None for other robots.
+        isolated: moments in which a torque acts that the motion does not ask for at other times.
     """
 
     label: str
@@ -109,6 +111,7 @@ class ModelComparison:
     motion: JointStates | None = None
     predicted_motion: JointStates | None = None
     free_run: FreeRun | None = None
+    isolated: tuple[IsolatedTorque, ...] = ()
 
     @property
     def judged_by(self) -> str:
@@ -149,4 +152,5 @@ def _model_json(model: ModelComparison) -> dict[str, Any]:
             for name, c in model.channels.items()
         },
         "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in model.worst],
+        "isolated": [moment.to_json() for moment in model.isolated],
     }

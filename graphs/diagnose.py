@@ -134,9 +134,10 @@ def diagnose(
 
 
 def _suspicions(base: BaseModel) -> list[str]:
-    """Plain mistakes that the screening saw: they look like effects, so they come first."""
+    """Plain mistakes that the screening saw, and pushes: they look like effects, so they come first."""
     notices = [notice for recording in base.recordings for notice in screen(recording, base.robot)]
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
+    texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{SUSPICION}: {text}." for text in texts]
 
 

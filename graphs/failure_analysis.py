@@ -118,7 +118,8 @@ def analyse_failure(comparison: ModelComparison, recording: Recording) -> Failur
         where = concentration(e.error**2, masks)
         findings.append(Finding(e, where, masks, failure.correlations, failure.whiteness_p))
     time_in_regime = {name: float(np.mean(np.any(mask, axis=1))) for name, mask in regimes.masks.items()}
-    return FailureAnalysis(channels, time_in_regime, sentences(findings, robot, regimes))
+    isolated = tuple(f"{moment.sentence(recording)}." for moment in comparison.isolated)
+    return FailureAnalysis(channels, time_in_regime, (*isolated, *sentences(findings, robot, regimes)))
 
 
 def _encoder_motion(comparison: ModelComparison) -> JointStates | None:

@@ -22,7 +22,8 @@ def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple
         result: a calibration without findings.
         notices: what the screening saw.
     """
-    said = [*_not_at_rest(result), _verdict(result), *_sensor_noise(result), *_process_noise(result)]
+    said = [*_not_at_rest(result), *_isolated(result), _verdict(result)]
+    said += [*_sensor_noise(result), *_process_noise(result)]
     said += _coloured(result)
     said += [direction.text for direction in result.weak_directions]
     said += [f"{p.name}: {p.note}" for p in result.parameters if p.note and "prior" not in p.note]
@@ -39,6 +40,10 @@ def _not_at_rest(result: CalibrationResult) -> list[str]:
         "gained any more although values still moved; believe no value and no sigma before the missing effect is in "
         "the model: jointscope diagnose"
     ]
+
+
+def _isolated(result: CalibrationResult) -> list[str]:
+    return [moment.sentence(bag.recording) for bag in result.bags for moment in bag.isolated]
 
 
 def _verdict(result: CalibrationResult) -> str:

@@ -62,9 +62,10 @@ class NoiseEvidence:
     def add(self, part: ResidualPart) -> None:
         """Takes in some residuals; those of other factors are ignored."""
         if isinstance(part.factor, DynamicsFactor):
-            half = len(self.squares)
-            self.squares += np.sum(part.residual[:, :half] ** 2, axis=0)
-            self.freedom += np.sum(1.0 - part.leverage[:, :half], axis=0)
+            half, slack = len(self.squares), part.factor.steps.slack
+            own = slice(None) if slack is None else slack == 1.0
+            self.squares += np.sum(part.residual[own, :half] ** 2, axis=0)
+            self.freedom += np.sum(1.0 - part.leverage[own, :half], axis=0)
 
     def __add__(self, other: NoiseEvidence) -> NoiseEvidence:
         """Both together."""

@@ -34,6 +34,14 @@ def settled_from(problem: BagProblem) -> float:
     return min(motion + SETTLING, 0.5 * float(ticks[0] + ticks[-1]))
 
 
+def are_judged(problem: BagProblem, start: NDArray[np.intp], horizon: float) -> NDArray[np.bool_]:
+    """Whether predictions from these ticks are the model's own: nothing left out in them, nor just before, shape (s,).
+
+    Where a stretch that is left out ends, the filter knows no more than at a start in motion.
+    """
+    return problem.recording.are_judged(problem.timeline.ticks[start] + horizon, horizon + SETTLING)
+
+
 def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> dict[str, float]:
     """Root mean square of the expected error `horizon` seconds ahead, in sensor sigmas, by channel.
 
@@ -49,6 +57,8 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
     first = int(np.searchsorted(problem.timeline.ticks, settled_from(problem)))
     last = max(len(x) - 2 - steps, 0)
     start = np.unique(np.linspace(min(first, last), last, STARTS).astype(int))
+    judged = are_judged(problem, start, horizon)
+    start = start[judged] if np.any(judged) else start
     P = filtered.covariance[start]
     for i in range(min(steps, len(x) - 2)):
         P = _advance(quiet, x, calibration, start + i, P)

@@ -15,7 +15,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.interpolated import interpolate
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.causal_filter import FilteredStates
-from jointscope.graphs.noise_floor import settled_from
+from jointscope.graphs.noise_floor import are_judged, settled_from
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.sensor_placement import factor_on_state
 from jointscope.robots.lateness import Lateness, late_channels
@@ -76,6 +76,7 @@ def predict_ahead(
             name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))), causal.mean[:0])
             for name, s in problem.robot.sensors.items()
         }
+    judged = are_judged(problem, start, horizon)
     wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
     taken = [g.taken[wanted[g.sensor][0]] for g in groups]
     steps = [timeline.locate(times)[0] for times in taken]
@@ -89,6 +90,7 @@ def predict_ahead(
     for name, (sample, near) in wanted.items():
         own = [(g, states) for g, states in zip(groups, found, strict=True) if g.sensor == name]
         good = near & np.all([np.all(np.isfinite(states), axis=1) for _, states in own], axis=0)
+        good &= judged
         stamps = problem.recording.streams[name].times[sample[good]]
         predicted = np.full((len(stamps), len(problem.robot.sensors[name].channels)), np.nan)
         for group, states in own:

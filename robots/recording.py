@@ -7,12 +7,18 @@ absolute start in nanoseconds is kept so that a sample can be found again in its
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.errors import RecordingError
+
 Array = NDArray[np.float64]
+
+GRID = 1000  # instants at which a recording is looked at
+SMALLEST_SHARE = 0.2  # of a recording that has to be left
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,8 @@ class Recording:
         streams: by name; always contains "command".
         notices: what was dropped and why, and what looked odd.
         goal: goal positions of a position-controlled robot [rad], NaN where a drive was off; None without.
+        left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
+            motion do not hold there, and no model is judged by them.
     """
 
     path: str
@@ -81,6 +89,7 @@ class Recording:
     streams: dict[str, Stream]
     notices: list[Notice] = field(default_factory=list)
     goal: Stream | None = None
+    left_out: tuple[tuple[float, float], ...] = ()
 
     @property
     def command(self) -> Stream:
@@ -115,4 +124,40 @@ class Recording:
                 received,
             )
         goal = None if self.goal is None else self.goal.between(t0, t1)
-        return Recording(self.path, self.sha256, self.start_ns, streams, self.notices, goal)
+        return replace(self, streams=streams, goal=goal)
+
+    def leaving_out(self, stretches: Sequence[tuple[float, float]]) -> Recording:
+        """The same recording with further stretches (t0, t1) [s] left out.
+
+        Raises:
+            RecordingError: a stretch ends before it begins or lies outside, or hardly anything would be left.
+        """
+        first = min(float(s.times[0]) for s in self.streams.values())
+        last = first + self.duration
+        for t0, t1 in stretches:
+            if not t0 < t1 or t1 <= first or t0 >= last:
+                raise RecordingError(
+                    f"{self.path}: cannot leave out {t0:g} to {t1:g} s; expected a beginning before its end, within "
+                    f"{first:.2f} to {last:.2f} s"
+                )
+        both = (*self.left_out, *stretches)
+        left = float(np.mean(self.are_apart(np.linspace(first, last, GRID), both)))
+        if left < SMALLEST_SHARE:
+            raise RecordingError(
+                f"{self.path}: only {100 * left:.0f} % would be left; cut the recording, or leave out less"
+            )
+        return replace(self, left_out=both)
+
+    def are_judged(self, times: Array, horizon: Array | float = 0.0) -> NDArray[np.bool_]:
+        """Whether what happened in the last `horizon` seconds before each time was all the robot's own, shape (m,)."""
+        return self.are_apart(times, self.left_out, horizon)
+
+    @staticmethod
+    def are_apart(
+        times: Array, stretches: Sequence[tuple[float, float]], horizon: Array | float = 0.0
+    ) -> NDArray[np.bool_]:
+        """Whether [time - horizon, time] touches none of the stretches, shape (m,)."""
+        apart = np.ones(len(times), bool)
+        for t0, t1 in stretches:
+            apart &= (times < t0) | (times - horizon > t1)
+        return apart

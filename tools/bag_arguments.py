@@ -10,6 +10,7 @@ from pathlib import Path
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.tools.left_out import add_leave_out_option, leave_out
 from jointscope.tools.progress import Progress, reading
 from jointscope.tools.user_effects import add_effects_option
 
@@ -27,6 +28,7 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="hold out the last part of the only BAG instead, for example 0.33; zeros and biases are then found anew",
     )
+    add_leave_out_option(parser)
     add_effects_option(parser)
 
 
@@ -40,17 +42,19 @@ def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tup
     """The training recordings and the held-out one.
 
     Raises:
-        RecordingError: a bag cannot be read, or the held-out one is also a training recording.
+        RecordingError: a bag cannot be read, the held-out one is also a training recording, or what is to be left out
+            is not there.
     """
     from jointscope.tools.bags import read_recording
 
     recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
     if args.holdout_share is not None:
-        return _last_part_held_out(args, recordings)
+        return _last_part_held_out(args, leave_out(recordings, args.leave_out))
     if args.holdout is None:
-        return recordings, None
+        return leave_out(recordings, args.leave_out), None
     holdout = read_recording(args.holdout, robot, reading(args.holdout, progress))
     _check_apart(recordings, holdout)
+    *recordings, holdout = leave_out([*recordings, holdout], args.leave_out)
     return recordings, holdout
 
 

@@ -19,6 +19,7 @@ def comparison_text(result: ComparisonResult) -> str:
         _channels(result),
         _free_runs(result),
         *(_worst(model) for model in result.models),
+        *(moment.sentence(recording) for moment in result.models[-1].isolated),
     ]
     return "\n\n".join(part for part in parts if part)
 

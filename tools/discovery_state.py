@@ -42,11 +42,14 @@ def hashes_of(
     robot: Robot, recordings: Sequence[Recording], holdout: Recording | None, effects: Sequence[Path]
 ) -> dict[str, Any]:
     """What a discovery started from, as hashes."""
+    everything = [*recordings, *([holdout] if holdout else [])]
+    stretches = [[list(stretch) for stretch in recording.left_out] for recording in everything]
     return {
         "robot": _sha256(robot.path, robot.tree.urdf),
         "bags": [recording.sha256 for recording in recordings],
         "holdout": holdout.sha256 if holdout else None,
         "effects": [_sha256(file) for file in effects],
+        "left_out": stretches if any(stretches) else None,
     }
 
 

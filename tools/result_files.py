@@ -197,6 +197,7 @@ def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
         "start": start,
         "bags": [
             {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
+            | ({"left_out": [list(stretch) for stretch in recording.left_out]} if recording.left_out else {})
             for recording in recordings
         ],
     }

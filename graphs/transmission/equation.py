@@ -117,6 +117,7 @@ def gyro_equation(recording: Recording, robot: Robot, gyro: Gyro, delay: float) 
     margin = window / 2 + DIFFERENCE
     kept = (stream.times >= first + margin) & (stream.times <= last - margin)
     kept &= away_from_gaps(stream, stream.times, window) & away_from_gaps(link, stream.times - delay, window)
+    kept &= recording.are_judged(stream.times)
     times = stream.times[kept]
 
     def rate(moments: Array) -> Array:

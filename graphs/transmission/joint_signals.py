@@ -57,6 +57,7 @@ def joint_signals(recording: Recording, robot: Robot) -> JointSignals:
     others = [link] if torque is None else [link, torque]
     inside = (motor.times >= link.times[0] + window / 2) & (motor.times <= link.times[-1] - window / 2)
     inside &= np.all([away_from_gaps(stream, motor.times, window) for stream in others], axis=0)
+    inside &= recording.are_judged(motor.times)
     times = motor.times[inside]
     if len(times) < FEWEST:
         raise RecordingError(

@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from jointscope.tools.left_out import add_leave_out_option, leave_out
 from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.user_effects import add_effects_option, load_user_effects
@@ -31,6 +32,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
@@ -48,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
     with progress_bar() as progress:
-        recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+        read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+        recordings = leave_out(read, args.leave_out)
         if robot.free_links:
             from jointscope.tools.free_links import run_free_links
 

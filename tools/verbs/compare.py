@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.left_out import add_leave_out_option, leave_out
 from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.result_files import ResultFiles, add_result_options, write_comparison
 from jointscope.tools.user_effects import add_effects_option, load_user_effects
@@ -30,6 +31,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_models_and_bag(parser)
+    add_leave_out_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
@@ -57,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     check_same_streams(robots)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
-        recording = read_recording(args.bag, first, reading(args.bag, progress))
+        (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
         result = compare(robots, recording, progress=progress)
         write_comparison(result, files)
     print(comparison_text(result))

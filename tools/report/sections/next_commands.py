@@ -10,6 +10,7 @@ from html import escape
 from jointscope.graphs.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery_result import Discovery
 from jointscope.robots.recording import Recording
+from jointscope.tools.left_out import left_out_arguments
 from jointscope.tools.report.model_answer import missing_numerics, of_verdict
 from jointscope.tools.report.page import Section
 from jointscope.tools.report.robot_argument import robot_argument
@@ -29,7 +30,7 @@ def after_diagnosis(result: Diagnosis) -> Section:
         effect = _quoted(found[0])
         commands = [f"jointscope add {robot} {effect} -o with_effect.yaml", _calibrate("with_effect.yaml", bags)]
         if result.heldout is not None:
-            commands.append(f"jointscope compare {robot} calibrated.yaml {_quoted(result.heldout.path)}")
+            commands.append(f"jointscope compare {robot} calibrated.yaml {_paths([result.heldout])}")
         blocks.append(("Add the first effect, calibrate, and see whether the error falls:", commands))
     discover = f"jointscope discover {robot} {bags}{held} -o found.yaml --report discovery.html"
     blocks.append(("Or let the effects be added one by one, as long as the error falls:", [discover]))
@@ -39,7 +40,7 @@ def after_diagnosis(result: Diagnosis) -> Section:
 def after_discovery(result: Discovery) -> Section:
     """Look at the model that was found, and undo its last step."""
     file = _quoted(result.robot_file or "found.yaml")
-    bag = _quoted(result.heldout.path) if result.heldout is not None else "ANOTHER_BAG"
+    bag = _paths([result.heldout]) if result.heldout is not None else "ANOTHER_BAG"
     first = _quoted(result.steps[0].robot_file or robot_argument(result.steps[0].robot))
     blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
     last = result.steps[-1].added
@@ -62,11 +63,15 @@ def _calibrate(robot: str, bags: str) -> str:
 
 
 def _holdout(recording: Recording | None) -> str:
-    return f" --holdout {_quoted(recording.path)}" if recording is not None else ""
+    return f" --holdout {_paths([recording])}" if recording is not None else ""
 
 
 def _paths(recordings: Sequence[Recording]) -> str:
-    return " ".join(_quoted(recording.path) for recording in recordings) or "BAG"
+    return " ".join([*(_quoted(recording.path) for recording in recordings), *_left_out(recordings)]) or "BAG"
+
+
+def _left_out(recordings: Sequence[Recording]) -> list[str]:
+    return [f"--leave-out {_quoted(stretch)}" for stretch in left_out_arguments(recordings)]
 
 
 def _quoted(text: str) -> str:

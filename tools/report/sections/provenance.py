@@ -27,6 +27,9 @@ def provenance(
         entries.append(("sha256", f"<code>{escape(recording.sha256) or '—'}</code>"))
         size = f"{significant(recording.duration, 4)} s, {recording.sample_count} messages"
         entries.append(("content", f"{size}, starts {begin:%Y-%m-%d %H:%M:%S} UTC"))
+        if isinstance(recording, Recording) and recording.left_out:
+            stretches = ", ".join(f"{t0:g} to {t1:g} s" for t0, t1 in recording.left_out)
+            entries.append(("left out", stretches))
     for robot in robots:
         choices = robot.choices
         text = f"integrator {choices.integrator}, Coriolis terms {'on' if choices.coriolis else 'off'}"
