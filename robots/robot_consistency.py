@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import LinkEncoder, MotorEncoder, TorqueSensor
+from jointscope.robots.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
 
 DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "torque_constant": "N m/A", "inertia": "kg m2"}
@@ -31,6 +31,7 @@ def check_robot(robot: Robot) -> None:
                 f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
             )
     _check_names(robot, place)
+    _check_stamps(robot, place)
     _check_positions(robot, place)
     _check_gyro_forms(robot, place)
     if not any(isinstance(sensor, MotorEncoder) for sensor in robot.sensors.values()):
@@ -60,6 +61,19 @@ def _check_links(robot: Robot, place: str) -> None:
             f"{place}: sensors.{robot.torque_sensor.name}: joint_torque is used with link_dynamics: free only; "
             "remove the sensor, or set model.link_dynamics"
         )
+
+
+def _check_stamps(robot: Robot, place: str) -> None:
+    """Joints have their stamps from sensors that exist and that are stamped by themselves."""
+    sources = {"command": robot.command} | {f"sensors.{name}": s.source for name, s in robot.sensors.items()}
+    known = [name for name, sensor in robot.sensors.items() if not sensor.source.stamped_by]
+    for where, source in sources.items():
+        for name in source.stamped_by:
+            if name not in (BY_MESSAGE, *known):
+                raise RobotError(
+                    f"{place}: {where}.stamped_by: expected {BY_MESSAGE!r} or a sensor with stamps of its own, got "
+                    f"{name!r}{did_you_mean(name, known)}"
+                )
 
 
 def _check_names(robot: Robot, place: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
+from jointscope.robots.sensors import BY_MESSAGE, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.units import UNITS, si_unit
 from jointscope.robots.yaml_section import Section
 
@@ -30,7 +30,7 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
         scaled: whether each joint may have a factor of its own, such as the ratio of its gear.
 
     Raises:
-        RobotError: another number of names than of joints.
+        RobotError: another number of names, or of sensors with stamps, than of joints.
     """
     known = units or tuple(UNITS)
     each = _unit_of_each(section, joints, known) if scaled else ()
@@ -41,7 +41,18 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
     wraps = section.number("wraps", None, positive=True) if scaled else None
     place = section.text("topic"), section.text("type"), section.text("field")
-    return Topic(*place, unit, names, scale, wraps or 0.0, each)
+    return Topic(*place, unit, names, scale, wraps or 0.0, each, _stamped_by(section, joints))
+
+
+def _stamped_by(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
+    """The sensor with the stamps of each joint; empty where the message has those of all."""
+    sensors = section.texts("stamped_by", ()) if joints else ()
+    if sensors and len(sensors) != len(joints):
+        raise RobotError(
+            f"{section.place}.stamped_by: expected a sensor, or {BY_MESSAGE!r}, for each of the {len(joints)} joints, "
+            f"got {len(sensors)}"
+        )
+    return sensors if any(sensor != BY_MESSAGE for sensor in sensors) else ()
 
 
 def _unit_of_each(section: Section, joints: tuple[str, ...], known: tuple[str, ...]) -> tuple[str, ...]:

@@ -13,6 +13,9 @@ from jointscope.robots.units import si_factor, si_unit
 AXES = ("x", "y", "z")
 
 
+BY_MESSAGE = "message"  # a joint that was sampled at the stamp of its message
+
+
 @dataclass(frozen=True)
 class Topic:
     """Where the samples of one stream are in a bag.
@@ -25,6 +28,8 @@ class Topic:
         units: unit of each joint where they are not all the same; empty where `unit` is that of all.
         names: name in the message for each joint of the robot, in the robot's order; empty for streams without names.
         scale: factor on the value of each joint, such as the ratio of its gear; empty for none.
+        stamped_by: sensor whose i-th stamp is the time at which each joint's i-th sample was taken, or BY_MESSAGE for
+            the stamp of the message; empty where that holds for all joints.
         wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
     """
 
@@ -36,6 +41,7 @@ class Topic:
     scale: tuple[float, ...] = ()
     wraps: float = 0.0
     units: tuple[str, ...] = ()
+    stamped_by: tuple[str, ...] = ()
 
     @property
     def factor(self) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from jointscope.graphs.fixed_lag.replay_result import ReplaySource
 from jointscope.robots.arrivals import Arrivals
+from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 from jointscope.tools.bags.message_type import MessageType
@@ -49,7 +50,16 @@ class ArrivalReader:
             robot: says which topics, fields, units and joint names.
             progress: called with the number of messages read and expected.
             block: messages per block.
+
+        Raises:
+            RobotError: joints have their stamps from another sensor.
         """
+        skewed = [need.name for need in needed_streams(robot) if need.source.stamped_by]
+        if skewed:
+            raise RobotError(
+                f"{robot.path.name}: {skewed[0]}.stamped_by: a replay feeds messages as they come and cannot wait for "
+                "the stamps of another sensor; remove it for the replay"
+            )
         self.path = Path(path)
         self.start_ns = self.messages = 0
         self._needed = needed_streams(robot)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.fast_columns import fast_columns
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
+from jointscope.tools.bags.own_stamps import at_message_stamps
 from jointscope.tools.bags.slow_columns import slow_columns
 from jointscope.tools.bags.stream_notices import clipping_notices, timing_notices
 from jointscope.tools.bags.time_order import TimedSamples, in_time_order
@@ -73,9 +74,14 @@ def read_recording(
         raw = bag.read(sorted(wanted), progress)
         samples: dict[str, TimedSamples] = {}
         notices: list[Notice] = []
+        columns = {
+            need.name: read_columns(raw[need.source.topic], types[need.name], need.source.field, decode_all)
+            for need in needed
+        }
+        stamps = {name: found.stamps for name, found in columns.items()}
         for need in needed:
             topic = raw[need.source.topic]
-            samples[need.name], found = _samples(need, topic, types[need.name], decode_all)
+            samples[need.name], found = _samples(need, topic, types[need.name], columns[need.name], stamps)
             notices += found
             notices += _surplus(need.name, topic, bag.count(topic.name))
         goal, found = _goal(bag, robot, raw, decode_all)
@@ -98,7 +104,9 @@ def _goal(
     need = StreamSource("goal", robot.controller.source, tuple(f"{joint}.goal" for joint in robot.joints))
     try:
         message_type = check_topic(bag, need.source)
-        samples, notices = _samples(need, raw[need.source.topic], message_type, decode_all)
+        topic = raw[need.source.topic]
+        columns = read_columns(topic, message_type, need.source.field, decode_all)
+        samples, notices = _samples(need, topic, message_type, columns, {})
     except RecordingError as err:
         return None, [Notice("goal", "info", 0, f"goal: {err}; the controller cannot be simulated")]
     return (need, samples), notices
@@ -158,10 +166,13 @@ def read_columns(
 
 
 def _samples(
-    need: StreamSource, topic: RawTopic, message_type: MessageType, decode_all: bool
+    need: StreamSource,
+    topic: RawTopic,
+    message_type: MessageType,
+    columns: Columns,
+    others: Mapping[str, NDArray[np.int64] | None],
 ) -> tuple[TimedSamples, list[Notice]]:
-    """The samples of one stream in SI units and in the order of their stamps."""
-    columns = read_columns(topic, message_type, need.source.field, decode_all)
+    """The samples of one stream in SI units and in the order of their stamps; `others` has those of all sensors."""
     order, notices = column_order(need, columns)
     stamps = columns.stamps
     if stamps is None:
@@ -169,6 +180,9 @@ def _samples(
         text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
         notices.append(Notice(need.name, "info", len(stamps), text))
     values = in_si(need.source, columns.values[:, order])
+    if need.source.stamped_by:
+        values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, values, others)
+        notices += found
     samples, found = in_time_order(need.name, TimedSamples(stamps, topic.received_ns, values))
     return samples, notices + found
 
