@@ -8,6 +8,7 @@ scored once per step and never chooses.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from jointscope.graphs.transmission.look_alikes import look_alikes
 from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
 from jointscope.graphs.transmission.position_ripple import strongest_order, with_order
 from jointscope.graphs.transmission.regression import errors, fitted, parts, spread, total
+from jointscope.graphs.transmission.step_sentences import what_changed
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, fit
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery, TransmissionStep
 from jointscope.graphs.verdicts import MOST
@@ -62,7 +64,8 @@ def discover_transmission(
         chosen = (*model.chosen, found)
         alike, sentence = look_alikes(model, recordings, found)
         model = fit(robot, recordings, chosen)
-        steps.append(_step(found, model, recordings, holdout, alike, sentence))
+        step = _step(found, model, recordings, holdout, alike, sentence)
+        steps.append(replace(step, paragraph=f"{sentence} {_told(found, steps[-1], step, recordings)}"))
     stop = "no effect explains more of the seconds that were not fitted"
     if len(steps) > max_steps:
         stop = f"{max_steps} effects were added, the largest number allowed"
@@ -158,6 +161,17 @@ def _helps_rarely(
 def _validated(equations: Sequence[Equation], names: Sequence[str]) -> dict[str, float]:
     """Errors on the seconds that were not fitted [sigma]."""
     return errors(parts(equations, names, validation_blocks), fitted(parts(equations, names, fit_blocks)))
+
+
+def _told(added: Candidate, before: TransmissionStep, after: TransmissionStep, recordings: Sequence[Recording]) -> str:
+    """What a step changed, on the held-out recording where there is one."""
+    model = after.model
+    equations = model.equations(recordings)
+    units = {e.name: (e.sigma, e.unit) for e in equations if any(size in e.columns for size in added.sizes)}
+    sigmas = model.sigmas(recordings)
+    if after.heldout:
+        return what_changed(added, model, sigmas, units, (before.heldout, after.heldout), "the held-out recording")
+    return what_changed(added, model, sigmas, units, (before.train, after.train), "the training recordings")
 
 
 def _step(

@@ -74,6 +74,11 @@ def test_hidden_springs_and_a_late_gyro_are_found_with_their_sizes_and_nothing_e
         assert abs(parameter.value - COMPLIANCE[j]) < 5.0 * parameter.sigma
     assert result.model.size("imu2.gyro_delay.delay") == pytest.approx(0.011, abs=5e-4)
     assert result.steps[-1].heldout["joint1.gear"] < 0.1 * result.steps[0].heldout["joint1.gear"]
+    said = {step.added: step.paragraph for step in result.steps}
+    stiffness = float(re.search(r"a stiffness of ([\d.]+) N m/rad", said["joint_elasticity@joint1"])[1])
+    assert stiffness == pytest.approx(1.0 / COMPLIANCE[0], rel=0.02)
+    assert "Left on the held-out recording: joint1.gear" in said["joint_elasticity@joint1"]
+    assert "imu2: delay 0.011" in said["gyro_delay@imu2"] and "mrad/s." in said["gyro_delay@imu2"]
 
 
 def test_the_mounting_of_a_gyro_is_found_and_written(robot):
@@ -113,7 +118,9 @@ def test_lags_that_differ_widely_are_no_lateness_of_one_sensor(robot):
 
 def test_the_held_out_recording_chooses_nothing(robot):
     with_holdout = discover_transmission(robot, [arm()], arm(compliance=np.zeros(2), seed=3))
-    assert added(with_holdout) == added(discover_transmission(robot, [arm()]))
+    without = discover_transmission(robot, [arm()])
+    assert added(with_holdout) == added(without)
+    assert "Left on the training recordings: joint1.gear" in without.steps[1].paragraph
 
 
 def test_samples_beside_a_gap_are_left_out(robot):

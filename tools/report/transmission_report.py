@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery
 from jointscope.tools.report.numbers import significant
@@ -15,6 +16,9 @@ from jointscope.tools.report.plot import Axes, Curve, plot
 
 MILLI = 1e3
 AXES = "xyz"
+HOLE = 6.0  # mean sampling periods from which a pause is drawn as one
+
+Array = NDArray[np.float64]
 
 
 def transmission_report(result: TransmissionDiscovery) -> str:
@@ -64,12 +68,18 @@ def _pictures(result: TransmissionDiscovery) -> Section:
         axis = f", {AXES[shown]}" if before.shape[1] > 1 else ""
         other = result.model.left(recording, name)[0].times
         curves = [
-            Curve("base model", equation.times, MILLI * before[:, shown], "k0"),
-            Curve("last model", other, MILLI * after[:, shown], "k1"),
+            Curve("base model", *_broken(equation.times, MILLI * before[:, shown]), "k0"),
+            Curve("last model", *_broken(other, MILLI * after[:, shown]), "k1"),
         ]
         keys = [Key("base model", "k0"), Key("last model", "k1")]
         figures.append(figure([plot(Axes(f"{name}{axis}: left over [m{unit}]"), curves)], keys, group="time"))
     return Section("pictures", "Before and after", "".join(figures), f"On {Path(recording.path).name}.")
+
+
+def _broken(times: Array, values: Array) -> tuple[Array, Array]:
+    """The curve with a hole where samples are missing, in which a line would claim to know something."""
+    gaps = np.flatnonzero(np.diff(times) > HOLE * np.mean(np.diff(times))) + 1
+    return np.insert(times, gaps, times[gaps - 1]), np.insert(values, gaps, np.nan)
 
 
 def _refused(result: TransmissionDiscovery) -> Section:
