@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robots whose masses are not known: what is hidden between motors, links and gyros is found, and nothing else."""
 
+import re
 from pathlib import Path
 
 import numpy as np
