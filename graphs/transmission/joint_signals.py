@@ -85,7 +85,7 @@ def torque_stream(recording: Recording, robot: Robot) -> Stream | None:
 
 def speed_window(stream: Stream) -> float:
     """Time over which speeds are means [s]."""
-    return max(WINDOW, PERIODS * _period(stream))
+    return max(WINDOW, PERIODS * period(stream))
 
 
 def at(stream: Stream, times: Array) -> Array:
@@ -101,14 +101,14 @@ def mean_at(stream: Stream, times: Array, window: float) -> Array:
 def away_from_gaps(stream: Stream, times: Array, window: float) -> NDArray[np.bool_]:
     """Whether the window around each instant holds no gap of the stream, shape (m,)."""
     spacing = np.diff(stream.times)
-    gaps = np.flatnonzero(spacing > GAP * _period(stream))
+    gaps = np.flatnonzero(spacing > GAP * period(stream))
     good = np.ones(len(times), dtype=bool)
     for k in gaps:
         good &= (times + window / 2 <= stream.times[k]) | (times - window / 2 >= stream.times[k + 1])
     return good
 
 
-def _period(stream: Stream) -> float:
+def period(stream: Stream) -> float:
     """Mean time from sample to sample; the median would be fooled by packets that arrive in bursts."""
     return float(stream.times[-1] - stream.times[0]) / max(len(stream) - 1, 1)
 

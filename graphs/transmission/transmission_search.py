@@ -152,7 +152,9 @@ def _helps_rarely(
     Seconds that leave no more than the noise of the sensors, as those at rest do, cannot tell and are not asked.
     """
     helped = [after[key] < old for key, old in before.items() if key[0] in concerned and old > 1.0]
-    share = float(np.mean(helped)) if helped else 0.0
+    if not helped:
+        return "leaves nothing to explain: what is left in the seconds that were not fitted is the noise of the sensors"
+    share = float(np.mean(helped))
     if share >= MOST:
         return ""
     return f"would explain more on the whole, but helps in {100 * share:.0f} % only of the seconds that were not fitted"
