@@ -33,7 +33,7 @@ class FreeRun:
 
     Attributes:
         channels: names of the motor encoder's channels.
-        times: stamps of the motor encoder, shape (m,) [s].
+        times: stamps of the motor encoder without those that are left out, shape (m,) [s].
         simulated, measured: shape (m, n) [rad].
     """
 
@@ -85,8 +85,10 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         command = controller.command(wanted[k], positions[k])
         # one bridge for all joints that are off: their back-EMF goes together
         x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
-    simulated = np.column_stack([np.interp(encoder.times, times, column) for column in positions.T])
-    return FreeRun(encoder.channels, encoder.times, simulated, encoder.values)
+    judged = recording.are_judged(encoder.times)
+    stamps, measured = encoder.times[judged], encoder.values[judged]
+    simulated = np.column_stack([np.interp(stamps, times, column) for column in positions.T])
+    return FreeRun(encoder.channels, stamps, simulated, measured)
 
 
 def loop_error(run: FreeRun, robot: Robot) -> float:

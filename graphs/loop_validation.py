@@ -41,10 +41,10 @@ def loop_squares(robot: Robot, recordings: Sequence[Recording], spans: Sequence[
         RecordingError: a recording lacks what the simulation needs.
     """
     runs = {bag: free_run(robot, recordings[bag]) for bag in sorted({span.bag for span in spans})}
-    return [_squares(runs[span.bag], robot, span, recordings[span.bag]) for span in spans]
+    return [_squares(runs[span.bag], robot, span) for span in spans]
 
 
-def _squares(run: FreeRun, robot: Robot, span: Span, recording: Recording) -> Array:
-    inside = (run.times >= span.t0) & (run.times <= span.t1) & recording.are_judged(run.times)
+def _squares(run: FreeRun, robot: Robot, span: Span) -> Array:
+    inside = (run.times >= span.t0) & (run.times <= span.t1)
     error = (run.simulated[inside] - run.measured[inside]) / robot.motor_encoder.sigmas
     return np.array([np.sum(error**2, axis=0), np.full(error.shape[1], float(len(error)))])

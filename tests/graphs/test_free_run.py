@@ -61,6 +61,18 @@ def test_the_loop_is_that_of_the_textbook(servo):
     assert run.rms["servo.motor_position"] >= run.mean_abs["servo.motor_position"]
 
 
+def test_no_loop_is_judged_where_something_was_left_out(servo):
+    pushed = pendulum(servo)
+    encoder = pushed.streams["motor_encoder"]
+    hand = (encoder.times > 1.0) & (encoder.times < 1.2)
+    values = encoder.values + 0.5 * hand[:, None]
+    pushed = replace(pushed, streams={**pushed.streams, "motor_encoder": replace(encoder, values=values)})
+    assert free_run(servo, pushed).rms["servo.motor_position"] > 0.1
+    without = free_run(servo, pushed.leaving_out([(1.0, 1.2)]))
+    assert without.rms["servo.motor_position"] < 2e-3
+    assert not np.any((without.times > 1.0) & (without.times < 1.2))
+
+
 def test_a_drive_that_is_off_lets_the_pendulum_swing(servo):
     recording = pendulum(servo, switched_off=True)
     run = free_run(servo, recording)

@@ -19,6 +19,7 @@ from jointscope.tools.bags.open_bag import Progress
 from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
 from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
+from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
 
@@ -55,6 +56,7 @@ class RobotGuess:
         encoder_noise, link_noise, torque_noise: of the sensors.
         gyros: those that sit on a moving link.
         left_out: what the bag also holds and why it is not used.
+        stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
     """
 
@@ -74,6 +76,7 @@ class RobotGuess:
     left_out: list[str] = field(default_factory=list)
     elastic: tuple[str, ...] = ()
     slides: tuple[str, ...] = ()
+    stamped_by: tuple[str, ...] = ()
 
     @property
     def free_links(self) -> bool:
@@ -136,8 +139,15 @@ def guess_robot(
         gyros=gyros,
         left_out=left_out,
         slides=tree.slides,
+        stamped_by=_sample_times(roles, gyros),
         elastic=_seen(tree, gyros) if masses else (),
     )
+
+
+def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
+    """Whose stamps the joints' samples have; the finer encoders tell."""
+    chosen = roles.link_encoder or roles.motor_encoder
+    return guess_sample_times(chosen.signal, chosen.names or roles.joints, {g.name: g.signal for g in gyros})
 
 
 def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:

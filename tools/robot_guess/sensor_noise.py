@@ -64,8 +64,22 @@ def _step(values: Array) -> float:
 
 def _roughness(times: Array, values: Array) -> float:
     """Standard deviation of white noise, from the quieter stretches."""
+    rest = beside_cubics(times, values)
+    count = max(len(rest) // WINDOW, 1)
+    by_window = np.array([np.sqrt(part.mean()) for part in np.array_split(rest, count) if len(part)])
+    alive = by_window[by_window > 0.0]
+    return float(np.quantile(alive, QUIET)) if len(alive) else 0.0
+
+
+def beside_cubics(times: Array, values: Array) -> Array:
+    """Squared distance of each sample from the cubic through its neighbours, as variance of one sample, shape (n - 4,).
+
+    Args:
+        times: strictly increasing, shape (n,) [s].
+        values: shape (n,).
+    """
     if len(times) < 5:
-        return 0.0
+        return np.zeros(0)
     left = np.zeros(len(times) - 4)
     gain = np.ones(len(times) - 4)
     middle = times[2:-2]
@@ -75,8 +89,4 @@ def _roughness(times: Array, values: Array) -> float:
         weight = np.prod([(middle - t) / (place - t) for t in others], axis=0)
         left += weight * values[i : len(values) - 4 + i]
         gain += weight**2
-    rest = (values[2:-2] - left) ** 2 / gain
-    count = max(len(rest) // WINDOW, 1)
-    by_window = np.array([np.sqrt(part.mean()) for part in np.array_split(rest, count)])
-    alive = by_window[by_window > 0.0]
-    return float(np.quantile(alive, QUIET)) if len(alive) else 0.0
+    return np.asarray((values[2:-2] - left) ** 2 / gain)
