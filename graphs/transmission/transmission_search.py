@@ -7,7 +7,7 @@ scored once per step and never chooses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +34,7 @@ BLOCK = 1.0  # [s] fitted and validated in turn
 MATTERS = 0.05  # share of the squared error of the equations concerned that an effect must explain
 SEARCHED = 0.1  # the same for a ripple whose order is the best of hundreds
 SURE = 3.0  # [sigma] a size must be away from zero
+QUARTERS = 4  # of the recordings, left out one by one
 MOST_STEPS = 12
 
 
@@ -98,6 +99,7 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
         share = (old - new) / old if old > 0.0 else 0.0
         why = _why_not(candidate, own, names, share)
         why = why or _helps_rarely(blocks, _by_block(own, names), concerned)
+        why = why or _fails_elsewhere(own, model.names, names, concerned)
         if why:
             refused[candidate.label] = why
         else:
@@ -158,6 +160,34 @@ def _helps_rarely(
     if share >= MOST:
         return ""
     return f"would explain more on the whole, but helps in {100 * share:.0f} % only of the seconds that were not fitted"
+
+
+def _fails_elsewhere(
+    equations: Sequence[Equation], before: Sequence[str], after: Sequence[str], concerned: set[str]
+) -> str:
+    """Why a candidate that helps between the seconds that were fitted is refused; empty if it helps further away, too.
+
+    Seconds next to each other hold the same motion; what only repeats there fails on a quarter that was left out whole.
+    """
+    old, new = (sum(_quarter_squares(equations, names, concerned)) for names in (before, after))
+    if new < old:
+        return ""
+    return "helps between the seconds that were fitted, but not on quarters of the recordings that were left out whole"
+
+
+def _quarter_squares(equations: Sequence[Equation], names: Sequence[str], concerned: set[str]) -> Iterator[float]:
+    """Squared error of each quarter of the recordings under the fit of the others [sigma^2]."""
+    for k in range(QUARTERS):
+
+        def inside(e: Equation, k: int = k) -> NDArray[np.bool_]:
+            return np.asarray(np.arange(len(e.times)) * QUARTERS // len(e.times) == k)
+
+        def outside(e: Equation, k: int = k) -> NDArray[np.bool_]:
+            return ~inside(e, k)
+
+        sizes = fitted(parts(equations, names, outside))
+        for piece in parts([e for e in equations if e.name in concerned], names, inside):
+            yield float(np.sum((piece.error - piece.columns @ sizes) ** 2))
 
 
 def _validated(equations: Sequence[Equation], names: Sequence[str]) -> dict[str, float]:

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.joint_signals import joint_signals
-from jointscope.graphs.transmission.transmission_search import discover_transmission
+from jointscope.graphs.transmission.transmission_search import _fails_elsewhere, discover_transmission
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot_file import load_robot
@@ -122,6 +123,23 @@ def test_the_held_out_recording_chooses_nothing(robot):
     without = discover_transmission(robot, [arm()])
     assert added(with_holdout) == added(without)
     assert "Left on the training recordings: joint1.gear" in without.steps[1].paragraph
+
+
+def test_what_repeats_only_within_a_stretch_does_not_help_elsewhere():
+    """A ripple that one quarter of a recording shows strongly, and the others the other way round."""
+    times = np.arange(0.0, 40.0, 0.02)
+    ripple = np.where(times < 10.0, 3.0, 1.0) * np.sin(5.0 * times)
+    rng = np.random.default_rng(5)
+
+    def helps(sign):
+        error = np.where(times < 10.0, 1.0, sign) * ripple + rng.normal(0.0, 0.3, len(times))
+        equation = Equation(
+            "joint1.gear", "rad", 1.0, times, error[:, None], np.ones((len(times), 1, 1)), {"ripple": ripple[:, None]}
+        )
+        return _fails_elsewhere([equation], [], ["ripple"], {"joint1.gear"}) == ""
+
+    assert helps(1.0)
+    assert not helps(-1.0)
 
 
 def test_samples_beside_a_gap_are_left_out(robot):
