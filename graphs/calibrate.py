@@ -23,6 +23,7 @@ from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, in
 from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.suspicions import with_suspicions
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import RecordingError, SolveError
@@ -39,7 +40,6 @@ NOISE_PASSES = 10  # at the most; where the noise of the windows was right, one 
 MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
 WINDOW_ITERATIONS = 12
 NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
-SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
 
 
 @dataclass
@@ -90,7 +90,7 @@ def calibrate(
         problems = _anchored(problems, calibrations)
         solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
     except SolveError as err:
-        raise SolveError(_with_suspicions(str(err), recordings, notices)) from err
+        raise SolveError(with_suspicions(str(err), recordings, notices)) from err
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -132,13 +132,6 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
             "add a recording in which it moves"
         )
     return notices
-
-
-def _with_suspicions(message: str, recordings: Sequence[Recording], notices: Sequence[Notice]) -> str:
-    """A failure together with what the reader and the screening saw, which often is the reason."""
-    everything = [*notices, *(notice for recording in recordings for notice in recording.notices)]
-    texts = dict.fromkeys(notice.text for notice in everything if notice.kind in SUSPICIOUS)
-    return "; ".join([message, *list(texts)[:3]])
 
 
 def _windows_stage(

@@ -21,6 +21,7 @@ from jointscope.graphs.missing_torque import MissingTorque, estimate_missing_tor
 from jointscope.graphs.refit import refit
 from jointscope.graphs.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.suspicions import names_suspicions
 from jointscope.graphs.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.verdicts import MATTERS, SAME, SENSOR_FLOOR, Trialled, excess_share, judge, worth_a_refit
 from jointscope.robots.errors import JointscopeError
@@ -52,6 +53,7 @@ class _Clock:
 
 
 @in_solver_context
+@names_suspicions
 def diagnose(
     robot: Robot,
     recordings: Sequence[Recording],

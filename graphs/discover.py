@@ -17,6 +17,7 @@ from jointscope.graphs.diagnose import ADEQUATE, diagnose, unexplained
 from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.suspicions import names_suspicions
 from jointscope.graphs.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.verdicts import MATTERS, SURE
 from jointscope.robots.effect_at import EffectAt
@@ -30,6 +31,7 @@ Save = Callable[[int, DiscoveryStep], str]
 
 
 @in_solver_context
+@names_suspicions
 def discover(
     robot: Robot,
     recordings: Sequence[Recording],

@@ -16,6 +16,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem, factor_on_state, first_command_time
 from jointscope.graphs.causal_filter import filter_around
 from jointscope.graphs.white_noise import separate_noise
+from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
@@ -45,13 +46,19 @@ def are_judged(problem: BagProblem, start: NDArray[np.intp], horizon: float) -> 
 def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> dict[str, float]:
     """Root mean square of the expected error `horizon` seconds ahead, in sensor sigmas, by channel.
 
+    A model may contradict its recording so much that free torques beside it run away; no more is known of its floor
+    then than the noise of the sensors.
+
     Args:
         problem: the recording with the model's noise.
         x: smoothed states, shape (m, d).
         calibration: shared values.
         horizon: prediction horizon [s].
     """
-    quiet = problem.with_noise(separate_noise(problem, x, calibration).white)
+    try:
+        quiet = problem.with_noise(separate_noise(problem, x, calibration).white)
+    except SolveError:
+        return dict.fromkeys(problem.robot.channels, 1.0)
     filtered = filter_around(quiet, x, calibration)
     steps = max(round(horizon / float(np.median(problem.timeline.h))), 1)
     first = int(np.searchsorted(problem.timeline.ticks, settled_from(problem)))

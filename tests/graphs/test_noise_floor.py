@@ -56,3 +56,17 @@ def test_only_the_last_memories_are_scaled_where_asked():
     factors = np.array([2.0, 3.0, 5.0, 7.0])
     np.testing.assert_allclose(densities(scaled(noise, factors)), [2.0, 3.0, 0.5, 2.0])
     np.testing.assert_allclose(densities(scaled(noise, factors, memories=1)), [2.0, 3.0, 0.5, 14.0])
+
+
+def test_where_free_torques_run_away_the_floor_is_the_noise_of_the_sensors(monkeypatch, doggy):
+    from types import SimpleNamespace
+
+    from jointscope.graphs import noise_floor
+    from jointscope.robots.errors import SolveError
+
+    def runs_away(*args):
+        raise SolveError("the state at tick 7 is not determined")
+
+    monkeypatch.setattr(noise_floor, "separate_noise", runs_away)
+    floors = noise_floor.channel_floors(SimpleNamespace(robot=doggy, with_noise=None), None, None, 0.1)
+    assert floors == dict.fromkeys(doggy.channels, 1.0)

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors of an estimation together with what looked odd in the recordings, which often is the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
+
+from jointscope.robots.errors import SolveError
+from jointscope.robots.recording import Notice, Recording
+from jointscope.robots.robot import Robot
+from jointscope.robots.screening import screen
+
+SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
+MOST = 3
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def with_suspicions(message: str, recordings: Sequence[Recording], notices: Sequence[Notice]) -> str:
+    """A failure with what the screening and the reader saw, unless the message says it already."""
+    everything = [*notices, *(notice for recording in recordings for notice in recording.notices)]
+    texts = dict.fromkeys(notice.text for notice in everything if notice.kind in SUSPICIOUS)
+    return "; ".join([message, *[text for text in texts if text not in message][:MOST]])
+
+
+def names_suspicions(
+    function: Callable[Concatenate[Robot, Sequence[Recording], P], T],
+) -> Callable[Concatenate[Robot, Sequence[Recording], P], T]:
+    """Decorates what learns from recordings: its SolveErrors name what looked odd in them."""
+
+    @wraps(function)
+    def named(robot: Robot, recordings: Sequence[Recording], *args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return function(robot, recordings, *args, **kwargs)
+        except SolveError as err:
+            notices = [notice for recording in recordings for notice in screen(recording, robot)]
+            raise SolveError(with_suspicions(str(err), recordings, notices)) from err
+
+    return named

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Estimations that fail name what looked odd in their recordings."""
+
+from __future__ import annotations
+
+import pytest
+
+from jointscope.graphs import suspicions
+from jointscope.graphs.diagnose import diagnose
+from jointscope.graphs.discover import discover
+from jointscope.graphs.suspicions import names_suspicions, with_suspicions
+from jointscope.robots.errors import SolveError
+from jointscope.robots.recording import Notice, Recording
+
+SWAPPED = Notice("imu2", "axes", 0, "imu2: the axes seem swapped")
+GAP = Notice("command", "gap", 1, "command: one gap")
+CALM = Notice("command", "info", 1, "command: nothing to worry about")
+
+
+def recording(*notices):
+    return Recording("run.mcap", "", 0, {}, list(notices))
+
+
+def test_a_failure_names_what_the_reader_and_the_screening_saw():
+    text = with_suspicions("it ran away", [recording(GAP, CALM)], [SWAPPED])
+    assert text == "it ran away; imu2: the axes seem swapped; command: one gap"
+
+
+def test_nothing_is_named_twice():
+    once = with_suspicions("it ran away", [recording()], [SWAPPED])
+    assert with_suspicions(once, [recording()], [SWAPPED]) == once
+
+
+@pytest.mark.parametrize("depth", [1, 2])
+def test_what_fails_inside_is_named_once(monkeypatch, depth):
+    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+
+    def fails(robot, recordings):
+        raise SolveError("it ran away")
+
+    for _ in range(depth):
+        fails = names_suspicions(fails)
+    with pytest.raises(SolveError, match=r"^it ran away; imu2: the axes seem swapped$"):
+        fails("robot", [recording()])
+
+
+@pytest.mark.parametrize("verb", [diagnose, discover])
+def test_verbs_that_learn_name_their_suspicions(monkeypatch, verb, doggy):
+    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+    place = {"diagnose": "jointscope.graphs.diagnose", "discover": "jointscope.graphs.discover"}[verb.__name__]
+
+    def no_base(*args, **kwargs):
+        raise SolveError("it ran away")
+
+    monkeypatch.setattr(f"{place}.BaseModel.of", no_base)
+    with pytest.raises(SolveError, match="it ran away; imu2: the axes seem swapped"):
+        verb(doggy, [recording()])
