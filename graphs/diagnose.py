@@ -136,8 +136,11 @@ def diagnose(
 
 
 def _suspicions(base: BaseModel) -> list[str]:
-    """Plain mistakes that the screening saw, and pushes: they look like effects, so they come first."""
-    notices = [notice for recording in base.recordings for notice in screen(recording, base.robot)]
+    """Plain mistakes that the screening saw, and pushes: they look like effects, so they come first.
+
+    The robot as it was before its calibration is screened: a mounting that was calibrated hides axes that are swapped.
+    """
+    notices = [notice for recording in base.recordings for notice in screen(recording, base.result.start)]
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{SUSPICION}: {text}." for text in texts]

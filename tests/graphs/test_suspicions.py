@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from types import SimpleNamespace
+
 import pytest
 
 from jointscope.graphs import suspicions
@@ -12,6 +15,7 @@ from jointscope.graphs.suspicions import names_suspicions, with_suspicions
 from jointscope.robots.errors import SolveError
 from jointscope.robots.recording import Notice, Recording
 
+diagnose_module = import_module("jointscope.graphs.diagnose")
 SWAPPED = Notice("imu2", "axes", 0, "imu2: the axes seem swapped")
 GAP = Notice("command", "gap", 1, "command: one gap")
 CALM = Notice("command", "info", 1, "command: nothing to worry about")
@@ -55,3 +59,14 @@ def test_verbs_that_learn_name_their_suspicions(monkeypatch, verb, doggy):
     monkeypatch.setattr(f"{place}.BaseModel.of", no_base)
     with pytest.raises(SolveError, match="it ran away; imu2: the axes seem swapped"):
         verb(doggy, [recording()])
+
+
+def test_the_robot_is_screened_as_it_was_before_its_calibration(monkeypatch):
+    """A mounting that was calibrated with swapped axes fits them, and no longer looks odd."""
+    monkeypatch.setattr(diagnose_module, "screen", lambda recording, robot: [SWAPPED] if robot == "before" else [])
+    base = SimpleNamespace(
+        recordings=[recording()],
+        robot="after",
+        result=SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())]),
+    )
+    assert diagnose_module._suspicions(base) == [f"{diagnose_module.SUSPICION}: {SWAPPED.text}."]
