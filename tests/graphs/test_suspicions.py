@@ -64,9 +64,6 @@ def test_verbs_that_learn_name_their_suspicions(monkeypatch, verb, doggy):
 def test_the_robot_is_screened_as_it_was_before_its_calibration(monkeypatch):
     """A mounting that was calibrated with swapped axes fits them, and no longer looks odd."""
     monkeypatch.setattr(diagnose_module, "screen", lambda recording, robot: [SWAPPED] if robot == "before" else [])
-    base = SimpleNamespace(
-        recordings=[recording()],
-        robot="after",
-        result=SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())]),
-    )
+    result = SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())])
+    base = SimpleNamespace(recordings=[recording()], robot="after", result=result)
     assert diagnose_module._suspicions(base) == [f"{diagnose_module.SUSPICION}: {SWAPPED.text}."]
