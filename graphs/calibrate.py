@@ -24,6 +24,7 @@ from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.suspicions import with_suspicions
+from jointscope.graphs.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import RecordingError, SolveError
@@ -77,6 +78,24 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
+    result = _calibrated(robot, recordings, biases_only, near, report)
+    turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
+    if turned:
+        report("again, with mountings held", 0.0)
+        anew = _calibrated(held(robot, turned), recordings, False, None, report)
+        result = released(robot, anew, turned)
+    report("done", 1.0)
+    return replace(result, wall_seconds=time.perf_counter() - started)
+
+
+def _calibrated(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    biases_only: bool,
+    near: Sequence[Calibration] | None,
+    report: Progress,
+) -> CalibrationResult:
+    """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
@@ -91,9 +110,7 @@ def calibrate(
         solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
     except SolveError as err:
         raise SolveError(with_suspicions(str(err), recordings, notices)) from err
-    result = summarize(robot, solved, tuple(history.records), notices, hold)
-    report("done", 1.0)
-    return replace(result, wall_seconds=time.perf_counter() - started)
+    return summarize(robot, solved, tuple(history.records), notices, hold)
 
 
 def _anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:
