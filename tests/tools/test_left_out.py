@@ -61,7 +61,7 @@ def test_a_discovery_is_not_continued_with_other_stretches(doggy):
     assert hashes_of(doggy, [plain], without, []) != hashes_of(doggy, [plain], plain, [])
 
 
-@pytest.mark.parametrize("verb", ["calibrate", "diagnose", "discover", "compare"])
+@pytest.mark.parametrize("verb", ["calibrate", "diagnose", "discover", "compare", "report"])
 def test_every_verb_that_judges_models_has_the_option(verb, capsys):
     with pytest.raises(SystemExit):
         main([verb, "--help"])

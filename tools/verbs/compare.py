@@ -31,15 +31,15 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_models_and_bag(parser)
-    add_leave_out_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
 
 def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
-    """Adds ROBOT... BAG [--effects FILE]."""
+    """Adds ROBOT... BAG [--leave-out T0:T1] [--effects FILE]."""
     parser.add_argument("robots", metavar="ROBOT", nargs="+", help="name of a ready robot, or a robot file")
     parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    add_leave_out_option(parser)
     add_effects_option(parser)
 
 
