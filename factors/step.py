@@ -80,10 +80,11 @@ class Steps:
         """Standard deviations of the rows (velocities, memories, positions; link before motor), shape (m, d)."""
         density = np.concatenate([self.noise.link_velocity, self.noise.motor_velocity, self.noise.memory])
         root = np.sqrt(self.h)[:, None]
-        if self.slack is not None:
+        rates, k = density * root, len(self.layout.velocities)
+        if self.slack is not None:  # memories follow the motion, which the sensors see
+            rates[:, :k] *= self.slack[:, None]
             root = root * self.slack[:, None]
-        rates = density * root
-        velocity = rates[:, : len(self.layout.velocities)]
+        velocity = rates[:, :k]
         if self.integrated:
             return np.hstack([rates, velocity * self.h[:, None] / np.sqrt(12.0)])
         return np.hstack([rates, np.broadcast_to(self.noise.position * root, velocity.shape)])

@@ -88,8 +88,9 @@ class BagProblem:
             placed.append(_without_states(BiasPrior(gyro), 1))
             if robot.choices.bias_at_rest and rests:
                 resting = recording.streams[gyro.name].between(-np.inf, first_command_time(recording))
-                if len(resting):
-                    placed.append(_without_states(BiasAtRestFactor(gyro, resting.values), len(resting)))
+                values = resting.values[recording.are_judged(resting.times)]
+                if len(values):
+                    placed.append(_without_states(BiasAtRestFactor(gyro, values), len(values)))
         return BagProblem(robot, recording, timeline, dynamics, tuple(placed), rests)
 
     def with_noise(self, noise: ProcessNoise) -> BagProblem:

@@ -30,7 +30,7 @@ from jointscope.graphs.free_run import FreeRun, free_run
 from jointscope.graphs.initial_guess import initial_biases
 from jointscope.graphs.isolated_torque import isolated_torques_of
 from jointscope.graphs.joint_states import JointStates
-from jointscope.graphs.noise_floor import channel_floors
+from jointscope.graphs.noise_floor import SETTLING, channel_floors
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.solver_context import in_solver_context
@@ -82,6 +82,11 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         for name in robot.sensors
     }
     channels = _channels(robot, recording, ahead, open_loop)
+    if recording.left_out and not any(len(p.sample) for p in ahead[HORIZON].values()):
+        raise RecordingError(
+            f"{recording.path}: nothing is left to judge a model by; expected stretches of at least "
+            f"{SETTLING + HORIZON:g} s between those that are left out"
+        )
     error = float(np.sqrt(np.mean([(c.horizons[str(HORIZON)] / c.noise_sigma) ** 2 for c in channels.values()])))
     floors = channel_floors(problem, states, calibration, HORIZON)
     defects = problem.dynamics.residual((states[:-1], states[1:]), calibration)

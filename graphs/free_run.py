@@ -24,6 +24,8 @@ from jointscope.robots.state_rates import StateRates
 Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
+SEEN = 0.05  # [s] of samples that tell position and speed where a simulation begins anew
+FEWEST = 5  # samples for that
 BACK_EMF = ".k_mi"
 
 
@@ -80,7 +82,11 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     times = np.arange(encoder.times[0], encoder.times[-1] + STEP, STEP)
     wanted = _held(goal, times)
     positions = np.empty((len(times), len(robot.joints)))
+    known = [t1 for _, t1 in recording.left_out if np.sum(encoder.times > t1) > FEWEST]
+    restarts = {int(np.searchsorted(times, t1, side="right")) for t1 in known}
     for k in range(len(times)):
+        if k in restarts:  # what happened in a stretch that is left out is not the model's
+            x = layout.from_joints(_measured(encoder, float(times[k]), zero))[0]
         positions[k] = x[layout.motor_q] + zero
         command = controller.command(wanted[k], positions[k])
         # one bridge for all joints that are off: their back-EMF goes together
@@ -89,6 +95,14 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     stamps, measured = encoder.times[judged], encoder.values[judged]
     simulated = np.column_stack([np.interp(stamps, times, column) for column in positions.T])
     return FreeRun(encoder.channels, stamps, simulated, measured)
+
+
+def _measured(encoder: Stream, time: float, zero: Array) -> Array:
+    """(q_link, v_link, q_motor, v_motor) as the samples after a moment tell them, springs relaxed, shape (1, 4n)."""
+    first = int(np.searchsorted(encoder.times, time))
+    last = max(int(np.searchsorted(encoder.times, time + SEEN)), first + FEWEST)
+    _, v, q = np.polyfit(encoder.times[first:last] - time, encoder.values[first:last] - zero, 2)
+    return np.hstack([q, v, q, v])[None]
 
 
 def loop_error(run: FreeRun, robot: Robot) -> float:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,17 +61,24 @@ class IsolatedTorque:
 
     def sentence(self, recording: Recording) -> str:
         """The moment in plain words, with what can be done about it."""
-        stretch = f"{Path(recording.path).name}:{self.t0:.2f}:{self.t1:.2f}"
+        stretch = f"{recording.path}:{self.t0:.2f}:{self.t1:.2f}"
         return (
             f"{recording.path}: from {self.t0:.2f} to {self.t1:.2f} s up to {abs(self.torque):.2g} {self.unit} act on "
             f"{self.row} that the same motion does not ask for at other times ({100 * self.share:.0f} % of the "
             "squared torque that the model lacks there): a push from outside, a collision or a slip looks like this, "
-            f"no law of the robot does; if it is not the robot's own, leave it out with --leave-out {stretch}"
+            f"no effect of the catalogue does; if it is not the robot's own, leave it out with --leave-out {stretch}"
         )
 
     def to_json(self) -> dict[str, float | str]:
         """Fit for JSON."""
-        return {"t0": self.t0, "t1": self.t1, "row": self.row, "torque": self.torque, "share": self.share}
+        return {
+            "t0": self.t0,
+            "t1": self.t1,
+            "row": self.row,
+            "torque": self.torque,
+            "unit": self.unit,
+            "share": self.share,
+        }
 
 
 def isolated_torques_of(problem: BagProblem, x: Array, defects: Array) -> tuple[IsolatedTorque, ...]:
@@ -97,9 +103,9 @@ def isolated_torques(
     start = max(first_command_time(recording), float(ticks[0]))
     edges = np.asarray(start + BIN * np.arange(int((ticks[-1] - start) / BIN) + 1), float)
     edges = edges[recording.are_judged(edges, BIN) & np.append(recording.are_judged(edges[1:], BIN), True)]
-    if len(edges) < FEWEST:
-        return ()
     whole = np.diff(edges) < 1.5 * BIN
+    if np.sum(whole) < FEWEST:
+        return ()
     torque = _means(ticks, _impulses(robot, defects), edges)[whole]
     centres = (0.5 * (edges[:-1] + edges[1:]))[whole]
     motion = JointStates.of(robot, ticks, x).at(centres)

@@ -74,7 +74,8 @@ class NoiseEvidence:
     @property
     def factors(self) -> Array:
         """Factor by which each density should change, shape (r,)."""
-        return np.sqrt(self.squares / np.maximum(self.freedom, 1.0))
+        told = self.freedom > 0.0  # a density of which no step tells stays
+        return np.where(told, np.sqrt(self.squares / np.maximum(self.freedom, 1.0)), 1.0)
 
 
 def scaled(noise: ProcessNoise, factors: Array, memories: int = 0) -> ProcessNoise:

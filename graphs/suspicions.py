@@ -23,7 +23,8 @@ def with_suspicions(message: str, recordings: Sequence[Recording], notices: Sequ
     """A failure with what the screening and the reader saw, unless the message says it already."""
     everything = [*notices, *(notice for recording in recordings for notice in recording.notices)]
     texts = dict.fromkeys(notice.text for notice in everything if notice.kind in SUSPICIOUS)
-    return "; ".join([message, *[text for text in texts if text not in message][:MOST]])
+    said = [text for text in texts if text in message]
+    return "; ".join([message, *[text for text in texts if text not in said][: max(MOST - len(said), 0)]])
 
 
 def names_suspicions(

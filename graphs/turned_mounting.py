@@ -28,11 +28,12 @@ def turned_without_reason(robot: Robot, result: CalibrationResult) -> dict[str, 
         robot: before the calibration.
         result: the calibration.
     """
-    found = {}
+    found, calibrated = {}, {gyro.name: gyro.R_imu_body for gyro in result.robot.gyros}
     for gyro in robot.gyros:
-        after = result.robot.sensors[gyro.name].R_imu_body
+        after = calibrated[gyro.name]
         angle = float(Rotation.from_matrix(after @ gyro.R_prior.T).magnitude())
-        left = max(result.channels[channel].chi2 for channel in gyro.channels if channel in result.channels)
+        kept = [result.channels[channel].chi2 for channel in gyro.channels if channel in result.channels]
+        left = max(kept, default=0.0)
         if angle > FAR * gyro.R_prior_sigma and left > UNEXPLAINED:
             found[gyro.name] = angle
     return found
@@ -52,7 +53,11 @@ def held(robot: Robot, names: dict[str, float]) -> Robot:
 def released(robot: Robot, result: CalibrationResult, names: dict[str, float]) -> CalibrationResult:
     """The result of a calibration with held mountings, their priors as they were, with what was done to them."""
     before = {gyro.name: gyro for gyro in robot.gyros}
-    sensors = {name: replace(result.robot.sensors[name], R_prior_sigma=before[name].R_prior_sigma) for name in names}
+    sensors = {
+        gyro.name: replace(gyro, R_prior_sigma=before[gyro.name].R_prior_sigma)
+        for gyro in result.robot.gyros
+        if gyro.name in names
+    }
     said = tuple(
         f"{name}: this calibration would turn the mounting by {np.degrees(angle):.0f} deg, "
         f"{angle / before[name].R_prior_sigma:.0f} sigma of its prior, and leave the gyro unexplained all the same; it "

@@ -140,7 +140,7 @@ class Recording:
                     f"{self.path}: cannot leave out {t0:g} to {t1:g} s; expected a beginning before its end, within "
                     f"{first:.2f} to {last:.2f} s"
                 )
-        both = (*self.left_out, *stretches)
+        both = (*self.left_out, *((max(t0, first), min(t1, last)) for t0, t1 in stretches))
         left = float(np.mean(self.are_apart(np.linspace(first, last, GRID), both)))
         if left < SMALLEST_SHARE:
             raise RecordingError(

@@ -65,7 +65,14 @@ def _check_links(robot: Robot, place: str) -> None:
 
 def _check_stamps(robot: Robot, place: str) -> None:
     """Joints have their stamps from sensors that exist and that are stamped by themselves."""
-    sources = {"command": robot.command} | {f"sensors.{name}": s.source for name, s in robot.sensors.items()}
+    held = {"command": robot.command} | ({} if robot.controller is None else {"controller": robot.controller.source})
+    for where, source in held.items():
+        if source.stamped_by:
+            raise RobotError(
+                f"{place}: {where}.stamped_by: expected only at encoders and torques, which are interpolated; a "
+                "command acts from its stamp until the next one"
+            )
+    sources = {f"sensors.{name}": s.source for name, s in robot.sensors.items()}
     known = [name for name, sensor in robot.sensors.items() if not sensor.source.stamped_by]
     for where, source in sources.items():
         for name in source.stamped_by:

@@ -35,9 +35,10 @@ def leave_out(recordings: Sequence[Recording], texts: Sequence[str]) -> list[Rec
     stretches: list[list[tuple[float, float]]] = [[] for _ in recordings]
     for text in texts:
         name, t0, t1 = _parts(text)
-        meant = [i for i, r in enumerate(recordings) if name in ("", r.path, Path(r.path).name)]
+        meant = [i for i, r in enumerate(recordings) if not name or Path(name) == Path(r.path)]
+        meant = meant or [i for i, r in enumerate(recordings) if name == Path(r.path).name]
         if len(meant) != 1:
-            names = ", ".join(Path(r.path).name for r in recordings)
+            names = ", ".join(r.path for r in recordings)
             reason = f"{len(meant)} recordings are meant" if meant else f"there is no recording {name}"
             raise RecordingError(f"--leave-out {text}: {reason}; expected {FORM} with BAG one of {names}")
         stretches[meant[0]].append((t0, t1))
@@ -46,7 +47,7 @@ def leave_out(recordings: Sequence[Recording], texts: Sequence[str]) -> list[Rec
 
 def left_out_arguments(recordings: Sequence[Recording]) -> list[str]:
     """What --leave-out has to be given to leave the same stretches out again."""
-    return [f"{Path(recording.path).name}:{t0:g}:{t1:g}" for recording in recordings for t0, t1 in recording.left_out]
+    return [f"{recording.path}:{t0:g}:{t1:g}" for recording in recordings for t0, t1 in recording.left_out]
 
 
 def _parts(text: str) -> tuple[str, float, float]:

@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.transmission.joint_signals import (
+    PERIODS,
     JointSignals,
     at,
     away_from_gaps,
     joint_signals,
     link_stream,
     mean_at,
-    period,
     speed_window,
 )
-from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import Gyro
 
@@ -133,12 +133,5 @@ def gyro_equation(recording: Recording, robot: Robot, gyro: Gyro, delay: float) 
     columns |= {f"{gyro.name}.R_imu_body.{axis}": turn[:, :, k] for k, axis in enumerate("xyz")}
     constants = np.broadcast_to(np.eye(3), (len(times), 3, 3))
     error = mean_at(stream, times, window) - omega @ R.T
-    return Equation(gyro.name, "rad/s", _sigma_of_means(robot, gyro, stream, window), times, error, constants, columns)
-
-
-def _sigma_of_means(robot: Robot, gyro: Gyro, stream: Stream, window: float) -> float:
-    """Of a gyro's mean over a window, and of the rate that link encoders at its ends tell [rad/s]."""
-    mean = gyro.sigma / np.sqrt(max(window / period(stream), 1.0))
-    encoder = robot.link_encoder
-    ends = np.sqrt(2.0) * float(np.mean(encoder.sigmas)) / window if encoder is not None else 0.0
-    return float(np.hypot(mean, ends))
+    sigma = gyro.sigma / float(np.sqrt(PERIODS))  # of a mean over the window; the same in every recording
+    return Equation(gyro.name, "rad/s", sigma, times, error, constants, columns)

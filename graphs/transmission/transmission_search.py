@@ -67,7 +67,7 @@ def discover_transmission(
         model = fit(robot, recordings, chosen)
         step = _step(found, model, recordings, holdout, alike, sentence)
         steps.append(replace(step, paragraph=f"{sentence} {_told(found, steps[-1], step, recordings)}"))
-    stop = "no effect explains more of the seconds that were not fitted"
+    stop = "no effect explains more of the seconds that were not fitted and holds on quarters that were left out whole"
     if len(steps) > max_steps:
         stop = f"{max_steps} effects were added, the largest number allowed"
     return TransmissionDiscovery(tuple(steps), tuple(recordings), holdout, stop, refused, model.sigmas(recordings))
@@ -172,7 +172,7 @@ def _fails_elsewhere(
     old, new = (sum(_quarter_squares(equations, names, concerned)) for names in (before, after))
     if new < old:
         return ""
-    return "helps between the seconds that were fitted, but not on quarters of the recordings that were left out whole"
+    return "would help between the seconds that were fitted, but not on quarters of the recordings left out whole"
 
 
 def _quarter_squares(equations: Sequence[Equation], names: Sequence[str], concerned: set[str]) -> Iterator[float]:

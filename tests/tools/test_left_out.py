@@ -28,9 +28,18 @@ def test_one_recording_needs_no_name():
 def test_several_are_told_apart_by_name_or_path():
     first, second = leave_out([recording("bags/a.mcap"), recording("b.mcap")], ["b.mcap:1:2", "bags/a.mcap:3:4"])
     assert first.left_out == ((3.0, 4.0),) and second.left_out == ((1.0, 2.0),)
-    assert left_out_arguments([first, second]) == ["a.mcap:3:4", "b.mcap:1:2"]
+    assert left_out_arguments([first, second]) == ["bags/a.mcap:3:4", "b.mcap:1:2"]
     again = leave_out([recording("bags/a.mcap"), recording("b.mcap")], left_out_arguments([first, second]))
     assert [r.left_out for r in again] == [first.left_out, second.left_out]
+
+
+def test_recordings_of_the_same_name_are_told_apart_by_their_folders():
+    bags = [recording("day1/run.mcap"), recording("day2/run.mcap")]
+    chosen = leave_out(bags, ["./day2/run.mcap:1:2"])
+    assert [r.left_out for r in chosen] == [(), ((1.0, 2.0),)]
+    assert leave_out(bags, left_out_arguments(chosen)) == chosen
+    with pytest.raises(RecordingError, match=r"2 recordings are meant; .* one of day1/run\.mcap, day2/run\.mcap"):
+        leave_out(bags, ["run.mcap:1:2"])
 
 
 def test_paths_may_hold_colons():

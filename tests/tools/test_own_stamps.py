@@ -100,6 +100,15 @@ def test_a_replay_says_that_it_cannot(robot, tmp_path):
         ArrivalReader(tmp_path / "run.mcap", robot)
 
 
+def test_commands_are_not_interpolated(doggy, tmp_path):
+    text = doggy.path.read_text(encoding="utf-8").replace(
+        "  topic: /motor_command\n", "  topic: /motor_command\n  stamped_by: [message, imu1, message]\n", 1
+    )
+    (tmp_path / "robot.yaml").write_text(text.replace("urdf: ", f"urdf: {doggy.path.parent}/"), encoding="utf-8")
+    with pytest.raises(RobotError, match=r"command\.stamped_by: expected only at encoders and torques"):
+        load_robot(tmp_path / "robot.yaml")
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [

@@ -122,13 +122,13 @@ def _wraps(chosen: Chosen) -> list[str]:
     return [_line(f"wraps: {chosen.wraps:.9g}", "jumps by that much from one sample to the next", False, 4)]
 
 
-def _stamps(chosen: Chosen, guess: RobotGuess, indent: int) -> list[str]:
+def _stamps(chosen: Chosen, guess: RobotGuess) -> list[str]:
     """Whose stamps the samples have, where the messages are one for one with those of the gyroscopes."""
     gyros = [gyro for gyro in guess.gyros if gyro.name in guess.stamped_by]
     if not gyros or any(len(gyro.signal.times) != len(chosen.signal.times) for gyro in gyros):
         return []
     reason = "positions are smoother at the stamps of these gyroscopes than at those of their messages"
-    return [_line(f"stamped_by: {_list(guess.stamped_by)}", reason, False, indent)]
+    return [_line(f"stamped_by: {_list(guess.stamped_by)}", reason, False, 4)]
 
 
 def _turned_joints(found: SignGuess) -> str:
@@ -145,7 +145,6 @@ def _command(guess: RobotGuess) -> list[str]:
         *_source(command.signal, unit, 2)[:3],
         _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
         *_names(command, joints, 2),
-        *_stamps(command, guess, 2),
         *_signs(signs, "moves against its command", 2),
     ]
     weak = [joint for joint, drive in zip(joints, guess.drives, strict=True) if drive.confidence < 10.0]
@@ -194,7 +193,7 @@ def _encoder(
         *_source(chosen.signal, units[0] if len(set(units)) == 1 else _list(units)),
         *_names(chosen, guess.roles.joints, 4),
         *_wraps(chosen),
-        *_stamps(chosen, guess, 4),
+        *_stamps(chosen, guess),
         *_signs(guess.encoder_signs.signs, signs, 4),
         *zero,
         _sigmas(noise, units),
@@ -210,7 +209,7 @@ def _torque(guess: RobotGuess) -> list[str]:
         _line("kind: joint_torque", chosen.reason, chosen.sure, 4),
         *_source(chosen.signal, "N m"),
         *_names(chosen, guess.roles.joints, 4),
-        *_stamps(chosen, guess, 4),
+        *_stamps(chosen, guess),
         _sigma(guess.torque_noise, "N m"),
     ]
 
