@@ -41,8 +41,8 @@ INTEGRATORS: dict[str, type[DynamicsFactor]] = {
 }
 DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
-SLACK = 1e3  # on the process noise where something unknown acts; the sensors alone tell the states there
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
+SLACK = 1e3  # on the process noise where something unknown acts; the sensors alone tell the states there
 
 
 @dataclass(frozen=True)
@@ -116,10 +116,7 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     layout, tree = robot.layout, robot.kinematic_tree
     q = np.zeros((len(middle), layout.n_link))
     q[:, layout.joint_link] = np.column_stack(angles) - robot.motor_encoder.zero
-    M = tree.mass_matrix(q)
-    M_at_zero = tree.mass_matrix(np.zeros((1, layout.n_link)))[0]
-    alone = 1.0 / np.diag(np.linalg.inv(M_at_zero))
-    return M / alone[:, None]
+    return tree.mass_matrix(q) / tree.free_inertias()[:, None]
 
 
 def _slack(recording: Recording, timeline: Timeline) -> Array | None:

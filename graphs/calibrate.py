@@ -23,7 +23,7 @@ from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, in
 from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.solver_context import in_solver_context
-from jointscope.graphs.suspicions import with_suspicions
+from jointscope.graphs.suspicions import names_suspicions
 from jointscope.graphs.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
@@ -54,6 +54,7 @@ class _History:
 
 
 @in_solver_context
+@names_suspicions
 def calibrate(
     robot: Robot,
     recordings: Sequence[Recording],
@@ -101,15 +102,12 @@ def _calibrated(
     problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = _History([])
-    try:
-        if near is None:
-            noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
-        else:
-            calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
-        problems = _anchored(problems, calibrations)
-        solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
-    except SolveError as err:
-        raise SolveError(with_suspicions(str(err), recordings, notices)) from err
+    if near is None:
+        noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
+    else:
+        calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
+    problems = _anchored(problems, calibrations)
+    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
     return summarize(robot, solved, tuple(history.records), notices, hold)
 
 

@@ -98,7 +98,7 @@ def diagnose(
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
     trialled, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report)
     clock.stage("refits")
-    seconds = sum(_judged_seconds(base, span) for span in spans)
+    seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
     candidates = _ranked(
         [judge(c, before, trialled.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     )
@@ -133,12 +133,6 @@ def diagnose(
         heldout=holdout,
     )
     return replace(result, paragraphs=(*_suspicions(base), *paragraphs_of(result)))
-
-
-def _judged_seconds(base: BaseModel, span: Span) -> float:
-    """Length of a stretch without what is left out of it [s]."""
-    moments = np.linspace(span.t0, span.t1, 200)
-    return (span.t1 - span.t0) * float(np.mean(base.recordings[span.bag].are_judged(moments)))
 
 
 def _suspicions(base: BaseModel) -> list[str]:

@@ -84,8 +84,7 @@ class FreeTorques:
 def _impulse_densities(robot: Robot) -> dict[str, float]:
     """Density of each equation's process noise as a torque, by name [N m sqrt(s)]."""
     layout, noise = robot.layout, robot.noise
-    M = robot.kinematic_tree.mass_matrix(np.zeros((1, layout.n_link)))[0]
-    alone = 1.0 / np.diag(np.linalg.inv(M))
+    alone = robot.kinematic_tree.free_inertias()
     motor = np.array([robot.drive_parameter(joint, "inertia").value for joint in layout.motors])
     density = np.concatenate([alone * noise.link_velocity, motor * noise.motor_velocity])
     return dict(zip(layout.rate_names, map(float, density), strict=False))

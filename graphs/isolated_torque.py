@@ -115,9 +115,7 @@ def isolated_torques(
 
 def _impulses(robot: Robot, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
-    n = robot.layout.n_link
-    M = robot.kinematic_tree.mass_matrix(np.zeros((1, n)))[0]
-    return defects[:, :n] / np.diag(np.linalg.inv(M))
+    return defects[:, : robot.layout.n_link] * robot.kinematic_tree.free_inertias()
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:

@@ -41,11 +41,11 @@ def turned_without_reason(robot: Robot, result: CalibrationResult) -> dict[str, 
 
 def held(robot: Robot, names: dict[str, float]) -> Robot:
     """The robot with some mountings held at their priors."""
-    gyros = {gyro.name: gyro for gyro in robot.gyros if gyro.name in names}
     return robot.with_sensors(
         {
-            name: replace(gyro, R_imu_body=gyro.R_prior, R_prior_sigma=TIGHT * gyro.R_prior_sigma)
-            for name, gyro in gyros.items()
+            gyro.name: replace(gyro, R_imu_body=gyro.R_prior, R_prior_sigma=TIGHT * gyro.R_prior_sigma)
+            for gyro in robot.gyros
+            if gyro.name in names
         }
     )
 

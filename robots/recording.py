@@ -141,23 +141,21 @@ class Recording:
                     f"{first:.2f} to {last:.2f} s"
                 )
         both = (*self.left_out, *((max(t0, first), min(t1, last)) for t0, t1 in stretches))
-        left = float(np.mean(self.are_apart(np.linspace(first, last, GRID), both)))
+        without = replace(self, left_out=both)
+        left = without.judged_share(first, last)
         if left < SMALLEST_SHARE:
             raise RecordingError(
                 f"{self.path}: only {100 * left:.0f} % would be left; cut the recording, or leave out less"
             )
-        return replace(self, left_out=both)
+        return without
+
+    def judged_share(self, t0: float, t1: float) -> float:
+        """Share of a stretch that is not left out."""
+        return float(np.mean(self.are_judged(np.linspace(t0, t1, GRID))))
 
     def are_judged(self, times: Array, horizon: Array | float = 0.0) -> NDArray[np.bool_]:
         """Whether what happened in the last `horizon` seconds before each time was all the robot's own, shape (m,)."""
-        return self.are_apart(times, self.left_out, horizon)
-
-    @staticmethod
-    def are_apart(
-        times: Array, stretches: Sequence[tuple[float, float]], horizon: Array | float = 0.0
-    ) -> NDArray[np.bool_]:
-        """Whether [time - horizon, time] touches none of the stretches, shape (m,)."""
-        apart = np.ones(len(times), bool)
-        for t0, t1 in stretches:
-            apart &= (times < t0) | (times - horizon > t1)
-        return apart
+        judged = np.ones(len(times), bool)
+        for t0, t1 in self.left_out:
+            judged &= (times < t0) | (times - horizon > t1)
+        return judged

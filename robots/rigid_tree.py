@@ -153,6 +153,11 @@ class RigidTree:
             M[k] = pin.crba(self.model, self.data, q[k])
         return M
 
+    def free_inertias(self) -> Array:
+        """Inertia of each coordinate at zero while all others are free to move, shape (n,) [kg m^2]."""
+        M = self.mass_matrix(np.zeros((1, self.n)))[0]
+        return np.asarray(1.0 / np.diag(np.linalg.inv(M)))
+
     def body_rate(self, body: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
         """Angular velocity of a body in its own frame, with derivatives.
 

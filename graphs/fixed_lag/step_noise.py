@@ -33,8 +33,7 @@ class StepNoise:
         self._density = np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
         # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
         self._tree = robot.kinematic_tree
-        M = self._mass_matrix(np.zeros(robot.layout.n_link))
-        self._alone = 1.0 / np.diag(np.linalg.inv(M))
+        self._alone = self._tree.free_inertias()
         r, k = len(self._density), len(robot.layout.positions)
         self._rate_rows, self._position_rows = np.arange(r), np.arange(r, r + k)
         self._eye = np.eye(robot.layout.n_link)

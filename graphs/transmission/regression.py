@@ -25,6 +25,17 @@ def everything(equation: Equation) -> NDArray[np.bool_]:
     return np.ones(len(equation.times), dtype=bool)
 
 
+def one_block(number: int, count: int) -> Choose:
+    """The samples of one of `count` blocks of an equation, in the order of time."""
+    return lambda e: np.asarray(np.arange(len(e.times)) * count // len(e.times) == number)
+
+
+def without_block(number: int, count: int) -> Choose:
+    """All samples but those of one block."""
+    chosen = one_block(number, count)
+    return lambda e: ~chosen(e)
+
+
 @dataclass(frozen=True)
 class Part:
     """An equation without its constants.
@@ -69,11 +80,7 @@ def fitted(pieces: Sequence[Part]) -> Array:
 
 def spread(equations: Sequence[Equation], names: Sequence[str]) -> Array:
     """Standard deviations of the sizes by leaving out blocks of time, shape (p,)."""
-
-    def without(block: int) -> Choose:
-        return lambda e: np.arange(len(e.times)) * JACKKNIFE // len(e.times) != block
-
-    found = np.array([fitted(parts(equations, names, without(block))) for block in range(JACKKNIFE)])
+    found = np.array([fitted(parts(equations, names, without_block(k, JACKKNIFE))) for k in range(JACKKNIFE)])
     return np.asarray(np.sqrt((JACKKNIFE - 1) * np.var(found, axis=0)))
 
 

@@ -19,7 +19,7 @@ from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.look_alikes import look_alikes
 from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
 from jointscope.graphs.transmission.position_ripple import strongest_order, with_order
-from jointscope.graphs.transmission.regression import errors, fitted, parts, spread, total
+from jointscope.graphs.transmission.regression import errors, fitted, one_block, parts, spread, total, without_block
 from jointscope.graphs.transmission.step_sentences import what_changed
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, fit
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery, TransmissionStep
@@ -94,7 +94,7 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
         names = columns_of(model.robot, (*model.chosen, candidate))
         own = with_order(equations, candidate)
         after = _validated(own, names)
-        concerned = {e.name for e in own if any(size in e.columns for size in candidate.sizes)}
+        concerned = {e.name for e in _concerned(candidate, own)}
         old, new = (sum(found[name] ** 2 for name in concerned) for found in (before, after))
         share = (old - new) / old if old > 0.0 else 0.0
         why = _why_not(candidate, own, names, share)
@@ -107,6 +107,11 @@ def _best(model: TransmissionModel, recordings: Sequence[Recording]) -> tuple[Ca
     if not gains:
         return None, refused
     return max(gains, key=lambda pair: pair[0])[1], refused
+
+
+def _concerned(candidate: Candidate, equations: Sequence[Equation]) -> list[Equation]:
+    """The equations in which an effect acts."""
+    return [e for e in equations if any(size in e.columns for size in candidate.sizes)]
 
 
 def _with_orders(model: TransmissionModel, equations: Sequence[Equation]) -> list[Candidate]:
@@ -177,16 +182,10 @@ def _fails_elsewhere(
 
 def _quarter_squares(equations: Sequence[Equation], names: Sequence[str], concerned: set[str]) -> Iterator[float]:
     """Squared error of each quarter of the recordings under the fit of the others [sigma^2]."""
+    judged = [e for e in equations if e.name in concerned]
     for k in range(QUARTERS):
-
-        def inside(e: Equation, k: int = k) -> NDArray[np.bool_]:
-            return np.asarray(np.arange(len(e.times)) * QUARTERS // len(e.times) == k)
-
-        def outside(e: Equation, k: int = k) -> NDArray[np.bool_]:
-            return ~inside(e, k)
-
-        sizes = fitted(parts(equations, names, outside))
-        for piece in parts([e for e in equations if e.name in concerned], names, inside):
+        sizes = fitted(parts(equations, names, without_block(k, QUARTERS)))
+        for piece in parts(judged, names, one_block(k, QUARTERS)):
             yield float(np.sum((piece.error - piece.columns @ sizes) ** 2))
 
 
@@ -198,8 +197,7 @@ def _validated(equations: Sequence[Equation], names: Sequence[str]) -> dict[str,
 def _told(added: Candidate, before: TransmissionStep, after: TransmissionStep, recordings: Sequence[Recording]) -> str:
     """What a step changed, on the held-out recording where there is one."""
     model = after.model
-    equations = model.equations(recordings)
-    units = {e.name: (e.sigma, e.unit) for e in equations if any(size in e.columns for size in added.sizes)}
+    units = {e.name: (e.sigma, e.unit) for e in _concerned(added, model.equations(recordings))}
     sigmas = model.sigmas(recordings)
     if after.heldout:
         return what_changed(added, model, sigmas, units, (before.heldout, after.heldout), "the held-out recording")
