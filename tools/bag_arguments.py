@@ -10,6 +10,7 @@ from pathlib import Path
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.tools.first_look import first_look
 from jointscope.tools.left_out import add_leave_out_option, leave_out
 from jointscope.tools.progress import Progress, reading
 from jointscope.tools.user_effects import add_effects_option
@@ -39,12 +40,19 @@ def input_files(args: argparse.Namespace) -> list[Path]:
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
-    """The training recordings and the held-out one.
+    """The training recordings and the held-out one; says what looks like a plain mistake in them.
 
     Raises:
-        RecordingError: a bag cannot be read, the held-out one is also a training recording, or what is to be left out
-            is not there.
+        RecordingError: a bag cannot be read or cannot be a measurement of this robot, the held-out one is also a
+            training recording, or what is to be left out is not there.
     """
+    recordings, holdout = _read(args, robot, progress)
+    first_look(robot, [*recordings, *([holdout] if holdout is not None else [])])
+    return recordings, holdout
+
+
+def _read(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
+    """What the arguments name; arguments as in `read_bags`."""
     from jointscope.tools.bags import read_recording
 
     recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]

@@ -46,12 +46,14 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags import read_recording
     from jointscope.tools.calibration_text import calibration_text
+    from jointscope.tools.first_look import first_look
 
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
         recordings = leave_out(read, args.leave_out)
+        first_look(robot, recordings)
         if robot.free_links:
             from jointscope.tools.free_links import run_free_links
 
