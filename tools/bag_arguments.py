@@ -27,7 +27,8 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
         "--holdout-share",
         metavar="SHARE",
         type=float,
-        help="hold out the last part of the only BAG instead, for example 0.33; zeros and biases are then found anew",
+        help="hold out the last part of the only BAG instead, for example 0.33; zeros of encoders and biases of gyros "
+        "are fitted again there",
     )
     add_leave_out_option(parser)
     add_effects_option(parser)
@@ -70,11 +71,14 @@ def _last_part_held_out(
     args: argparse.Namespace, recordings: Sequence[Recording]
 ) -> tuple[list[Recording], Recording | None]:
     """The first part of a recording for training, the last part held out."""
-    if args.holdout is not None or len(recordings) > 1 or not 0.05 <= args.holdout_share <= 0.95:
+    if args.holdout is not None:
+        raise RecordingError("--holdout and --holdout-share exclude each other; give one of them")
+    if len(recordings) > 1:
         raise RecordingError(
-            f"--holdout-share {args.holdout_share:g}: expected a share from 0.05 to 0.95 of a single BAG, without "
-            f"--holdout; got {len(recordings)} bags"
+            f"--holdout-share: expected a single BAG, got {len(recordings)}; hold one of them out with --holdout"
         )
+    if not 0.05 <= args.holdout_share <= 0.95:
+        raise RecordingError(f"--holdout-share {args.holdout_share:g}: expected a share from 0.05 to 0.95")
     (whole,) = recordings
     end = max(float(stream.times[-1]) for stream in whole.streams.values())
     cut = end - args.holdout_share * whole.duration

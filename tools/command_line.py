@@ -15,6 +15,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import jointscope
 from jointscope.robots.errors import JointscopeError
@@ -62,8 +63,15 @@ def verbs() -> dict[str, str]:
     }
 
 
+class _Parser(argparse.ArgumentParser):
+    """No abbreviations: --effect must not be taken for --effects where a verb has only that."""
+
+    def __init__(self, *args: Any, **kwargs: Any):
+        super().__init__(*args, **{"allow_abbrev": False, **kwargs})
+
+
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="jointscope",
         description="Calibrates the dynamics of flexible-joint robots from rosbags and shows what the model cannot "
         "explain.",

@@ -13,7 +13,7 @@ from jointscope.robots.robot import Robot
 from jointscope.robots.screening import screen
 from jointscope.tools.progress import ERASE_LINE
 
-PLAIN_MISTAKES = ("unit", "axes")  # kinds of notices that no effect can mend
+PLAIN_MISTAKES = ("unit", "axes")  # kinds of notices
 
 
 def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | None = None) -> None:
@@ -38,7 +38,10 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     lead = ERASE_LINE if stream.isatty() else ""
     for text, path in seen.items():
         stream.write(f"{lead}{path}: {text}\n")
-    stream.write("Look at this first: no effect can mend it, and a calibration with it takes long (Ctrl-C ends it).\n")
+    stream.write(
+        "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording "
+        "takes long to calibrate (Ctrl-C ends it).\n"
+    )
     stream.flush()
 
 

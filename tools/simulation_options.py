@@ -24,12 +24,18 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="true value of a parameter; may be repeated"
     )
-    parser.add_argument("--friction", choices=["dry", "smooth"], default="dry", help="Coulomb friction of the motors")
+    parser.add_argument(
+        "--friction",
+        choices=["dry", "smooth"],
+        default="dry",
+        help="of the motors; dry: they stick, which the model rounds off, so that more is missing than the effects "
+        "that are named; smooth: rounded off as in the model; default dry",
+    )
     sensors = parser.add_argument_group("sensors and disturbances")
     sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
     sensors.add_argument("--gyro-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
-    sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of the samples' times, 1 sigma [ms]")
-    sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="probability that a sample is lost")
+    sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of sampling, 1 sigma [ms]; default 0")
+    sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="share of lost samples; default 0")
     sensors.add_argument(
         "--transport-delay",
         type=float,

@@ -90,6 +90,16 @@ def test_the_help_of_every_verb_has_an_example_of_itself(verb, capsys):
     assert f"jointscope {verb}" in text.partition("example")[2]
 
 
+READ_ROBOT_FILES = "add calibrate closed-loop compare diagnose discover info remove replay report simulate".split()
+
+
+@pytest.mark.parametrize("verb", READ_ROBOT_FILES)
+def test_every_verb_that_reads_robot_files_takes_effects_of_the_users_own(verb, capsys):
+    with pytest.raises(SystemExit):
+        main([verb, "--help"])
+    assert "--effects FILE.py" in capsys.readouterr().out
+
+
 def test_version(capsys):
     with pytest.raises(SystemExit) as exit_:
         main(["--version"])
@@ -108,6 +118,7 @@ def test_version(capsys):
         ["calibrate", "doggy", "a.mcap", "-o", "b.yaml", "--colour"],
         ["compare", "a.mcap"],
         ["demo", "--seconds", "long"],
+        ["effects", "--effect", "backlash@joint3"],  # no abbreviation of --effects
     ],
 )
 def test_wrong_usage_exits_with_2(arguments, capsys):

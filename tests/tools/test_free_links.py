@@ -35,7 +35,7 @@ def test_the_last_part_of_a_recording_can_be_held_out(tmp_path, capsys):
     assert main(["discover", "hebi_5r", bag, "--holdout-share", "0.333", *out]) == 0
     assert "joint_elasticity@joint1" in capsys.readouterr().out
     assert main(["discover", "hebi_5r", bag, bag, "--holdout-share", "0.3", *out]) == 1
-    assert "of a single BAG" in capsys.readouterr().err
+    assert "--holdout-share: expected a single BAG, got 2" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("verb", [["compare", "kr300", KR[0]], ["diagnose", "kr300", KR[0]]])

@@ -5,6 +5,7 @@ import argparse
 import json
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -15,6 +16,7 @@ from jointscope.robots.errors import EffectError, JointscopeError, RobotError, S
 from jointscope.robots.robot import Robot
 from jointscope.robots.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.command_line import main
 from jointscope.tools.simulator import Disturbance, simulate
 from jointscope.tools.simulator.controller import GAIN
 from jointscope.tools.simulator.effect import SimulatedEffect
@@ -392,6 +394,19 @@ def test_the_verb_writes_a_bag_that_can_be_read_and_the_truth_beside_it(doggy, t
         np.testing.assert_allclose(recording.streams[name].values, stream.values, atol=1e-12)
         np.testing.assert_allclose(np.diff(recording.streams[name].times), np.diff(stream.times), atol=3e-9)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.json", "train.mcap", "train.truth.json"]
+
+
+def test_the_verb_says_which_effects_of_the_robot_file_it_does_not_simulate(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["add", "doggy", "cogging@joint1", "-o", "rippled.yaml"]) == 0
+    capsys.readouterr()
+    assert verb("rippled.yaml", "-o", "a.mcap", "--seconds", "1", "--json", "a.json") == 0
+    assert (
+        "not simulated, although in the robot file: cogging@joint1; name them with --effect" in capsys.readouterr().out
+    )
+    assert json.loads(Path("a.json").read_text())["not_simulated"] == ["cogging@joint1"]
+    assert verb("rippled.yaml", "-o", "b.mcap", "--seconds", "1", "--effect", "cogging@joint1") == 0
+    assert "not simulated" not in capsys.readouterr().out
 
 
 def test_the_verb_leaves_nothing_behind_when_it_fails(tmp_path):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jointscope.robots.effect_editing import remove_effect
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import SimulatedEffect
@@ -19,6 +20,8 @@ TINY = 1e-12  # in the unit of the parameter; inertia and stiffness must be abov
 def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
     """The robot with its true parameters: published values where there are some, then the overrides.
 
+    Effects of the robot file are no part of it: what is simulated is named, and has the simulator's own form.
+
     Args:
         robot: the robot of the file.
         overrides: values by full name.
@@ -27,6 +30,8 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
         RobotError: an override names no parameter.
         SimulationError: a value is impossible.
     """
+    for here in robot.effects:
+        robot = remove_effect(robot, here.label)
     published = {p.name: p.published for p in robot.parameters.values() if p.published is not None}
     truth = robot.with_values({**published, **overrides})
     for parameter in truth.parameters.values():

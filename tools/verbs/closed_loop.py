@@ -17,8 +17,8 @@ from jointscope.tools.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
-  jointscope closed-loop doggy --seed 3 --report loop.html
-  jointscope closed-loop doggy --model found.yaml --seed 3 --effect bearing_flexibility@joint1 --report loop.html
+  jointscope closed-loop doggy --seed 3 --friction smooth --report loop.html
+  jointscope closed-loop doggy --model found.yaml --seed 3 --effect bearing_flexibility@joint1 --friction smooth
 
 ROBOT is the simulated truth; controllers and estimator know the model only. The same seed is the same robot as in
 `jointscope simulate`, so a model can be calibrated from a recording of the very robot that it then controls."""
@@ -47,13 +47,22 @@ def add_parser(subparsers: Any) -> None:
         "--controllers",
         default=",".join(CONTROLLERS),
         metavar="LIST",
-        help=f"of {', '.join(CONTROLLERS)}; default both",
+        help=f"of {', '.join(CONTROLLERS)}, separated by commas; default both",
     )
     parser.add_argument(
-        "--sources", default=",".join(SOURCES), metavar="LIST", help=f"of {', '.join(SOURCES)}; default all"
+        "--sources",
+        default=",".join(SOURCES),
+        metavar="LIST",
+        help=f"of {', '.join(SOURCES)}, separated by commas; default all",
     )
     parser.add_argument("--lag", type=float, default=0.1, metavar="S", help="of the estimator [s]; default 0.1")
-    parser.add_argument("--cutoff", type=float, default=40.0, metavar="HZ", help="low-pass of differences; default 40")
+    parser.add_argument(
+        "--cutoff",
+        type=float,
+        default=40.0,
+        metavar="HZ",
+        help="low-pass of the differentiated encoders [Hz]; default 40",
+    )
     parser.add_argument(
         "--mismatch",
         type=float,

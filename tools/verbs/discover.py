@@ -22,7 +22,8 @@ EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
 
 Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
-after the last finished step; found.discovery.json remembers what it started from."""
+after the last finished step; found.discovery.json remembers what it started from. Robots with link_dynamics:
+free are searched in one go, without files of steps."""
 
 MAX_STEPS = 8
 

@@ -13,7 +13,9 @@ from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope info calibration.mcap
-  jointscope info calibration.mcap --robot doggy --json info.json"""
+  jointscope info calibration.mcap --robot doggy --json info.json
+
+The exit code is 0 also where the robot cannot use the bag; what is said, and `usable` in the JSON, tell."""
 
 
 def add_parser(subparsers: Any) -> None:

@@ -41,7 +41,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
-    parser.add_argument("--lag", metavar="S", type=_positive, default=0.1, help="length of the window [s], 0.1")
+    parser.add_argument("--lag", metavar="S", type=_positive, default=0.1, help="length of the window [s]; default 0.1")
     parser.add_argument(
         "--adapt",
         metavar="NAME=DENSITY",
@@ -51,7 +51,11 @@ def add_parser(subparsers: Any) -> None:
         help="let a parameter walk, with this density [its unit / sqrt(s)]; may be repeated",
     )
     parser.add_argument(
-        "--lagged-every", metavar="N", type=_count, default=20, help="read the state at the lag at every N-th tick, 20"
+        "--lagged-every",
+        metavar="N",
+        type=_count,
+        default=20,
+        help="read the state at the lag at every N-th tick; default 20",
     )
     parser.add_argument("-o", "--output", metavar="STATES", type=Path, help="table of the states, .parquet or .csv")
     parser.add_argument(

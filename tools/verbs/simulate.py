@@ -15,11 +15,12 @@ from jointscope.tools.progress import progress_bar
 from jointscope.tools.simulation_options import add_simulation_options, conditions_of
 from jointscope.tools.simulator import DEFAULT_SECONDS, Simulation, simulate_under
 from jointscope.tools.simulator.effect_list import effect_list
+from jointscope.tools.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
-  jointscope simulate doggy -o train.mcap --seconds 20 --seed 3 --effect bearing_flexibility@joint1
-  jointscope simulate doggy -o test.mcap --seconds 10 --seed 3 --effect bearing_flexibility@joint1 --motion moves
+  jointscope simulate doggy -o train.mcap --seed 3 --friction smooth --effect bearing_flexibility@joint1
+  jointscope simulate doggy -o test.mcap --motion moves --seed 3 --friction smooth --effect bearing_flexibility@joint1
 
 The same seed is the same robot; the truth is written beside the bag as train.truth.json."""
 
@@ -36,10 +37,16 @@ def add_parser(subparsers: Any) -> None:
     defaults = ", ".join(f"{seconds:g} for {motion}" for motion, seconds in DEFAULT_SECONDS.items())
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("-o", "--output", metavar="BAG", type=Path, required=True, help=".bag, .mcap, .db3 or a folder")
-    parser.add_argument("--motion", choices=list(DEFAULT_SECONDS), default="calibration")
+    parser.add_argument(
+        "--motion",
+        choices=list(DEFAULT_SECONDS),
+        default="calibration",
+        help="calibration: rest, slow and fast motion, chirps; moves: others, to judge by; default calibration",
+    )
     parser.add_argument("--seconds", type=float, metavar="S", help=f"duration [s]; default {defaults}")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")
     add_simulation_options(parser)
+    add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
 
@@ -47,13 +54,14 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulates, writes bag, truth and JSON, and says what was done."""
     truth_file = args.output.parent / f"{args.output.stem}.truth.json"
-    check_outputs([args.output if args.output.suffix else None, truth_file, args.json])
+    check_outputs([args.output if args.output.suffix else None, truth_file, args.json], inputs=args.effects)
+    load_user_effects(args.effects)
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         simulation = _simulate(robot, args, lambda share: progress("simulating", share))
     write_bag(args.output, simulation.recording, robot)
     write_json(truth_file, simulation.truth)
-    summary = _summary(simulation, args.output, truth_file)
+    summary = _summary(simulation, robot, args.output, truth_file)
     if args.json is not None:
         write_json(args.json, summary)
     print(_as_text(summary))
@@ -65,12 +73,14 @@ def _simulate(robot: Robot, args: argparse.Namespace, progress: Callable[[float]
     return simulate_under(conditions_of(args), robot, args.motion, seconds, args.seed, progress)
 
 
-def _summary(simulation: Simulation, bag: Path, truth_file: Path) -> dict[str, Any]:
+def _summary(simulation: Simulation, robot: Robot, bag: Path, truth_file: Path) -> dict[str, Any]:
     streams = simulation.recording.streams.values()
+    simulated = {f"{effect['effect']}@{effect['owner']}" for effect in simulation.truth["effects"]}
     return {
         "bag": str(bag),
         "truth_file": str(truth_file),
         "samples": {stream.name: len(stream) for stream in streams},
+        "not_simulated": [here.label for here in robot.effects if here.label not in simulated],
         "truth": simulation.truth,
     }
 
@@ -79,8 +89,10 @@ def _as_text(summary: dict[str, Any]) -> str:
     truth = summary["truth"]
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
     samples = ", ".join(f"{name} {count}" for name, count in summary["samples"].items())
+    left = ", ".join(summary["not_simulated"])
+    note = f"\n  not simulated, although in the robot file: {left}; name them with --effect" if left else ""
     return (
         f"{summary['bag']}: {truth['seconds']:g} s of {truth['robot']}, motion {truth['motion']}, "
         f"seed {truth['seed']}, {truth['friction']} friction\n"
-        f"  effects: {effects}\n  samples: {samples}\n  truth:   {summary['truth_file']}"
+        f"  effects: {effects}\n  samples: {samples}\n  truth:   {summary['truth_file']}{note}"
     )
