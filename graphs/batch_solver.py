@@ -21,6 +21,7 @@ from jointscope.graphs.banded_solver import Elimination, eliminate
 from jointscope.graphs.convergence import Iteration, has_converged, is_crawling, is_flat, measured_rows, short_step
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
+from jointscope.graphs.undetermined import undetermined
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -179,7 +180,10 @@ def newton_step(
     free = free_indices(shared, hold)
     eliminations = [eliminate(system, _of_states(damping)) for system in solution.systems]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
-    dp, in_sigmas = _solve_shared(H, g, free, damping)
+    try:
+        dp, in_sigmas = _solve_shared(H, g, free, damping)
+    except np.linalg.LinAlgError as err:
+        raise undetermined(H, free, shared, solution.estimate.calibrations[0]) from err
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     solution.hessian = H
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
@@ -281,10 +285,7 @@ def _solve_shared(H: Array, g: Array, free: NDArray[np.intp], damping: float) ->
     block = H[np.ix_(free, free)]
     if not (np.all(np.isfinite(block)) and np.all(np.isfinite(g))):
         raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
-    try:
-        factor = cho_factor(block + damping * np.diag(np.diag(block)))
-    except np.linalg.LinAlgError as err:
-        raise SolveError("the shared values are not determined: their Hessian is not positive definite") from err
+    factor = cho_factor(block + damping * np.diag(np.diag(block)))
     dp[free] = -cho_solve(factor, g[free])
     # Newton decrement per value: step over its conditional-free sigma
     sigma = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(free)))), 0.0))

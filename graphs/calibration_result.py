@@ -193,7 +193,9 @@ class CalibrationResult:
                 name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
             },
             "noise": {
-                "unit": "rad/s/sqrt(s)",
+                "unit": "rad/s/sqrt(s), of joints that slide m/s/sqrt(s)"
+                if self.robot.tree.slides
+                else "rad/s/sqrt(s)",
                 "link_velocity": list(map(float, self.noise.link_velocity)),
                 "motor_velocity": list(map(float, self.noise.motor_velocity)),
             },

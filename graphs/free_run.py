@@ -69,10 +69,16 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     if controller is None:
         raise RobotError(f"{robot.name} has no section `controller`; without it the loop cannot be simulated")
     if goal is None:
-        raise RecordingError(f"{recording.path} holds no goal positions on {controller.source.topic}")
+        raise RecordingError(
+            f"{recording.path} holds no goal positions on {controller.source.topic}; check topic and field of "
+            "`controller` in the robot file, or take that section out"
+        )
     late = [here.label for here in robot.effects if isinstance(here.effect, CommandEffect)]
     if late:
-        raise RobotError(f"the loop cannot be simulated with effects on the command yet: {', '.join(late)}")
+        raise RobotError(
+            f"the loop cannot be simulated with effects on the command yet: {', '.join(late)}; remove them, or "
+            "the section `controller`"
+        )
     encoder, zero = recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero
     on, off = _Stepper(robot), _Stepper(_without_back_emf(robot))
     layout = robot.layout

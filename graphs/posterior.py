@@ -25,7 +25,7 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
 from jointscope.graphs.batch_solver import Solution, free_indices, reduced_system
 from jointscope.graphs.normal_equations import Linearized, layout, whitened
-from jointscope.robots.errors import SolveError
+from jointscope.graphs.undetermined import undetermined
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def posteriors(
     try:
         covariance[np.ix_(free, free)] = cho_solve(cho_factor(H[np.ix_(free, free)]), np.eye(len(free)))
     except np.linalg.LinAlgError as err:
-        raise SolveError("the shared values are not determined: their Hessian is not positive definite") from err
+        raise undetermined(H, free, shared, solution.estimate.calibrations[0]) from err
     found = []
     for i, elimination in enumerate(eliminations):
         index = shared.indices(i)

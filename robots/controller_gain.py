@@ -26,7 +26,10 @@ def controller_of(robot: Robot, recording: Recording) -> PositionController | No
     if controller is None or controller.gain is not None:
         return controller
     if goal is None:
-        raise RecordingError(f"{recording.path} holds no goal positions on {controller.source.topic}")
+        raise RecordingError(
+            f"{recording.path} holds no goal positions on {controller.source.topic}; check topic and field of "
+            "`controller` in the robot file, or take that section out"
+        )
     reading = recording.streams[robot.motor_encoder.name]
     held = np.clip(np.searchsorted(goal.times, command.times, side="right") - 1, 0, len(goal) - 1)
     gains = []

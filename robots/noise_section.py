@@ -37,7 +37,7 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
     joints = {key: section.array(key, (n,)) for key in ("link_velocity", "motor_velocity")}
     for key, values in joints.items():
         if np.any(values <= 0):
-            raise RobotError(f"{section.place}.{key}: expected numbers above zero")
+            raise RobotError(f"{section.place}.{key}: expected numbers above zero, got {values.tolist()}")
     link = dict(zip(layout.joints, joints["link_velocity"], strict=True)) | hinges
     motor = dict(zip(layout.joints, joints["motor_velocity"], strict=True))
     memory = [own.number(label, m.noise, positive=True) for label, m in robot.memories.items()]

@@ -54,5 +54,5 @@ def position_controller(section: Section, source: Topic, joints: tuple[str, ...]
         return PositionController(source, None, limit)
     gain = section.array("gain", (len(joints),))
     if np.any(gain <= 0.0):
-        raise RobotError(f"{section.place}.gain: expected numbers above zero")
+        raise RobotError(f"{section.place}.gain: expected numbers above zero, got {gain.tolist()}")
     return PositionController(source, tuple(gain.tolist()), limit)

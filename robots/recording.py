@@ -145,7 +145,8 @@ class Recording:
         left = without.judged_share(first, last)
         if left < SMALLEST_SHARE:
             raise RecordingError(
-                f"{self.path}: only {100 * left:.0f} % would be left; cut the recording, or leave out less"
+                f"{self.path}: only {100 * left:.0f} % would be left, expected at least {100 * SMALLEST_SHARE:.0f} %; "
+                "cut the recording, or leave out less"
             )
         return without
 

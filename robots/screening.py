@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,7 +53,7 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
         _check_samples(stream)
     for sensor in (robot.motor_encoder, robot.link_encoder):
         if sensor is not None:
-            _check_wraps(recording.streams[sensor.name])
+            _check_wraps(recording.streams[sensor.name], sensor.units)
     recording = with_motor_zero(recording, robot)
     notices = _check_overlap(recording)
     _check_command(recording.command, robot)
@@ -107,14 +109,14 @@ def _check_frozen(stream: Stream) -> None:
         )
 
 
-def _check_wraps(stream: Stream) -> None:
-    """An angle does not cross its whole range between two samples; a counter that begins anew does."""
-    for channel, column in zip(stream.channels, stream.values.T, strict=True):
+def _check_wraps(stream: Stream, units: Sequence[str]) -> None:
+    """A position does not cross its whole range between two samples; a counter that begins anew does."""
+    for channel, column, unit in zip(stream.channels, stream.values.T, units, strict=True):
         jump = wrapping_jump(stream.times, column)
         if jump > 10.0 * MOVED_ANGLE:
             raise RecordingError(
-                f"{channel} jumps by {jump:.4g} rad from one sample to the next, nearly its whole range: it looks like "
-                f"a counter that begins anew; set `wraps` of sensors.{stream.name} in the robot file to its period"
+                f"{channel} jumps by {jump:.4g} {unit} from one sample to the next, nearly its whole range: it looks "
+                f"like a counter that begins anew; set `wraps` of sensors.{stream.name} in the robot file to its period"
             )
 
 

@@ -96,7 +96,7 @@ def _position(section: Section, joints: tuple[str, ...]) -> tuple[Topic, Array]:
         return source, np.full(len(joints), section.number("sigma", positive=True))
     sigmas = section.array("sigma", (len(joints),))
     if np.any(sigmas <= 0.0):
-        raise RobotError(f"{section.place}.sigma: expected numbers above zero")
+        raise RobotError(f"{section.place}.sigma: expected numbers above zero, got {sigmas.tolist()}")
     return source, sigmas
 
 

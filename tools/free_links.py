@@ -12,6 +12,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 from jointscope.robots.robot_writer import robot_text
+from jointscope.tools.progress import Progress
 from jointscope.tools.report.transmission_report import transmission_report
 from jointscope.tools.result_files import ResultFiles, origin
 from jointscope.tools.transmission_text import transmission_text
@@ -19,7 +20,12 @@ from jointscope.tools.whole_file import whole_file, write_json
 
 
 def run_free_links(
-    robot: Robot, recordings: Sequence[Recording], holdout: Recording | None, files: ResultFiles, search: bool
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None,
+    files: ResultFiles,
+    search: bool,
+    progress: Progress,
 ) -> str:
     """Fits the robot, with a search for missing effects or as it is, writes the files, returns what the screen says.
 
@@ -29,7 +35,7 @@ def run_free_links(
     """
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd is not available with link_dynamics: free; use --report")
-    result = discover_transmission(robot, recordings, holdout, MOST_STEPS if search else 0)
+    result = discover_transmission(robot, recordings, holdout, MOST_STEPS if search else 0, progress)
     _write(result, files, robot.path.name)
     return transmission_text(result)
 
@@ -42,4 +48,4 @@ def _write(result: TransmissionDiscovery, files: ResultFiles, start: str) -> Non
         if files.report is not None:
             stack.enter_context(whole_file(files.report)).write_text(transmission_report(result), encoding="utf-8")
         if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+            write_json(stack.enter_context(whole_file(files.json)), result.to_json() | {"robot_file": str(files.robot)})

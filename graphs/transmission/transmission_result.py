@@ -90,8 +90,13 @@ class TransmissionDiscovery:
                 for step in self.steps
             ],
             "stop_reason": self.stop_reason,
+            "adequate": None,  # without equations of motion nothing says what is left of them
             "parameters": {
-                name: {"value": physical(self.model, name)}
+                name: {
+                    "value": physical(self.model, name),
+                    "sigma": self.robot.parameters[name].sigma,
+                    "unit": self.robot.parameters[name].unit,
+                }
                 for candidate in self.model.chosen
                 for name in candidate.sizes
             },

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.batch_solver import Progress
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.transmission.candidates import Candidate, candidates, columns_of, may_be_added
 from jointscope.graphs.transmission.equation import Equation
@@ -40,7 +41,11 @@ MOST_STEPS = 12
 
 @in_solver_context
 def discover_transmission(
-    robot: Robot, recordings: Sequence[Recording], holdout: Recording | None = None, max_steps: int = MOST_STEPS
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None = None,
+    max_steps: int = MOST_STEPS,
+    progress: Progress | None = None,
 ) -> TransmissionDiscovery:
     """Finds the effects that motors, links and gyros show of each other.
 
@@ -49,16 +54,20 @@ def discover_transmission(
         recordings: for training.
         holdout: scored once per step.
         max_steps: effects to add at the most.
+        progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RecordingError: a recording does not hold what the robot needs.
     """
+    report = progress or (lambda text, share: None)
+    report("rigid joints", 0.0)
     for recording in [*recordings, *([holdout] if holdout is not None else [])]:
         screen(recording, robot)
     model = fit(robot, recordings)
     steps = [_step(None, model, recordings, holdout, (), "Rigid joints, all sensors in time.")]
     refused: dict[str, str] = {}
     while len(steps) <= max_steps:
+        report(f"looking for effect {len(steps)}", len(steps) / (max_steps + 1))
         found, refused = _best(model, recordings)
         if found is None:
             break

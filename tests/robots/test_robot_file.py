@@ -89,7 +89,7 @@ MISTAKES = [
     ("motor.inertia: {", "rotor.inertia: {",
      "my.yaml: parameters: unknown parameter 'rotor.inertia'; did you mean 'motor.inertia'?"),
     ("link_velocity: [0.349, 0.349, 0.349]", "link_velocity: [0.349, 0, 0.349]",
-     "my.yaml: noise.link_velocity: expected numbers above zero"),
+     "my.yaml: noise.link_velocity: expected numbers above zero, got [0.349, 0.0, 0.349]"),
     ("model: integrated", "model: independent", "my.yaml: noise: 'position' is missing"),
     ("format: 1", "format: 1\nformat: 1",
      'my.yaml is not YAML: line 6, column 1: found duplicate key "format" with value "1" (original value: "1")'),

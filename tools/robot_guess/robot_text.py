@@ -266,7 +266,11 @@ def _noise(n: int) -> list[str]:
     return [
         "",
         "noise:",
-        _line("estimate: true", "random torques, as densities of the velocities [rad/s/sqrt(s)]", indent=2),
+        _line(
+            "estimate: true",
+            "random torques, as densities of the velocities [rad/s/sqrt(s), of slides m/s/sqrt(s)]",
+            indent=2,
+        ),
         f"  link_velocity: {_list([link] * n)}",
         f"  motor_velocity: {_list([motor] * n)}",
     ]

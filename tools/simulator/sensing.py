@@ -49,7 +49,9 @@ class Sampling:
                 raise SimulationError(f"{name.replace('_', ' ')}: expected 1 to 100000 Hz, got {getattr(self, name):g}")
         for name in ("jitter", "transport_delay"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise SimulationError(f"{name.replace('_', ' ')}: expected 0 to 1000 ms, got {1e3 * getattr(self, name):g}")
+                raise SimulationError(
+                    f"{name.replace('_', ' ')}: expected 0 to 1000 ms, got {1e3 * getattr(self, name):g}"
+                )
         if not 0.0 <= self.drop <= 0.95:
             raise SimulationError(f"drop: expected a probability of 0 to 0.95, got {self.drop:g}")
 

@@ -57,13 +57,13 @@ def run(args: argparse.Namespace) -> int:
         if robot.free_links:
             from jointscope.tools.free_links import run_free_links
 
-            print(run_free_links(robot, recordings, None, files, search=False))
-            print(f"\nWrote {', '.join(map(str, files.all))}")
-            return 0
-        result = calibrate(robot, recordings, progress=progress)
-        if files.report is not None or files.rrd is not None:
-            progress("writing", 1.0)
-        write_calibration(result, files)
-    print(calibration_text(result))
+            text = run_free_links(robot, recordings, None, files, False, progress)
+        else:
+            result = calibrate(robot, recordings, progress=progress)
+            if files.report is not None or files.rrd is not None:
+                progress("writing", 1.0)
+            write_calibration(result, files)
+            text = calibration_text(result)
+    print(text)
     print(f"\nWrote {', '.join(map(str, files.all))}")
     return 0

@@ -61,21 +61,16 @@ def run(args: argparse.Namespace) -> int:
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
         if robot.free_links:
-            return _without_dynamics(robot, recordings, holdout, files)
-        result = _discover(args, robot, recordings, holdout, progress)
-        if files.pictures:
-            progress("writing", 1.0)
-        write_discovery(result, files, robot.path.name)
-    print(discovery_text(result))
-    print(f"\nWrote {', '.join(map(str, files.all))}")
-    return 0
+            from jointscope.tools.free_links import run_free_links
 
-
-def _without_dynamics(robot: Robot, recordings: Sequence[Any], holdout: Any, files: ResultFiles) -> int:
-    """Robots whose masses are not known."""
-    from jointscope.tools.free_links import run_free_links
-
-    print(run_free_links(robot, recordings, holdout, files, search=True))
+            text = run_free_links(robot, recordings, holdout, files, True, progress)
+        else:
+            result = _discover(args, robot, recordings, holdout, progress)
+            if files.pictures:
+                progress("writing", 1.0)
+            write_discovery(result, files, robot.path.name)
+            text = discovery_text(result)
+    print(text)
     print(f"\nWrote {', '.join(map(str, files.all))}")
     return 0
 
