@@ -95,6 +95,17 @@ def test_the_headline_says_what_is_not_reached(result, effects, headline):
     assert discovery_answer(unfinished(result, effects[1])).headline == headline
 
 
+def test_effects_that_explain_only_part_may_stand_in_for_something_else(result):
+    base, step = result.steps
+    half = dataclasses.replace(step, heldout_error=8.0, train_error=8.0)  # of 13.2; the floor is 1.21
+    stuck = dataclasses.replace(result, steps=(base, half), adequate=False)
+    assert "What changed explains 64 % of the squared error" in discovery_answer(stuck).why
+    assert "stand in" in discovery_text(stuck)
+    nearly = dataclasses.replace(result, steps=(base, dataclasses.replace(half, heldout_error=3.0)), adequate=False)
+    assert "stand in" not in discovery_answer(nearly).why
+    assert "stand in" not in discovery_answer(result).why
+
+
 def test_an_effect_that_was_taken_out_again_is_no_change(result):
     base, step = result.steps
     out = dataclasses.replace(step, added="cogging@joint1", removed=BEARING)

@@ -12,6 +12,8 @@ from jointscope.graphs.discovery_result import Discovery, DiscoveryStep
 from jointscope.tools.effect_cards import is_numerics
 from jointscope.tools.report.numbers import percent, significant
 
+BELIEVED = 0.9  # share of the excess that effects have to explain together where the model stays inadequate
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -68,8 +70,21 @@ def discovery_answer(result: Discovery) -> Answer:
     if result.adequate:
         return Answer("good", f"The model is adequate {effects or 'as it was'}.", why)
     if effects:
-        return Answer("warn", f"The model is better {effects}, but still not adequate.", why)
+        return Answer("warn", f"The model is better {effects}, but still not adequate.", why + _stand_in(result))
     return Answer("bad", "The model is not adequate, and no known effect makes it better.", why)
+
+
+def _stand_in(result: Discovery) -> str:
+    """A warning where what was added explains only part of what the base model lacks."""
+    first, last = result.steps[0], result.steps[-1]
+    excess = judged_error(first) ** 2 - last.floor**2
+    explained = (judged_error(first) ** 2 - judged_error(last) ** 2) / excess if excess > 0.0 else 0.0
+    if explained >= BELIEVED:
+        return ""
+    return (
+        f" What changed explains {percent(max(explained, 0.0))} of the squared error above that; where the rest has "
+        "another cause, an effect may only stand in for it: do not take its size for physics yet."
+    )
 
 
 def changes(result: Discovery) -> list[str]:
