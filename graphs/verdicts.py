@@ -24,6 +24,7 @@ MOST = 0.6  # share of the validation blocks on which it must help
 SURE = 3.0  # [sigma] a refitted size must be away from null
 HORIZON = 0.1  # [s] predictions of this length that do not overlap count as independent
 SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
+HARM = 3.0  # times the error on a block from which an effect is said to harm there
 SAME = 0.02  # relative difference of errors that decides nothing
 
 
@@ -157,6 +158,11 @@ def _after_refit(
     seen = np.isfinite(now.by_span) & np.isfinite(base.by_span)
     better = int(np.sum(now.by_span[seen] < base.by_span[seen]))
     reasons.append(f"it helps on {better} of {int(seen.sum())} validation blocks")
+    worse = now.by_span[seen] / np.maximum(base.by_span[seen], SENSOR_FLOOR)
+    if np.max(worse, initial=0.0) > HARM:
+        reasons.append(
+            f"on one of them it makes the error {np.max(worse):.1f} times larger: it may stand in for something else"
+        )
     sizes = tuple(s for s in sizes if s.name in parameters)
     wrong = [s.name for s in sizes if s.sign == "+" and parameters[s.name].value < s.null]
     if wrong:

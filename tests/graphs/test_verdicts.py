@@ -65,6 +65,16 @@ def test_an_effect_that_lowers_the_error_on_all_blocks_is_missing():
     )
 
 
+def test_an_effect_that_harms_one_block_badly_may_stand_in_for_something_else():
+    quiet = ValidationError(4.0, 4.0, np.array([1.5, 4.0, 4.0, 4.0, 6.0]), {})
+    harmful = refitted(2.0)
+    by_span = np.array([6.0, 2.0, 2.0, 2.0, 2.0])
+    harmful = Trialled(harmful.refit, ValidationError(2.0, 2.0, by_span, {}), 1.7)
+    found = judge(scored(), quiet, harmful, SECONDS)
+    said = "on one of them it makes the error 4.0 times larger: it may stand in for something else"
+    assert (found.verdict, found.reasons[2:]) == ("missing", (said,))
+
+
 def test_an_effect_that_leaves_the_error_where_it_is_is_absent():
     expected = ("with it the error on validation blocks goes from 4 to 3.97 sigma",)
     assert verdict(scored(), refitted(3.97)) == ("absent", expected)
