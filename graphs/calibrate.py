@@ -24,6 +24,7 @@ from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.suspicions import names_suspicions
+from jointscope.graphs.time_shift_start import placed, with_best_shifts
 from jointscope.graphs.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
@@ -117,7 +118,7 @@ def _anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration
     if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
         return list(problems)
     values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
-    return [BagProblem.of(problem.robot.with_values(values), problem.recording) for problem in problems]
+    return placed(problems, values)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
@@ -169,7 +170,7 @@ def _windows_stage(
         whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
         guess = initial_dynamics(problems, whole, bags[0])
         calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
-    estimate = Estimate(tuple(states), tuple(calibrations))
+    windows, estimate = with_best_shifts(windows, Estimate(tuple(states), tuple(calibrations)), hold)
     # nearly linear in the states alone: bring them to the parameters before both move
     solution = solve(windows, estimate, max_iterations=4, step_tolerance=0.5, hold=(DYNAMICS,))
     history.add("states", solution)
