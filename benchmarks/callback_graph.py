@@ -11,11 +11,11 @@ import time
 from dataclasses import dataclass
 
 import gtsam
-import numpy as np
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Solution, newton_step, solve
+from jointscope.graphs.batch_solver import Solution, newton_step, solve
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_states
 from jointscope.graphs.normal_equations import build
 from jointscope.graphs.reference_graph import initial_values, nonlinear_graph
@@ -64,7 +64,7 @@ def batch_iteration(problem: BagProblem, estimate: Estimate, repeats: int = 3) -
         system = build(problem, x, calibration)
         built = time.perf_counter()
         shared = SharedLayout.of(calibration, 1)
-        newton_step([problem], Solution(estimate, system.cost, np.zeros((0, 0)), shared, [system]))
+        newton_step([problem], Solution(estimate, system.cost, shared, [system]))
         costs.append(Cost(problem.recording.duration, built - started, time.perf_counter() - built))
     return min(costs, key=lambda cost: cost.total)
 

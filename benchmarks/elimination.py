@@ -12,8 +12,10 @@ import numpy as np
 
 from jointscope.factors.custom_factor import block_key, state_key
 from jointscope.factors.factor import Factor
+from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, NewtonStep, Solution, newton_step, priors_of
+from jointscope.graphs.batch_solver import NewtonStep, Solution, newton_step
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.normal_equations import Linearized, accumulate, linearize_all, whitened
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.graphs.solver_context import in_solver_context
@@ -46,7 +48,7 @@ def measure(problem: BagProblem, estimate: Estimate) -> EliminationTimes:
     x, calibration = estimate.states[0], estimate.calibrations[0]
     linearized = list(linearize_all(problem, x, calibration))
     system, accumulating = _fastest(lambda: accumulate(linearized, x, calibration))
-    solution = Solution(estimate, system.cost, np.zeros((0, 0)), SharedLayout.of(calibration, 1), [system])
+    solution = Solution(estimate, system.cost, SharedLayout.of(calibration, 1), [system])
     step, banded = _fastest(lambda: newton_step([problem], solution))
     graph = jacobian_graph(problem, linearized, estimate)
     ordering = chain_ordering(len(x), estimate)
@@ -63,7 +65,7 @@ def jacobian_graph(
     graph = gtsam.GaussianFactorGraph()
     calibration = estimate.calibrations[0]
     priors: list[Linearized] = [
-        (prior, np.zeros(1, np.intp), prior.linearize((), calibration)) for prior in priors_of(problem)
+        (prior, np.zeros(1, np.intp), prior.linearize((), calibration)) for prior in shared_priors(problem.robot)
     ]
     for factor, ticks, linear in (*linearized, *priors):
         residual, by_state, by_block = whitened(factor, linear)

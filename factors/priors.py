@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
-from jointscope.factors.factor import Linearization, Samples
+from jointscope.factors.factor import Factor, Linearization, Samples
 from jointscope.factors.gyro import skew
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import AXES, Gyro
@@ -172,3 +172,8 @@ def inverse_right_jacobian(w: Array) -> Array:
         return np.eye(3) + 0.5 * W + W @ W / 12.0
     factor = 1.0 / angle**2 - (1.0 + np.cos(angle)) / (2.0 * angle * np.sin(angle))
     return np.eye(3) + 0.5 * W + factor * W @ W
+
+
+def shared_priors(robot: Robot) -> list[Factor]:
+    """The priors that all recordings of a robot share: dynamics and rotations."""
+    return [DynamicsPrior.of(robot), *(RotationPrior(gyro) for gyro in robot.gyros)]

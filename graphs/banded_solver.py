@@ -65,12 +65,13 @@ class Elimination:
         return x
 
 
-def eliminate(system: NormalEquations, damping: float = 0.0) -> Elimination:
+def eliminate(system: NormalEquations, damping: float = 0.0, first_tick: int = 0) -> Elimination:
     """Factorises the chain and forms the Schur complement.
 
     Args:
         system: normal equations.
         damping: Levenberg-Marquardt lambda, relative to the diagonal.
+        first_tick: tick of the first state, for messages.
 
     Raises:
         SolveError: a state is not determined.
@@ -80,7 +81,7 @@ def eliminate(system: NormalEquations, damping: float = 0.0) -> Elimination:
     if info > 0:
         tick, component = divmod(info - 1, d)
         raise SolveError(
-            f"the state at tick {tick} (component {component} of {d}) is not determined by the recording: "
+            f"the state at tick {first_tick + tick} (component {component} of {d}) is not determined by the recording: "
             "its Hessian is not positive definite; either no sample sees it, or the estimate ran away because "
             "the model contradicts the recording (a wrong sign, axis or unit, a sensor that stopped)"
         )

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Levenberg-Marquardt over all samples of all recordings, linearised in batches.
+"""Levenberg-Marquardt over the condensed GTSAM graph of all recordings.
 
-It minimises the same cost as the GTSAM graph of reference_graph.py; a test shows that both end in the same point.
+It minimises the same cost as the GTSAM graph of reference_graph.py, which has a factor for every sample; a test shows
+that both end in the same point.
 """
 
 from __future__ import annotations
@@ -9,16 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+import gtsam
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Factor
-from jointscope.factors.priors import DynamicsPrior, RotationPrior
+from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import Elimination, eliminate
+from jointscope.graphs.condensed.condensed_graph import CondensedGraph
+from jointscope.graphs.condensed.damped_step import LARGEST, damped_step, damping_of_states
 from jointscope.graphs.convergence import Iteration, has_converged, is_crawling, is_flat, measured_rows, short_step
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.graphs.undetermined import undetermined
@@ -29,29 +33,7 @@ Progress = Callable[[str, float], None]
 
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
-LAMBDA_LARGEST = 1e8
-LAMBDA_STATES = 1e-9  # of the states, as long as shorter steps of the shared values may help
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """States and shared values of all recordings.
-
-    Attributes:
-        states: states of each recording, shape (m + 1, 4n).
-        calibrations: shared values with the biases of each recording.
-    """
-
-    states: tuple[Array, ...]
-    calibrations: tuple[Calibration, ...]
-
-    def moved(self, dx: Sequence[Array], dp: Array, shared: SharedLayout) -> Estimate:
-        """The estimate after a step."""
-        return Estimate(
-            tuple(x + d for x, d in zip(self.states, dx, strict=True)),
-            tuple(c.retract(shared.step(dp, i)) for i, c in enumerate(self.calibrations)),
-        )
 
 
 @dataclass
@@ -61,28 +43,20 @@ class Solution:
     Attributes:
         estimate: the minimum.
         cost: half the sum of squared whitened residuals.
-        iterations: history.
-        hessian: Hessian on the shared values with all states eliminated, where the last step began, shape (s, s).
         shared: layout of the shared values.
         systems: normal equations of each recording at the estimate.
+        iterations: history.
         converged: False if the iterations ended before the step became small.
         flat: the iterations ended because a model that contradicts its recording gained nothing any more.
     """
 
     estimate: Estimate
     cost: float
-    hessian: Array
     shared: SharedLayout
     systems: list[NormalEquations]
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
-
-
-def priors_of(problem: BagProblem) -> list[Factor]:
-    """The priors that all recordings share: dynamics and rotations."""
-    robot = problem.robot
-    return [DynamicsPrior.of(robot), *(RotationPrior(gyro) for gyro in robot.gyros)]
 
 
 def solve(
@@ -107,36 +81,77 @@ def solve(
     Raises:
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
-    shared = SharedLayout.of(start.calibrations[0], BagProblem.owners(problems))
-    systems = _build(problems, start)
-    solution = Solution(start, _cost(problems[0], systems, start), np.zeros((0, 0)), shared, systems)
-    if not np.isfinite(solution.cost):
+    graph, values = CondensedGraph.of(problems, start, hold)
+    descent = _Descent(graph, values, graph.cost(values))
+    if not np.isfinite(descent.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
-    damping, measured = LAMBDA_START, measured_rows(problems)
-    for i in range(max_iterations):
-        if progress:
-            progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
-        step = _try(problems, solution, hold, damping)
-        while not step.accepted:
-            near = 0.0 < step.in_sigmas < short_step(solution.cost, step_tolerance, measured)
-            if near and damping <= LAMBDA_START:
+    descent.run(max_iterations, step_tolerance, measured_rows(problems), progress)
+    graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
+    estimate = graph.estimate(descent.values)
+    return Solution(
+        estimate,
+        descent.cost,
+        graph.shared,
+        graph.systems(estimate),
+        descent.iterations,
+        descent.converged,
+        descent.flat,
+    )
+
+
+@dataclass
+class _Descent:
+    """The iterations of one solve; attributes as in `Solution`."""
+
+    graph: CondensedGraph
+    values: gtsam.Values
+    cost: float
+    iterations: list[Iteration] = field(default_factory=list)
+    converged: bool = False
+    flat: bool = False
+
+    def run(self, most: int, tolerance: float, measured: int, progress: Progress | None) -> None:
+        """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
+        damping: float | None = LAMBDA_START
+        for i in range(most):
+            if progress:
+                progress(f"iteration {i + 1}, cost {self.cost:.6g}", i / most)
+            damping = self._lowered(damping, tolerance, measured)
+            if damping is None:
+                return
+            self.converged = has_converged(self.iterations, tolerance, measured, damping <= LAMBDA_START)
+            self.flat = not self.converged and is_flat(self.iterations, measured)
+            if self.converged or self.flat:
+                return
+            damping = max(damping / LAMBDA_FACTOR, 1e-12)
+        self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
+
+    def _lowered(self, damping: float, tolerance: float, measured: int) -> float | None:
+        """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
+        while True:
+            step = damped_step(self.graph, self.values, damping)
+            cost = self.graph.cost(step.values)
+            if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
+                self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
+                self.values, self.cost = step.values, cost
+                return damping
+            if 0.0 < step.in_sigmas < short_step(self.cost, tolerance, measured) and damping <= LAMBDA_START:
                 # there already: only states at a kink of the friction keep the cost from falling
-                solution.converged = True
-                return solution
+                self.converged = True
+                return None
             damping *= LAMBDA_FACTOR
-            if damping > LAMBDA_LARGEST:
-                return _stuck(solution, step, step_tolerance)
-            step = _try(problems, solution, hold, damping)
-        solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
-        solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
-        solution.converged = has_converged(solution.iterations, step_tolerance, measured, damping <= LAMBDA_START)
-        solution.flat = not solution.converged and is_flat(solution.iterations, measured)
-        if solution.converged or solution.flat:
-            break
-        damping = max(damping / LAMBDA_FACTOR, 1e-12)
-    else:
-        solution.flat = bool(solution.iterations) and is_crawling(solution.iterations, measured)
-    return solution
+            if damping > LARGEST:
+                self._end_stuck(step.in_sigmas, tolerance)
+                return None
+
+    def _end_stuck(self, in_sigmas: float, tolerance: float) -> None:
+        """No damping lowers the cost: a minimum within rounding, or an error."""
+        if in_sigmas >= max(tolerance, 0.1):
+            raise SolveError(
+                f"the cost {self.cost:.6g} cannot be lowered any further although the next step is "
+                f"{in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
+            )
+        self.converged = True
 
 
 @dataclass(frozen=True)
@@ -156,15 +171,6 @@ class NewtonStep:
     dp: Array
 
 
-@dataclass(frozen=True)
-class _Trial(NewtonStep):
-    """A step whose end was linearised: normal equations, cost, and whether the cost falls."""
-
-    systems: list[NormalEquations]
-    cost: float
-    accepted: bool
-
-
 def newton_step(
     problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
 ) -> NewtonStep:
@@ -172,56 +178,27 @@ def newton_step(
 
     Args:
         problems: factors of each recording.
-        solution: estimate with its normal equations; receives the Hessian.
+        solution: estimate with its normal equations.
         hold: blocks that stay.
         damping: Levenberg-Marquardt lambda, relative to the diagonal.
     """
     shared = solution.shared
     free = free_indices(shared, hold)
-    eliminations = [eliminate(system, _of_states(damping)) for system in solution.systems]
+    eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
     try:
         dp, in_sigmas = _solve_shared(H, g, free, damping)
     except np.linalg.LinAlgError as err:
         raise undetermined(H, free, shared, solution.estimate.calibrations[0]) from err
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
-    solution.hessian = H
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
-
-
-def _of_states(damping: float) -> float:
-    """Damping of the states: they follow the shared values at once, or a long valley is walked in tiny steps.
-
-    Where steps of the shared values are next to nothing and the cost still rises, the states are what is too far off.
-    """
-    return float(max(min(damping, LAMBDA_STATES), (damping / LAMBDA_LARGEST) ** 1.5))
 
 
 def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
     """Where one hardly damped step leads; for starts from which every step is an improvement."""
     shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
-    here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, _build(problems, estimate))
+    here = Solution(estimate, float("nan"), shared, _build(problems, estimate))
     return newton_step(problems, here, hold, LAMBDA_START).estimate
-
-
-def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str], damping: float) -> _Trial:
-    """One damped step. The trial point is linearised at once: nearly every step is accepted."""
-    step = newton_step(problems, solution, hold, damping)
-    systems = _build(problems, step.estimate)
-    cost_there = _cost(problems[0], systems, step.estimate)
-    accepted = bool(np.isfinite(cost_there) and cost_there <= solution.cost * (1.0 + 1e-12))
-    return _Trial(step.estimate, step.in_sigmas, step.dx, step.dp, systems, cost_there, accepted)
-
-
-def _stuck(solution: Solution, step: _Trial, step_tolerance: float) -> Solution:
-    """No damping lowers the cost: a minimum within rounding, or an error."""
-    if step.in_sigmas >= max(step_tolerance, 0.1):
-        raise SolveError(
-            f"the cost {solution.cost:.6g} cannot be lowered any further although the next step is "
-            f"{step.in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
-        )
-    solution.converged = True
-    return solution
 
 
 def _build(problems: Sequence[BagProblem], estimate: Estimate) -> list[NormalEquations]:
@@ -229,12 +206,8 @@ def _build(problems: Sequence[BagProblem], estimate: Estimate) -> list[NormalEqu
     return [build(problem, x, calibration) for problem, x, calibration in bags]
 
 
-def _cost(problem: BagProblem, systems: Sequence[NormalEquations], estimate: Estimate) -> float:
-    return sum(system.cost for system in systems) + _prior_cost(problem, estimate.calibrations[0])
-
-
 def _prior_cost(problem: BagProblem, calibration: Calibration) -> float:
-    residuals = [prior.residual((), calibration) / prior.sigmas for prior in priors_of(problem)]
+    residuals = [prior.residual((), calibration) / prior.sigmas for prior in shared_priors(problem.robot)]
     return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
 
 
@@ -258,7 +231,7 @@ def reduced_system(
         index = shared.indices(bag)
         H[np.ix_(index, index)] += elimination.S
         g[index] += elimination.s
-    for prior in priors_of(problem):
+    for prior in shared_priors(problem.robot):
         linear = prior.linearize((), calibration)
         for block, J in linear.by_block.items():
             columns = shared.columns[block]

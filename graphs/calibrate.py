@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, Progress, Solution, first_step, solve, total_cost
+from jointscope.graphs.batch_solver import Progress, Solution, first_step, solve, total_cost
 from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
 from jointscope.graphs.calibration_summary import Solved, summarize
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.memory_start import with_filled_memories
 from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, solve
+from jointscope.graphs.batch_solver import solve
+from jointscope.graphs.estimate import Estimate
 
 ITERATIONS = 12  # four do on a robot whose other parameters are right
 

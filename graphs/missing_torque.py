@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, first_step, solve
+from jointscope.graphs.batch_solver import first_step, solve
 from jointscope.graphs.compare import smooth
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.explained_torque import explained_torque, spring_and_drive
 from jointscope.graphs.free_torque import FreeTorques
 from jointscope.graphs.posterior import posteriors

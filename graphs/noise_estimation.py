@@ -22,8 +22,9 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, NewtonStep, Progress, Solution, newton_step, solve
+from jointscope.graphs.batch_solver import NewtonStep, Progress, Solution, newton_step, solve
 from jointscope.graphs.convergence import measured_rows, short_step
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.normal_equations import accumulate, linearize_all
 from jointscope.graphs.posterior import ResidualPart, posteriors, residual_parts
 from jointscope.graphs.shared_layout import SharedLayout
@@ -176,7 +177,7 @@ def _cycle(
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
     shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
-    here = Solution(estimate, float("nan"), np.zeros((0, 0)), shared, systems)
+    here = Solution(estimate, float("nan"), shared, systems)
     step = newton_step(problems, here, hold)
     cost = sum(system.cost for system in systems)
     if step.in_sigmas > short_step(cost, FAR, measured_rows(problems)):

@@ -13,8 +13,9 @@ import gtsam
 import numpy as np
 
 from jointscope.factors.custom_factor import custom_factor, extract_calibration, insert_calibration, state_key
+from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, priors_of
+from jointscope.graphs.estimate import Estimate
 from jointscope.robots.errors import SolveError
 
 
@@ -30,7 +31,7 @@ def nonlinear_graph(problems: Sequence[BagProblem], estimate: Estimate) -> gtsam
                 first = [int(placed.ticks[sample])] if placed.factor.states else []
                 ticks = tuple(first[0] + i for i in range(placed.factor.states))
                 graph.add(custom_factor(placed.factor, sample, ticks, like, bag))
-    for prior in priors_of(problems[0]):
+    for prior in shared_priors(problems[0].robot):
         graph.add(custom_factor(prior, 0, (), like))
     return graph
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel, Span
-from jointscope.graphs.batch_solver import Estimate, solve
+from jointscope.graphs.batch_solver import solve
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.posterior import posteriors
 from jointscope.graphs.score_test import TrialScore

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import f as fisher
 
+from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.graphs.trial_columns import Column, columns_of
 from jointscope.graphs.trial_system import Segment, TrialRows, rows_of, trial_system
@@ -168,7 +168,7 @@ class ScoreTest:
             g[index] += system.g
             Ws.append(system.W)
         calibration = self._segments[0].calibration
-        for prior in priors_of(self._segments[0].problem):
+        for prior in shared_priors(self._segments[0].problem.robot):
             linear = prior.linearize((), calibration)
             for block, J in linear.by_block.items():
                 c, J_white = shared.columns[block], J[0] / prior.sigmas[:, None]

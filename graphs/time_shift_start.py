@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate, solve
+from jointscope.graphs.batch_solver import solve
+from jointscope.graphs.estimate import Estimate
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
 from jointscope.robots.robot import Robot

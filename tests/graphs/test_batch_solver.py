@@ -9,8 +9,9 @@ import pytest
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.banded_solver import eliminate
-from jointscope.graphs.batch_solver import Estimate, solve, total_cost
+from jointscope.graphs.batch_solver import solve, total_cost
 from jointscope.graphs.causal_filter import filter_around, filter_states
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_states
 from jointscope.graphs.normal_equations import build, linearize_all
 from jointscope.graphs.posterior import StatePosterior, posteriors, residual_parts

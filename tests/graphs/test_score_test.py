@@ -8,8 +8,8 @@ import pytest
 from linearised_motion import base
 
 from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.factors.priors import shared_priors
 from jointscope.graphs.banded_solver import eliminate
-from jointscope.graphs.batch_solver import priors_of
 from jointscope.graphs.normal_equations import accumulate, layout, whitened
 from jointscope.graphs.order_scan import scan_orders
 from jointscope.graphs.score_test import ScoreTest
@@ -59,7 +59,7 @@ def dense(segment, x, trial):
                 A[s, :, x.size + p :] += by_trial[id(factor)][s]
         blocks.append(A.reshape(-1, A.shape[2]))
         residuals.append(r.ravel())
-    for prior in priors_of(segment.problem):
+    for prior in shared_priors(segment.problem.robot):
         linear = prior.linearize((), segment.calibration)
         r, _, by_block = whitened(prior, linear)
         A = np.zeros((r.size, x.size + p + k))

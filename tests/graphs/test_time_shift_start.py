@@ -7,8 +7,8 @@ import pytest
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Estimate
 from jointscope.graphs.calibrate import calibrate
+from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_states
 from jointscope.graphs.time_shift_start import with_best_shifts
 from jointscope.robots.effect_editing import add_effect
