@@ -79,6 +79,24 @@ def custom_factor(
     return gtsam.CustomFactor(noise, keys, _callback(one, len(ticks), calibration, bag))
 
 
+def stacked_factor(factor: Factor, calibration: Calibration, bag: int = 0) -> gtsam.CustomFactor:
+    """All samples of a factor that touches no state as one; arguments as in `custom_factor`."""
+    keys = [block_key(block, calibration, bag) for block in factor.blocks]
+    sigmas = np.broadcast_to(factor.sigmas, (len(factor), len(factor.rows))).ravel().copy()
+
+    def error(this: gtsam.CustomFactor, values: gtsam.Values, H: list | None) -> np.ndarray:
+        here = extract_calibration(values, calibration, factor.blocks, bag)
+        if H is None:
+            return factor.residual((), here).ravel()
+        linear = factor.linearize((), here)
+        for i, block in enumerate(factor.blocks):
+            J = linear.by_block[block]
+            H[i] = np.asfortranarray(J.reshape(-1, J.shape[2]))
+        return linear.residual.ravel()
+
+    return gtsam.CustomFactor(gtsam.noiseModel.Diagonal.Sigmas(sigmas), keys, error)
+
+
 def _callback(one: Factor, n_states: int, like: Calibration, bag: int) -> Callable:
     def error(this: gtsam.CustomFactor, values: gtsam.Values, H: list | None) -> np.ndarray:
         keys = this.keys()

@@ -22,9 +22,9 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.condensed import CondensedFactor
 from jointscope.factors.custom_factor import (
     block_key,
-    custom_factor,
     extract_calibration,
     insert_calibration,
+    stacked_factor,
     state_key,
 )
 from jointscope.factors.factor import Factor
@@ -106,13 +106,21 @@ class CondensedGraph:
         return self.graph.linearize(values)
 
     @property
-    def state_keys(self) -> list[int]:
-        """Keys of the states between stretches, piece after piece."""
-        return [
-            state_key(tick, piece)
-            for piece, cuts in enumerate(self.stretches)
-            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts))
-        ]
+    def states_ordering(self) -> gtsam.Ordering:
+        """The states between stretches, piece after piece."""
+        ordering = gtsam.Ordering()
+        for piece, cuts in enumerate(self.stretches):
+            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts)):
+                ordering.push_back(state_key(tick, piece))
+        return ordering
+
+    @property
+    def shared_ordering(self) -> gtsam.Ordering:
+        """All shared blocks that may change."""
+        ordering = gtsam.Ordering()
+        for key, _ in self.shared_keys:
+            ordering.push_back(key)
+        return ordering
 
     @property
     def shared_keys(self) -> list[tuple[int, NDArray[np.intp]]]:
@@ -179,8 +187,7 @@ def _add_rows_without_states(
     held = 0.0
     for factor, piece in alone:
         if set(factor.blocks) <= set(blocks):
-            for sample in range(len(factor)):
-                graph.add(custom_factor(factor, sample, (), likes[piece], owners[piece]))
+            graph.add(stacked_factor(factor, likes[piece], owners[piece]))
         else:
             residual = factor.residual((), likes[piece]) / factor.sigmas
             held += 0.5 * float(np.sum(residual**2))

@@ -44,12 +44,9 @@ def damped_step(graph: CondensedGraph, values: gtsam.Values, damping: float) -> 
     Raises:
         SolveError: a state or a shared value that nothing determines, or a Hessian that is not finite.
     """
-    states = gtsam.Ordering()
-    for key in graph.state_keys:
-        states.push_back(key)
     linear = graph.linearized(values, damping_of_states(damping))
     try:
-        conditionals, rest = linear.eliminatePartialSequential(states)
+        conditionals, rest = linear.eliminatePartialSequential(graph.states_ordering)
         given, in_sigmas = _shared_step(graph, rest, damping)
         return DampedStep(values.retract(conditionals.optimize(given)), in_sigmas)
     except RuntimeError as err:
@@ -71,13 +68,10 @@ def _shared_step(
     graph: CondensedGraph, rest: gtsam.GaussianFactorGraph, damping: float
 ) -> tuple[gtsam.VectorValues, float]:
     """Step of the shared values from the graph that the states left, and its largest part in sigmas."""
-    step, ordering = gtsam.VectorValues(), gtsam.Ordering()
-    keys = graph.shared_keys
+    step, keys = gtsam.VectorValues(), graph.shared_keys
     if not keys:
         return step, 0.0
-    for key, _ in keys:
-        ordering.push_back(key)
-    H, right = rest.hessian(ordering)
+    H, right = rest.hessian(graph.shared_ordering)
     free = np.concatenate([index for _, index in keys])
     if not (np.all(np.isfinite(H)) and np.all(np.isfinite(right))):
         raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
