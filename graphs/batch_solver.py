@@ -112,18 +112,18 @@ class _Descent:
 
     def run(self, most: int, tolerance: float, measured: int, progress: Progress | None) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
-        damping: float | None = LAMBDA_START
+        damping = LAMBDA_START
         for i in range(most):
             if progress:
                 progress(f"iteration {i + 1}, cost {self.cost:.6g}", i / most)
-            damping = self._lowered(damping, tolerance, measured)
-            if damping is None:
+            accepted = self._lowered(damping, tolerance, measured)
+            if accepted is None:
                 return
-            self.converged = has_converged(self.iterations, tolerance, measured, damping <= LAMBDA_START)
+            self.converged = has_converged(self.iterations, tolerance, measured, accepted <= LAMBDA_START)
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
-            damping = max(damping / LAMBDA_FACTOR, 1e-12)
+            damping = max(accepted / LAMBDA_FACTOR, 1e-12)
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
 
     def _lowered(self, damping: float, tolerance: float, measured: int) -> float | None:
