@@ -98,7 +98,7 @@ class CoupledEquations:
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """As `FreeEquations.acceleration`."""
         bias = self.torque(q, v, np.zeros_like(q))
-        return np.linalg.solve(self.mass_matrix(q), (tau - bias)[:, :, None])[:, :, 0]
+        return np.asarray(np.linalg.solve(self.mass_matrix(q), (tau - bias)[:, :, None])[:, :, 0], float)
 
     def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """As `FreeEquations.derivatives`."""

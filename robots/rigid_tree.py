@@ -135,8 +135,11 @@ class RigidTree:
     @property
     def slides(self) -> tuple[str, ...]:
         """Names of the prismatic joints, whose positions are lengths [m] and whose torques are forces [N]."""
-        kinds = {name: joint.shortname() for name, joint in zip(self.model.names, self.model.joints, strict=True)}
-        return tuple(joint for joint in self.joints if kinds[joint].startswith("JointModelP"))
+        return tuple(joint for joint in self.joints if self.is_slide(joint))
+
+    def is_slide(self, joint: str) -> bool:
+        """Whether a joint of the URDF is prismatic."""
+        return self._bodies.is_slide(joint)
 
     @property
     def other_joints(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import contextlib
 import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -56,12 +57,12 @@ class UrdfBodies:
         followers = {name: follower for name, follower in read_followers(path).items() if name in names}
         return UrdfBodies(path, model, followers)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all joints that are not fixed, base to tip."""
         return tuple(self.model.names)[1:]  # the first one is the universe
 
-    @property
+    @cached_property
     def free(self) -> tuple[str, ...]:
         """Names of the joints with one axis that follow no other joint, base to tip."""
         return tuple(name for name in self.names if name not in self.followers and self._joint(name).nv == 1)
@@ -122,6 +123,10 @@ class UrdfBodies:
             if name in positions and follower.factor != 0.0:
                 found.setdefault(follower.leader, (positions[name] - follower.offset) / follower.factor)
         return found
+
+    def is_slide(self, joint: str) -> bool:
+        """Whether a joint is prismatic."""
+        return joint in self.names and self._joint(joint).shortname().startswith("JointModelP")
 
     def _joint(self, name: str) -> pin.JointModel:
         return self.model.joints[self.model.getJointId(name)]
