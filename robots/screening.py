@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from jointscope.robots.encoder_gyro_scale import check_scales
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.gyro_plausibility import check_gyros
-from jointscope.robots.joint_motion import JointMotion, joint_motion
 from jointscope.robots.held_joints import about_bodies
+from jointscope.robots.joint_motion import JointMotion, joint_motion
 from jointscope.robots.motor_zero import with_motor_zero
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
