@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from xml.parsers import expat
-
-import numpy as np
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf_text import UrdfText
 
 
 @dataclass(frozen=True)
@@ -36,68 +33,36 @@ class Follower:
         return self.factor * leader + self.offset
 
 
-def read_followers(urdf: Path) -> dict[str, Follower]:
+def followers_of(text: UrdfText, file: str) -> dict[str, Follower]:
     """All mimic joints of a URDF, each with the joint at the beginning of its chain.
 
     One whose leader is not in the file follows nothing: it is a joint like any other.
 
+    Args:
+        text: of a URDF that pinocchio has read, so that factors and offsets are numbers.
+        file: its name.
+
     Raises:
-        RobotError: one follows itself; factor or offset is no finite number.
+        RobotError: a joint follows itself.
     """
-    joints = _Joints(urdf)
-    found = {name: _first_leader(name, joints, urdf) for name in joints.mimics}
-    return {name: follower for name, follower in found.items() if follower.leader in joints.names}
+    steps = {name: _step(mimic) for name, mimic in text.mimics.items() if mimic.get("joint") in text.joints}
+    return {name: _first_leader(name, steps, file) for name in steps}
 
 
-def _first_leader(name: str, joints: _Joints, urdf: Path) -> Follower:
+def _step(attributes: Mapping[str, str]) -> Follower:
+    numbers = (float(attributes.get(key) or usual) for key, usual in (("multiplier", 1.0), ("offset", 0.0)))
+    return Follower(attributes.get("joint", ""), *numbers)
+
+
+def _first_leader(name: str, steps: Mapping[str, Follower], file: str) -> Follower:
     found, seen = Follower(name), {name}
-    while found.leader in joints.mimics:
-        step = joints.mimics[found.leader]
+    while found.leader in steps:
+        step = steps[found.leader]
         if step.leader in seen:
             raise RobotError(
-                f"{urdf.name}: joint {found.leader} mimics {step.leader}, which follows {found.leader} itself; remove "
-                "one <mimic> of the ring"
+                f"{file}: joint {found.leader} mimics {step.leader}, which follows {found.leader} itself; remove one "
+                "<mimic> of the ring"
             )
         seen.add(step.leader)
         found = Follower(step.leader, found.factor * step.factor, found.factor * step.offset + found.offset)
     return found
-
-
-class _Joints:
-    """The joints of a URDF, which are children of <robot>, and their <mimic>; prefixes need no declaration."""
-
-    def __init__(self, urdf: Path):
-        self.names: set[str] = set()
-        self.mimics: dict[str, Follower] = {}
-        self._open: list[str] = []
-        self._joint, self._urdf = "", urdf
-        parser = expat.ParserCreate()
-        parser.StartElementHandler, parser.EndElementHandler = self._begin, self._end
-        try:
-            parser.Parse(urdf.read_bytes(), True)
-        except expat.ExpatError as err:
-            raise RobotError(f"{urdf} is not a URDF: {err}; expected XML that begins with <robot>") from err
-
-    def _begin(self, tag: str, attributes: Mapping[str, str]) -> None:
-        self._open.append(tag)
-        if self._open == ["robot", "joint"]:
-            self._joint = attributes.get("name", "")
-            self.names.add(self._joint)
-        elif self._open == ["robot", "joint", "mimic"] and self._joint:
-            factor, offset = (self._number(attributes, key, usual) for key, usual in (("multiplier", 1), ("offset", 0)))
-            self.mimics[self._joint] = Follower(attributes.get("joint", ""), factor, offset)
-
-    def _end(self, _: str) -> None:
-        self._open.pop()
-
-    def _number(self, attributes: Mapping[str, str], key: str, usual: float) -> float:
-        text = attributes.get(key, str(usual))
-        try:
-            value = float(text)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            raise RobotError(
-                f"{self._urdf.name}: joint {self._joint}, <mimic {key}={text!r}>: expected a finite number"
-            )
-        return value

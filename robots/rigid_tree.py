@@ -108,7 +108,10 @@ class RigidTree:
         model.gravity = pin.Motion(self.gravity, np.zeros(3))
         self._use(model)
         if self._need_inertias:
-            self.remarks = check_inertias(self.urdf.name, model, self.joints, self.mass_matrix, self.limits)
+            complaints = tuple(f"{self.urdf.name}: {complaint}" for complaint in self._bodies.complaints)
+            self.remarks = complaints + check_inertias(
+                self.urdf.name, model, self.joints, self.mass_matrix, self.limits
+            )
 
     def _use(self, model: pin.Model) -> None:
         self.model, self.data = model, model.createData()

@@ -8,8 +8,6 @@ joint they follow. Names of links and joints may coincide.
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +17,9 @@ import numpy as np
 import pinocchio as pin
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.mimic_joints import Follower, read_followers
+from jointscope.robots.mimic_joints import Follower, followers_of
+from jointscope.robots.urdf_parser import parse_urdf
+from jointscope.robots.urdf_text import UrdfText
 
 ROUND = {"JointModelRUBX": pin.JointModelRX, "JointModelRUBY": pin.JointModelRY, "JointModelRUBZ": pin.JointModelRZ}
 ROUND_SLANTED = "JointModelRevoluteUnboundedUnaligned"
@@ -33,11 +33,13 @@ class UrdfBodies:
         path: the file.
         model: all joints; those with <mimic> as if they moved freely, continuous ones with two coordinates.
         followers: the mimic joints among them.
+        complaints: what the parser left out, and why.
     """
 
     path: Path
     model: pin.Model
     followers: Mapping[str, Follower]
+    complaints: tuple[str, ...] = ()
 
     @staticmethod
     def read(path: Path) -> UrdfBodies:
@@ -48,14 +50,17 @@ class UrdfBodies:
         """
         if not path.is_file():
             raise RobotError(f"the URDF {path} does not exist; set `urdf` in the robot file, relative to that file")
-        try:
-            with _quiet_stderr():
-                model = pin.buildModelFromUrdf(str(path))
-        except Exception as err:
-            raise RobotError(f"{path} is not a URDF that pinocchio can read: {str(err).splitlines()[0]}") from err
+        text = UrdfText(path)
+        model, complaints = parse_urdf(path, text)
         names = set(model.names)
-        followers = {name: follower for name, follower in read_followers(path).items() if name in names}
-        return UrdfBodies(path, model, followers)
+        followers = {name: follower for name, follower in followers_of(text, path.name).items() if name in names}
+        lost = [name for name in text.mimics if name in names and name not in followers]
+        complaints += tuple(
+            f"joint {name} mimics {text.mimics[name].get('joint', '')!r}, which is no joint of the file, and is taken for "
+            "a joint of its own"
+            for name in lost
+        )
+        return UrdfBodies(path, model, followers, complaints)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -128,6 +133,10 @@ class UrdfBodies:
         """Whether a joint is prismatic."""
         return joint in self.names and self._joint(joint).shortname().startswith("JointModelP")
 
+    def has_axis(self, joint: str) -> bool:
+        """Whether the axis of a joint has a direction."""
+        return bool(np.linalg.norm(self._motion_axis(self._joint(joint))) > 0.5)
+
     def _joint(self, name: str) -> pin.JointModel:
         return self.model.joints[self.model.getJointId(name)]
 
@@ -161,22 +170,9 @@ class UrdfBodies:
         """A continuous joint as one with a single coordinate."""
         if joint.shortname() != ROUND_SLANTED:
             return ROUND[joint.shortname()]()
+        return pin.JointModelRevoluteUnaligned(self._motion_axis(joint)[3:])
+
+    def _motion_axis(self, joint: pin.JointModel) -> np.ndarray:
+        """What a joint with one axis does at unit velocity, in its own frame: linear, then angular, shape (6,)."""
         jacobian = pin.computeJointJacobian(self.model, self.model.createData(), pin.neutral(self.model), joint.id)
-        return pin.JointModelRevoluteUnaligned(jacobian.reshape(6, self.model.nv)[3:, joint.idx_v])
-
-
-@contextlib.contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Keeps the parser's own lines, written from C++, off the screen; its exception says the same."""
-    try:
-        saved = os.dup(2)
-    except OSError:
-        yield  # there is no stderr to keep quiet
-        return
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
+        return np.array(jacobian.reshape(6, self.model.nv)[:, joint.idx_v])

@@ -15,7 +15,7 @@ def check_moving(bodies: UrdfBodies, joints: Sequence[str]) -> None:
     """Complains about joints that cannot be those of a robot.
 
     Raises:
-        RobotError: a joint is not there, follows another one, or has several axes.
+        RobotError: a joint is not there, follows another one, or has several axes or none.
     """
     file, free = bodies.path.name, bodies.free
     for joint in joints:
@@ -33,6 +33,8 @@ def check_moving(bodies: UrdfBodies, joints: Sequence[str]) -> None:
             )
         if joint not in free:
             raise RobotError(f"{file} has no moving joint {joint!r}; it has {', '.join(free)}")
+        if not bodies.has_axis(joint):
+            raise RobotError(f'{file}: joint {joint} has no axis; expected a direction such as <axis xyz="0 0 1"/>')
 
 
 def check_locked(bodies: UrdfBodies, joints: Sequence[str], locked: Mapping[str, float]) -> None:
