@@ -19,6 +19,7 @@ from jointscope.robots.body_rates import BodyRates
 from jointscope.robots.coupling import Coupling, with_new_joints
 from jointscope.robots.equations_of_motion import Equations, equations_of
 from jointscope.robots.errors import RobotError
+from jointscope.robots.mimic_joints import Follower
 from jointscope.robots.possible_inertias import check_inertias
 from jointscope.robots.urdf_bodies import UrdfBodies
 from jointscope.robots.usable_joints import check_locked, check_moving
@@ -148,6 +149,12 @@ class RigidTree:
     def other_joints(self) -> tuple[str, ...]:
         """Names of the joints of the URDF beside `joints` whose position matters for the equations of `joints`."""
         return self._bodies.that_matter(self.joints)
+
+    @property
+    def followers(self) -> dict[str, Follower]:
+        """The mimic joints that move, by name."""
+        moving = tuple(self.model.names)
+        return {name: follower for name, follower in self._bodies.followers.items() if name in moving}
 
     @property
     def limits(self) -> Array:
