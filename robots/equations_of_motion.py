@@ -102,11 +102,15 @@ class CoupledEquations:
 
     def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """As `FreeEquations.derivatives`."""
-        m, n = q.shape
-        a, da_dq, da_dv, M_inverse = np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, n)), np.empty((m, n, n))
-        for k in range(m):
-            a[k], da_dq[k], da_dv[k], M_inverse[k] = self.derivatives_at(q[k], v[k], tau[k])
-        return a, da_dq, da_dv, M_inverse
+        coupling, G = self._coupling, self._G
+        M_inverse = np.linalg.inv(self.mass_matrix(q))
+        a = (M_inverse @ (tau - self.torque(q, v, np.zeros_like(q)))[:, :, None])[:, :, 0]
+        by_q, by_v = np.empty((2, len(q), len(G), len(G)))
+        motion = coupling.positions(q), coupling.rates(v), coupling.rates(a)
+        model, data, derivatives = self._model, self._data, pin.computeRNEADerivatives
+        for k, (q_model, v_model, a_model) in enumerate(zip(*motion, strict=True)):
+            by_q[k], by_v[k], _ = derivatives(model, data, q_model, v_model, a_model)
+        return a, -M_inverse @ (G.T @ by_q @ G), -M_inverse @ (G.T @ by_v @ G), M_inverse
 
     def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
         """As `FreeEquations.acceleration_at`."""

@@ -22,7 +22,9 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.mimic_joints import Follower
 from jointscope.robots.possible_inertias import check_inertias
 from jointscope.robots.urdf_bodies import UrdfBodies
-from jointscope.robots.usable_joints import check_locked, check_moving
+from jointscope.robots.usable_joints import check_locked, check_moving, check_within_limits
+from jointscope.robots.usable_joints import joints_that_matter as joints_that_matter
+from jointscope.robots.usable_joints import moving_joints as moving_joints
 
 Array = NDArray[np.float64]
 NOWHERE: Mapping[str, float] = MappingProxyType({})
@@ -67,6 +69,7 @@ class RigidTree:
         self._bodies = UrdfBodies.read(urdf)
         check_moving(self._bodies, self.joints)
         check_locked(self._bodies, self.joints, locked)
+        check_within_limits(self._bodies, locked)
         self.remarks: tuple[str, ...] = ()
         self._need_inertias = inertias
         self._relatives: dict[tuple[tuple[str, float], ...], RigidTree] = {}  # the same tree in other postures
@@ -274,31 +277,6 @@ class RigidTree:
         if body not in self.bodies:
             raise RobotError(f"{self.urdf.name} has no link {body!r}; it has {', '.join(self.bodies)}")
         return self.model.getFrameId(body, pin.FrameType.BODY)
-
-
-def moving_joints(urdf: Path) -> tuple[str, ...]:
-    """Names of the joints that can be a robot's: revolute, continuous, prismatic; no mimic ones. Base to tip.
-
-    Raises:
-        RobotError: no such file, no URDF, or none of its joints is of that kind.
-    """
-    names = UrdfBodies.read(urdf).free
-    if not names:
-        raise RobotError(
-            f"{urdf.name} has no moving joint that can be used: expected revolute, continuous or prismatic ones"
-        )
-    return names
-
-
-def joints_that_matter(urdf: Path, joints: Sequence[str]) -> tuple[str, ...]:
-    """`RigidTree.other_joints` before there is a tree.
-
-    Raises:
-        RobotError: no such file, no URDF, or one of the joints cannot move.
-    """
-    bodies = UrdfBodies.read(urdf)
-    check_moving(bodies, joints)
-    return bodies.that_matter(joints)
 
 
 def _key(positions: Mapping[str, float]) -> tuple[tuple[str, float], ...]:

@@ -56,8 +56,8 @@ class UrdfBodies:
         followers = {name: follower for name, follower in followers_of(text, path.name).items() if name in names}
         lost = [name for name in text.mimics if name in names and name not in followers]
         complaints += tuple(
-            f"joint {name} mimics {text.mimics[name].get('joint', '')!r}, which is no joint of the file, and is taken for "
-            "a joint of its own"
+            f"joint {name} mimics {text.mimics[name].get('joint', '')!r}, which is no joint of the file, and is taken "
+            "for a joint of its own"
             for name in lost
         )
         return UrdfBodies(path, model, followers, complaints)
@@ -132,6 +132,13 @@ class UrdfBodies:
     def is_slide(self, joint: str) -> bool:
         """Whether a joint is prismatic."""
         return joint in self.names and self._joint(joint).shortname().startswith("JointModelP")
+
+    def limits(self, joint: str) -> tuple[float, float]:
+        """Lower and upper limit of a joint with one axis; both infinite for a continuous one."""
+        q = self._joint(joint).idx_q
+        if self._joint(joint).nq == 2:
+            return -np.inf, np.inf
+        return float(self.model.lowerPositionLimit[q]), float(self.model.upperPositionLimit[q])
 
     def has_axis(self, joint: str) -> bool:
         """Whether the axis of a joint has a direction."""

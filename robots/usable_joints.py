@@ -4,11 +4,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.urdf_bodies import UrdfBodies
+
+TURN = 2.0 * np.pi  # [rad]
+
+
+def moving_joints(urdf: Path) -> tuple[str, ...]:
+    """Names of the joints that can be a robot's: revolute, continuous, prismatic; no mimic ones. Base to tip.
+
+    Raises:
+        RobotError: no such file, no URDF, or none of its joints is of that kind.
+    """
+    names = UrdfBodies.read(urdf).free
+    if not names:
+        raise RobotError(
+            f"{urdf.name} has no moving joint that can be used: expected revolute, continuous or prismatic ones"
+        )
+    return names
+
+
+def joints_that_matter(urdf: Path, joints: Sequence[str]) -> tuple[str, ...]:
+    """`RigidTree.other_joints` before there is a tree.
+
+    Raises:
+        RobotError: no such file, no URDF, or one of the joints cannot move.
+    """
+    bodies = UrdfBodies.read(urdf)
+    check_moving(bodies, joints)
+    return bodies.that_matter(joints)
 
 
 def check_moving(bodies: UrdfBodies, joints: Sequence[str]) -> None:
@@ -60,3 +88,20 @@ def check_locked(bodies: UrdfBodies, joints: Sequence[str], locked: Mapping[str,
             raise RobotError(f"locked: {file} has no joint {joint!r} that can be locked; it has {some}")
         if not np.isfinite(position):
             raise RobotError(f"locked: position {position} of {joint}; expected a finite number [rad] or [m]")
+
+
+def check_within_limits(bodies: UrdfBodies, locked: Mapping[str, float]) -> None:
+    """Complains about positions that a user wrote down in degrees.
+
+    Zeros of encoders and limits of URDFs are not that exact: a joint may stand up to a turn outside.
+
+    Raises:
+        RobotError: a joint that turns is locked more than a turn outside of its limits.
+    """
+    for joint, position in locked.items():
+        low, high = bodies.limits(joint)
+        if not bodies.is_slide(joint) and low < high and not low - TURN < position < high + TURN:
+            raise RobotError(
+                f"locked: {joint} at {position:g} rad is far outside of the limits {low:g} to {high:g} rad of "
+                f"{bodies.path.name}; expected radians: {np.radians(position):.4g} if it is {position:g} degrees"
+            )
