@@ -103,7 +103,7 @@ class CoupledEquations:
     def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """As `FreeEquations.derivatives`."""
         coupling, G = self._coupling, self._G
-        M_inverse = np.linalg.inv(self.mass_matrix(q))
+        M_inverse = np.asarray(np.linalg.inv(self.mass_matrix(q)), dtype=np.float64)
         a = (M_inverse @ (tau - self.torque(q, v, np.zeros_like(q)))[:, :, None])[:, :, 0]
         by_q, by_v = np.empty((2, len(q), len(G), len(G)))
         motion = coupling.positions(q), coupling.rates(v), coupling.rates(a)

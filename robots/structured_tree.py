@@ -138,8 +138,15 @@ def inertia_torque(tree: RigidTree, change: InertiaChange, q: Array, v: Array, a
     size = UNIT_CHANGE / max(float(np.abs(change.direction).max()), 1e-12)
     _change(model, change, size)
     other = tree.with_model(model)
-    used = v * np.sqrt(max(coriolis, 0.0)) if tree.coriolis else np.zeros_like(v)
-    return (other.torque(q, used, a) - tree.torque(q, used, a)) / size
+
+    def more(velocity: Array) -> Array:
+        return (other.torque(q, velocity, a) - tree.torque(q, velocity, a)) / size
+
+    share = coriolis if tree.coriolis else 0.0
+    if share == 1.0:
+        return more(v)
+    still = more(np.zeros_like(v))
+    return still if share == 0.0 else still + share * (more(v) - still)  # linear in the share, beyond 0 and 1, too
 
 
 def inertia_changes(robot: Robot, model: pin.Model) -> list[InertiaChange]:
