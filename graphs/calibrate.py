@@ -110,6 +110,8 @@ def _calibrated(
         calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
     problems = _anchored(problems, calibrations)
     solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
+    # the file that will be written says in which posture its values were found
+    robot = robot.locked_as_in(recordings[0].posture)
     return summarize(robot, solved, tuple(history.records), notices, hold)
 
 

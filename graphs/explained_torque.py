@@ -29,6 +29,7 @@ def explained_torque(robot: Robot, label: str, problem: BagProblem, x: Array) ->
         problem: recording with the model that lacks it.
         x: states of that model, shape (m, d).
     """
+    robot = robot.in_posture(problem.recording.posture)
     base, n = remove_effect(robot, label), len(robot.joints)
     full = [model.layout.carried_over(x, problem.robot.layout) for model in (robot, base)]
     change = _accelerations(robot, problem, full[0]) - _accelerations(base, problem, full[1])

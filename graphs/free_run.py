@@ -65,6 +65,7 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         RobotError: no controller, or effects on the command, which act before the controller's output is known.
         RecordingError: the recording holds no goals.
     """
+    robot = robot.in_posture(recording.posture)
     controller, goal = controller_of(robot, recording), recording.goal
     if controller is None:
         raise RobotError(f"{robot.name} has no section `controller`; without it the loop cannot be simulated")

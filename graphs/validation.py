@@ -66,7 +66,7 @@ def validation_error(
         calibration = replace(Calibration.of(robot), biases=biases[bag].biases)
         x = base.states_at(bag, problem.timeline.ticks, robot.layout)
         causal = filter_states(problem, x, calibration)
-        predictor = Predictor(robot, problem.timeline)
+        predictor = Predictor(problem.robot, problem.timeline)
         for horizon, target in squares.items():
             ahead = predict_ahead(problem, calibration, predictor, causal, horizon)
             for i, span in enumerate(spans):

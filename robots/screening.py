@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from jointscope.robots.encoder_gyro_scale import check_scales
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.gyro_plausibility import check_gyros
+from jointscope.robots.held_joints import about_bodies
 from jointscope.robots.joint_motion import JointMotion, joint_motion
 from jointscope.robots.motor_zero import with_motor_zero
 from jointscope.robots.recording import Notice, Recording, Stream
@@ -55,7 +56,8 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
         if sensor is not None:
             _check_wraps(recording.streams[sensor.name], sensor.units)
     recording = with_motor_zero(recording, robot)
-    notices = _check_overlap(recording)
+    notices = [*about_bodies(recording, robot), *_check_overlap(recording)]
+    robot = robot.in_posture(recording.posture)
     _check_command(recording.command, robot)
     motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
     for name in robot.sensors:

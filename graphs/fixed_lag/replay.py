@@ -38,7 +38,8 @@ def replay(
 
     Args:
         robot: the model.
-        recording: blocks of messages as they were received, or a recording, which has lost its duplicates.
+        recording: blocks of messages as they were received, or a recording, which has lost its duplicates; other joints
+            are held where its `posture` says, if it has one.
         lag: length of the window [s].
         adapt: parameters that may walk: full name and density [unit/sqrt(s)].
         smoothed_every: the state at the lag is read at every so-manieth tick.
@@ -50,6 +51,7 @@ def replay(
         EstimatorError: an impossible lag or parameter.
         RecordingError: the messages never led to an update, or the bag cannot be read.
     """
+    robot = robot.in_posture(getattr(recording, "posture", {}))
     run = _Run(robot, lag, adapt, smoothed_every, listener, progress)
     gc.collect()
     gc.freeze()  # what is there by now need not be looked through in the middle of an update

@@ -69,6 +69,7 @@ def equations(recording: Recording, robot: Robot, values: Mapping[str, float]) -
         robot: the model.
         values: delays of gyros at which these are evaluated, by full name [s]; what is missing is zero.
     """
+    robot = robot.in_posture(recording.posture)
     signals = joint_signals(recording, robot)
     gears = [gear_equation(signals, robot, j) for j in range(robot.n)]
     gyros = [gyro_equation(recording, robot, g, values.get(delay_name(g), 0.0)) for g in robot.gyros]

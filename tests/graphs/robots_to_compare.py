@@ -4,12 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from jointscope.robots.effect_catalogue import catalogue
 from jointscope.robots.effect_editing import add_effect, carried_noise
+from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot_file import load_robot
+
+MIMICKING = Path(__file__).with_name("mimicking_doggy.urdf")
 
 READY, PAPER = load_robot("doggy"), load_robot("doggy_paper")
 SMOOTH = replace(READY, choices=replace(READY.choices, friction_sharpness=20.0))
@@ -23,6 +27,12 @@ def _rigid(robot, *joints):
 def _without_coriolis(robot):
     robot = replace(robot, choices=replace(robot.choices, coriolis=False))
     return replace(robot, tree=robot.tree.with_coriolis(False))
+
+
+def mimicking(robot, joints):
+    """The robot on other bodies: a continuous joint, links that follow, an ear that is held, gravity."""
+    tree = RigidTree(MIMICKING, joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7})
+    return replace(robot, tree=tree, joints=tuple(joints))
 
 
 def _with(effect, robot):
@@ -41,7 +51,17 @@ def _every():
     for effect in catalogue().values():
         if effect.id != "integration_error":  # it is a choice of the rule, not a term of the equations
             yield effect.id, _with(effect, bases.get(effect.id, READY))
+    follows = mimicking(READY, READY.joints)
+    yield "mimic joints", follows
+    yield "mimic joints in another order", mimicking(READY, ("joint3", "joint1", "joint2"))
+    yield "mimic joints and rigid ones", _rigid(follows, "joint1", "joint3")
+    for name in ("payload", "inertia_error", "bearing_flexibility"):
+        yield f"mimic joints and {name}", _with(catalogue()[name], follows)
+    follows = _without_coriolis(follows)
+    yield "mimic joints without Coriolis terms", follows
+    yield "mimic joints and coriolis", _with(catalogue()["coriolis"], follows)
     bearing = catalogue()["bearing_flexibility"]
+    yield "mimic joints in another order and bearing", _with(bearing, mimicking(READY, ("joint3", "joint1", "joint2")))
     yield "bearing and a rigid joint", _rigid(_with(bearing, READY), "joint2")
     for name in ("cogging", "hysteresis"):
         yield f"bearing and {name}", _with(catalogue()[name], _with(bearing, READY))

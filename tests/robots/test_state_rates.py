@@ -53,6 +53,29 @@ def test_derivatives_by_the_torque_give_the_response_to_commands(compared):
         assert not C[layout.positions].any()
 
 
+@pytest.mark.parametrize("scale", [-0.2, 0.0, 0.37, 0.998, 1.0, 1.3])
+@pytest.mark.parametrize("name", ["coriolis", "mimic joints and coriolis"])
+def test_any_share_of_the_coriolis_terms_gives_the_same_as_many_samples_and_the_right_slopes(name, scale):
+    robot = ROBOTS[name].with_values({"robot.coriolis.scale": scale})
+    joints, layout = ElasticJoints(robot), robot.layout
+    x, u = states(robot, COUNT), np.random.default_rng(5).uniform(-1.0, 1.0, (COUNT, robot.n))
+    x[:, layout.v_link] += 1.5  # fast enough for the terms to matter
+    values = np.array([robot.parameters[name].value for name in joints.names])
+    expected = joints.with_derivatives(x, u, values)
+    model = StateRates(robot)
+    for k in range(COUNT):
+        torque = model.command_torque(u[k])
+        rate, A, _ = model.with_jacobian(x[k], torque)
+        np.testing.assert_allclose(rate, model.rates(x[k], torque), rtol=1e-10, atol=1e-9)
+        np.testing.assert_allclose(rate[layout.rates], expected.value[k], rtol=1e-10, atol=1e-9)
+        largest = np.abs(expected.by_state[k]).max()
+        np.testing.assert_allclose(A[layout.rates], expected.by_state[k], rtol=1e-9, atol=1e-11 * largest)
+        for column in np.r_[np.arange(layout.size)[layout.q_link], np.arange(layout.size)[layout.v_link]]:
+            step = 1e-6 * np.eye(layout.size)[column]
+            slope = (model.rates(x[k] + step, torque) - model.rates(x[k] - step, torque)) / 2e-6
+            np.testing.assert_allclose(A[:, column], slope, rtol=1e-5, atol=1e-7 * largest)
+
+
 def test_calls_do_not_disturb_each_other(compared):
     robot, _, x, u, _, _ = compared
     model = StateRates(robot)

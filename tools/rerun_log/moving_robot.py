@@ -69,6 +69,7 @@ def _readable(half_axis: float) -> float:
 
 def send_robot(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str) -> None:
     """Entities robot/BODY, robot/trail and robot/position_2_sigma below `root`."""
+    robot = robot.in_posture(fit.recording.posture)
     duration = float(fit.ticks[-1] - fit.ticks[0])
     keep = thinned(len(fit.ticks), max(int(FRAMES * duration), 2))
     times, q = fit.ticks[keep], fit.states[keep][:, robot.layout.joint_q]

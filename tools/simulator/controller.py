@@ -60,7 +60,7 @@ def full_command(robot: Robot) -> Array:
         if "motor.supply_voltage" not in robot.constants:
             raise SimulationError(f"robot {robot.name!r}: simulating needs the constant 'motor.supply_voltage'")
         return np.full(robot.n, robot.constants["motor.supply_voltage"])
-    effort = np.array(robot.tree.model.effortLimit, dtype=float)
+    effort = robot.tree.effort_limits
     if not np.all(np.isfinite(effort) & (effort > 0) & (effort < 1e9)):
         raise SimulationError(f"robot {robot.name!r}: simulating needs an effort limit of every joint in the URDF")
     gain = 1.0 if robot.drive_gain is None else [robot.drive_parameter(j, robot.drive_gain).value for j in robot.joints]

@@ -76,6 +76,7 @@ class Engine:
         self.address = self._find_address(robot)
         self._link = np.array([self.address.link[joint] for joint in robot.joints])
         self._motor = np.array([self.address.motor[joint] for joint in robot.joints])
+        self._followers = [(self.model.joint(n).qposadr[0], f) for n, f in robot.tree.followers.items()]
         self._actuator = np.array([self.address.actuator[joint] for joint in robot.joints])
         for effect in self.effects:
             effect.bind(self.model, self.data, self.address)
@@ -104,6 +105,8 @@ class Engine:
         """Puts links and rotors at a position, shape (n_joints,) [rad], at rest with relaxed springs."""
         self._mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._link] = self.data.qpos[self._motor] = position
+        for place, follower in self._followers:
+            self.data.qpos[place] = follower.position(self.data.joint(follower.leader).qpos[0])
 
     def settle(self) -> None:
         """Lets the robot come to rest under its own load, without commands, and calls that time zero."""

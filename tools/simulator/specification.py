@@ -23,6 +23,7 @@ from jointscope.tools.simulator.mujoco_module import load_mujoco
 Array = NDArray[np.float64]
 
 DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
+STIFF = (4e-4, 1.0)  # [s] time constant and damping ratio with which a mimic joint is pulled back; two steps at 5 kHz
 DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # almost rigid
 
 
@@ -55,6 +56,7 @@ def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
     # The engine would otherwise shift a body's inertia to satisfy inequalities that the robot file has passed already.
     spec.compiler.balanceinertia = False
     _add_links(mujoco, spec, robot)
+    _tie_followers(mujoco, spec, robot)
     for joint in robot.joints:
         _add_rotor(mujoco, spec, robot, joint, friction)
         _add_spring(spec, robot, joint)
@@ -82,6 +84,22 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
         axis, turns = joint_axis(model, j)
         kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(name=name, type=kind, axis=axis)
+
+
+def _tie_followers(mujoco: Any, spec: Any, robot: Robot) -> None:
+    """Mimic joints as equations between joints, which the engine holds by forces; off by some 1e-9 rad."""
+    for name, follower in robot.tree.followers.items():
+        tie = spec.add_equality(
+            name=f"{name} follows",
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=name,
+            name2=follower.leader,
+            solref=STIFF,
+            solimp=DRY_IMPEDANCE,
+        )
+        tie.data[:2] = follower.offset, follower.factor  # of a polynomial in the leader's position
+        tie.data[2:5] = 0.0
 
 
 def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a URDF's own text says about its joints, and the text as pinocchio's parser wants it.
+
+Makers leave out limits that the parser insists on; they are put in as zeros, which means: not known. Prefixes that
+nothing declares (leftovers of xacro, sections of simulators) are no mistake here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.parsers import expat
+
+LIMITED = ("revolute", "prismatic")
+NO_LIMIT = b'<limit lower="0" upper="0" effort="0" velocity="0"/>'
+
+
+class UrdfText:
+    """One pass over a URDF; joints are the children of <robot>.
+
+    Args:
+        urdf: the file.
+
+    Attributes:
+        joints: names of all joints, fixed ones, too.
+        mimics: attributes of <mimic>, by joint.
+        trouble: why it is no XML; empty if it is.
+    """
+
+    def __init__(self, urdf: Path):
+        self._text = urdf.read_bytes()
+        self.joints: set[str] = set()
+        self.mimics: dict[str, Mapping[str, str]] = {}
+        self.trouble = ""
+        self._open: list[str] = []
+        self._joint: Mapping[str, str] = {}
+        self._limited = False
+        self._missing: list[tuple[int, bytes]] = []  # where something is missing, and what
+        self._parser = parser = expat.ParserCreate()
+        parser.StartElementHandler, parser.EndElementHandler = self._begin, self._end
+        try:
+            parser.Parse(self._text, True)
+        except expat.ExpatError as err:
+            self.trouble = str(err)
+
+    @property
+    def completed(self) -> str | None:
+        """The text with all limits; None if none is missing."""
+        if not self._missing or self.trouble:
+            return None
+        pieces, last = [], 0
+        for place, missing in self._missing:
+            pieces += [self._text[last:place], missing]
+            last = place
+        return b"".join([*pieces, self._text[last:]]).decode(errors="replace")
+
+    def _begin(self, tag: str, attributes: Mapping[str, str]) -> None:
+        self._open.append(tag)
+        name = self._joint.get("name", "")
+        if self._open == ["robot", "joint"]:
+            self._joint, self._limited = attributes, False
+            self.joints.add(attributes.get("name", ""))
+        elif self._open == ["robot", "joint", "mimic"]:
+            self.mimics[name] = attributes
+        elif self._open == ["robot", "joint", "limit"]:
+            self._limited = True
+            behind = self._parser.CurrentByteIndex + len(b"<limit")
+            self._missing += [
+                (behind, b' %s="0"' % key) for key in (b"effort", b"velocity") if key.decode() not in attributes
+            ]
+
+    def _end(self, tag: str) -> None:
+        whole = self._open == ["robot", "joint"] and not self._limited
+        place = self._parser.CurrentByteIndex
+        # an empty element <joint/> has no end tag, and no parent link either
+        if whole and self._joint.get("type") in LIMITED and self._text[place : place + 2] == b"</":
+            self._missing.append((place, NO_LIMIT))
+        self._open.pop()
