@@ -22,6 +22,7 @@ from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.joint_parameters import JointParameters
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -83,12 +84,13 @@ def initial_dynamics(problems: Sequence[BagProblem], states: Sequence[Array], ca
     found: dict[str, list[tuple[float, float]]] = {}
     if robot.command.unit == "N m":
         return calibration
+    parameters = JointParameters(robot)
     for i, joint in enumerate(robot.joints):
         link = np.column_stack([-merged["deflection"][:, i], -merged["deflection_rate"][:, i]])
-        _regress(found, robot, joint, ("stiffness", "damping"), link, merged["load"][:, i])
+        _regress(found, robot, parameters, joint, ("stiffness", "damping"), link, merged["load"][:, i])
         laws = (*robot.drive_laws, "coulomb_torque", "inertia")
         motor = np.column_stack([merged[SIGNAL_OF[law]][:, i] for law in laws])
-        _regress(found, robot, joint, laws, motor, merged["load"][:, i])
+        _regress(found, robot, parameters, joint, laws, motor, merged["load"][:, i])
     return _with_values(calibration, found)
 
 
@@ -129,6 +131,7 @@ def _inverse_mass(robot: Robot, q: Array) -> Array:
 def _regress(
     found: dict[str, list[tuple[float, float]]],
     robot: Robot,
+    parameters: JointParameters,
     joint: str,
     laws: tuple[str, ...],
     regressors: Array,
@@ -142,13 +145,11 @@ def _regress(
         _check_sign(joint, regressors / scale, target)
     values, _ = nnls(regressors / scale, target)
     for law, value, size in zip(laws, values / scale, scale, strict=True):
-        parameter = (
-            robot.parameter(f"{joint}.{law}")
-            if law not in (*robot.drive_laws, "inertia")
-            else robot.drive_parameter(joint, law)
-        )
-        if value > 0.0 and not parameter.fixed:
-            found.setdefault(parameter.name, []).append((float(value), float(value * size)))
+        name = parameters.source(law, robot.joints.index(joint))
+        if value > 0.0 and name and not robot.parameter(name).fixed:
+            # a spring that an effect gave to the joint has a compliance
+            own = 1.0 / value if name.endswith(".compliance") else value
+            found.setdefault(name, []).append((float(own), float(value * size)))
 
 
 def _check_sign(joint: str, regressors: Array, target: Array) -> None:

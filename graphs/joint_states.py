@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.joint_parameters import JointParameters
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -45,9 +46,7 @@ class JointStates:
             x: states, shape (m, d).
         """
         q_link, v_link, q_motor, v_motor = np.split(_by_joint(robot, x), 4, axis=1)
-        stiffness, damping = (
-            np.array([_drive_value(robot, joint, name) for joint in robot.joints]) for name in ("stiffness", "damping")
-        )
+        stiffness, damping = _springs(robot)
         load = stiffness * (q_link - q_motor) + damping * (v_link - v_motor)
         return JointStates(times, q_motor, v_motor, q_link - q_motor, load)
 
@@ -72,9 +71,10 @@ def _by_joint(robot: Robot, x: Array) -> Array:
     return robot.layout.by_joint(x)
 
 
-def _drive_value(robot: Robot, joint: str, name: str) -> float:
-    """A drive's constant; NaN where the joint has none because it is rigid."""
-    for full in (f"{joint}.{name}", f"motor.{name}"):
-        if full in robot.parameters:
-            return robot.parameters[full].value
-    return float("nan")
+def _springs(robot: Robot) -> tuple[Array, Array]:
+    """Stiffness and damping of every joint, shape (n,) each; NaN where the joint has no spring."""
+    parameters = JointParameters(robot)
+    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    known = [bool(parameters.source("stiffness", i)) for i in range(robot.n)]
+    stiffness, damping = (np.where(known, parameters.of(values, law), np.nan) for law in ("stiffness", "damping"))
+    return stiffness, damping

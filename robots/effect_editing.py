@@ -12,14 +12,13 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from jointscope.robots.effect_at import EffectAt
 from jointscope.robots.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.effect_kinds.effect import EffectParameter
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
-from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
+from jointscope.robots.needed_spring import effects_of_spring, is_spring, needed_spring
 from jointscope.robots.noise_section import HINGE_DENSITY, smallest_densities
 from jointscope.robots.parameter import Parameter
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.yaml_comments import remove_at
+from jointscope.robots.yaml_comments import empty_at, remove_at
 
 BEST_INTEGRATOR = "simpson"
 
@@ -47,6 +46,7 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
     parameters = dict(robot.parameters)
     document = copy.deepcopy(robot.document)
     document.setdefault("effects", CommentedSeq()).append(label)
+    document.setdefault("parameters", CommentedMap())
     for p in effect.parameters_at(robot, owner):
         parameter = parameter_of(here, p, (start or {}).get(p.name, p.start))
         parameters[parameter.name] = parameter
@@ -66,24 +66,38 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     """A robot without one of its effects.
 
     Raises:
-        EffectError: the robot does not have it, or it is a choice of the model and no entry.
+        EffectError: the robot does not have it, another effect needs it, or it is a choice of the model and no entry.
     """
     gone = [here for here in robot.effects if here.label == label]
     if not gone:
         raise EffectError(_why_not_removed(robot, label))
+    held = effects_of_spring(robot, gone[0]) if is_spring(gone[0]) else ()
+    if held:
+        raise EffectError(
+            f"{label} cannot be removed from {robot.name}: {', '.join(held)} acts in that spring; remove both: "
+            f"jointscope remove {robot.path} {' '.join(held)} {label} -o OUT.yaml"
+        )
     document = copy.deepcopy(robot.document)
     remove_at(document, "effects", document["effects"].index(label))
     start = gone[0].parameter("")
     parameters = {name: p for name, p in robot.parameters.items() if not name.startswith(start)}
     for name in robot.parameters:
         if name.startswith(start) and name in document["parameters"]:
-            remove_at(document, "parameters", name)
+            _take_out_parameter(document, name)
     effects = tuple(here for here in robot.effects if here.label != label)
     new = replace(robot, parameters=parameters, effects=effects, document=document)
     by_name = set(new.layout.links) - set(new.layout.joints) | set(new.memories)
     if not by_name and "effects" in document.get("noise", {}):
         remove_at(document, "noise", "effects")
     return replace(new, noise=carried_noise(robot, new))
+
+
+def _take_out_parameter(document: CommentedMap, name: str) -> None:
+    """Removes a parameter; a robot file has the section also where nothing is left in it."""
+    if len(document["parameters"]) > 1:
+        remove_at(document, "parameters", name)
+    else:
+        empty_at(document, "parameters")
 
 
 def _why_not_removed(robot: Robot, label: str) -> str:
@@ -109,9 +123,9 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
         return why_not
     if isinstance(effect, Structure) and effect.form == "integration" and robot.choices.integrator == BEST_INTEGRATOR:
         return f"the model has the best integrator, {BEST_INTEGRATOR}, already"
-    of_spring = isinstance(effect, RobotTorque) or (isinstance(effect, JointTorque) and effect.side == "spring")
-    if of_spring and owner in robot.joints and owner not in robot.layout.motors:
-        return f"{owner} is rigid and has no spring; add joint_elasticity@{owner} first"
+    spring = needed_spring(robot, here)
+    if spring:
+        return f"{owner} is rigid and has no spring; add {spring} first"
     return ""
 
 

@@ -50,6 +50,10 @@ class JointParameters:
             found[self._compliant] = 1.0 / found[self._compliant]
         return found
 
+    def source(self, law: str, joint: int) -> str:
+        """Full name of the parameter that holds a law's value at a joint; empty for the spring of a rigid joint."""
+        return self._sources[law][joint]
+
     def slopes(self, law: str, found: Array) -> list[tuple[int, float]]:
         """For each joint the index among the free parameters, -1 for none, and the derivative of the law by it.
 

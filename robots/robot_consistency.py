@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.needed_spring import needed_spring
 from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
@@ -39,6 +40,7 @@ def check_robot(robot: Robot) -> None:
     if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
         raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
     _check_links(robot, place)
+    _check_springs(robot, place)
     _check_parameters(robot, place)
 
 
@@ -61,6 +63,17 @@ def _check_links(robot: Robot, place: str) -> None:
             f"{place}: sensors.{robot.torque_sensor.name}: joint_torque is used with link_dynamics: free only; "
             "remove the sensor, or set model.link_dynamics"
         )
+
+
+def _check_springs(robot: Robot, place: str) -> None:
+    """Effects that act in a spring have one."""
+    for here in robot.effects:
+        spring = needed_spring(robot, here)
+        if spring:
+            raise RobotError(
+                f"{place}: effects: {here.label} acts in a spring, and {here.owner} is declared rigid; take "
+                f"{here.label} and its parameters out, then `jointscope add` brings it with {spring}"
+            )
 
 
 def _check_stamps(robot: Robot, place: str) -> None:

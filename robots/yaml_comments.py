@@ -50,6 +50,21 @@ def remove_at(document: CommentedMap, *path: str | int) -> None:
         _hang_on_top(document, lines)
 
 
+def empty_at(document: CommentedMap, key: str) -> None:
+    """Takes everything out of a mapping of the document and writes it as {}; lines of comments stay.
+
+    Args:
+        document: changed in place.
+        key: of the mapping.
+    """
+    lines = _lines((document, key))
+    document[key] = CommentedMap()
+    document[key].fa.set_flow_style()
+    document.ca.items.pop(key, None)
+    if lines:
+        _hang_behind((document, key), lines)
+
+
 def _lines(place: Place) -> str:
     """All lines with nothing but a comment, or with nothing at all, that hang on an entry and its content."""
     container, key = place

@@ -223,5 +223,7 @@ def test_an_effect_that_cannot_be_edited_is_one_line_and_writes_nothing(capsys):
     assert "it has none" in complaint(capsys, "remove", "doggy", BEARING, "-o", "o.yaml")
     assert files() == set()
     assert main(["add", "doggy", BEARING, "-o", "o.yaml"]) == 0
+    assert main(["remove", "o.yaml", BEARING, "-o", "o.yaml"]) == 0
     told = "cannot write o.yaml: it is also an input; give it another name"
-    assert complaint(capsys, "remove", "o.yaml", BEARING, "-o", "o.yaml") == told
+    assert complaint(capsys, "add", "o.yaml", BEARING, "-o", "p.yaml", "--json", "o.yaml") == told
+    assert load_robot("o.yaml").effects == ()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.robots.effect_editing import remove_effect
+from jointscope.robots.effects_at_once import without_effects
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.robot import Robot
 from jointscope.tools.simulator.effect import SimulatedEffect
@@ -30,8 +30,7 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
         RobotError: an override names no parameter.
         SimulationError: a value is impossible.
     """
-    for here in robot.effects:
-        robot = remove_effect(robot, here.label)
+    robot = without_effects(robot)
     published = {p.name: p.published for p in robot.parameters.values() if p.published is not None}
     truth = robot.with_values({**published, **overrides})
     for parameter in truth.parameters.values():

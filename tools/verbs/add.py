@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope add`: adds a physical effect to a robot file; calibration then finds its size."""
+"""`jointscope add`: adds physical effects to a robot file; calibration then finds their sizes."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, only_in
+from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 from jointscope.tools.text_table import text_table
 
 EXAMPLE = """example:
   jointscope add doggy bearing_flexibility@joint1 -o doggy_bearing.yaml
   jointscope calibrate doggy_bearing.yaml train.mcap -o doggy_calibrated.yaml
+  jointscope add arm.yaml 'motor_viscous@*' cogging@elbow -o arm.yaml
 
+ID@* means everything that the effect can act on. A joint declared rigid gets the spring that an effect needs.
 `jointscope effects` lists the effects, `jointscope diagnose` tells which one is missing."""
 
 
@@ -20,8 +22,8 @@ def add_parser(subparsers: Any) -> None:
     """Adds the verb to the command line."""
     parser = subparsers.add_parser(
         "add",
-        help="adds a physical effect to a robot file; calibration then finds its size",
-        description="Writes a robot file with one physical effect more; comments of the file survive.",
+        help="adds physical effects to a robot file; calibration then finds their sizes",
+        description="Writes a robot file with one or more physical effects more; comments of the file survive.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -31,15 +33,15 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Adds, writes, and says what a calibration will find."""
-    from jointscope.robots.effect_editing import add_effect
+    from jointscope.robots.effects_at_once import add_effects
     from jointscope.tools.report.numbers import significant
 
-    before, after = edit_robot(args, add_effect)
+    before, edited = edit_robot(args, add_effects)
     rows = [
         [p.name, significant(p.value), p.unit, f"{significant(p.prior)} ± {significant(p.prior_sigma, 2)}"]
-        for p in only_in(after, before)
+        for p in only_in(edited.robot, before)
     ]
-    print(f"{args.effect} added to {before.name}")
+    print(f"{', '.join(edited.labels)} added to {before.name}{notes(edited)}")
     if rows:
         print(text_table(["parameter", "start", "unit", "prior"], rows, "<><<"))
     print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o CALIBRATED.yaml finds the values")

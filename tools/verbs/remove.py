@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope remove`: takes a physical effect out of a robot file, with all its parameters."""
+"""`jointscope remove`: takes physical effects out of a robot file, with all their parameters."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, only_in
+from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 
 EXAMPLE = """example:
   jointscope remove doggy_bearing.yaml bearing_flexibility@joint1 -o doggy_rigid.yaml
+  jointscope remove arm.yaml 'motor_viscous@*' cogging@elbow -o arm.yaml
 
-The other parameters keep their values; calibrate again, because they were found beside the effect."""
+ID@* means that effect wherever the robot has it. The other parameters keep their values; calibrate again, because they
+were found beside the effect."""
 
 
 def add_parser(subparsers: Any) -> None:
     """Adds the verb to the command line."""
     parser = subparsers.add_parser(
         "remove",
-        help="takes a physical effect out of a robot file, with all its parameters",
-        description="Writes a robot file with one physical effect less; comments of the file survive.",
+        help="takes physical effects out of a robot file, with all their parameters",
+        description="Writes a robot file with one or more physical effects less; comments of the file survive.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -29,10 +31,10 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Removes, writes, and says what is gone."""
-    from jointscope.robots.effect_editing import remove_effect
+    from jointscope.robots.effects_at_once import remove_effects
 
-    before, after = edit_robot(args, remove_effect)
-    gone = ", ".join(p.name for p in only_in(before, after))
-    print(f"{args.effect} removed from {before.name}{f': {gone}' if gone else ''}")
+    before, edited = edit_robot(args, remove_effects)
+    gone = ", ".join(p.name for p in only_in(before, edited.robot))
+    print(f"{', '.join(edited.labels)} removed from {before.name}{f': {gone}' if gone else ''}{notes(edited)}")
     print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o CALIBRATED.yaml finds the values again")
     return 0
