@@ -136,7 +136,11 @@ class ArmBodies:
             index = self._model.body(name).id
             self._model.body_mass[index] = bodies[name].mass
             self._model.body_inertia[index] = bodies[name].principal()[1]
-        mujoco.mj_setConst(self._model, self._data)
+        # the masses that hang on each body, which the compiler had summed up; its own function for that refuses bodies
+        # without mass
+        self._model.body_subtreemass[:] = self._model.body_mass
+        for index in range(self._model.nbody - 1, 0, -1):
+            self._model.body_subtreemass[self._model.body_parentid[index]] += self._model.body_subtreemass[index]
         if [self._model.joint(k).name for k in range(self._model.njnt)] != self.moving:
             self._reorder()
 

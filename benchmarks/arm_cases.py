@@ -114,7 +114,7 @@ def _hands() -> list[ArmCase]:
         _of(e, "allegro_thumb", "urdf/allegro_right_hand.urdf", "joint_15.0", 4, rate=200.0),
         _of(e, "allegro_finger", "urdf/allegro_left_hand.urdf", "joint_3.0", 3, order="some", command="group"),
         _of(AIRO, "robotiq_2f_85", "urdf/robotiq_2f_85.urdf", "finger_joint", 1, rate=100.0, order="no_mimics"),
-        _of(AIRO, "schunk_egk40", "schunk_egk40/schunk_egk40.urdf", "left_finger_mount_joint", 1, rate=200.0),
+        _of(AIRO, "schunk_egk40", "schunk_egk40/urdf/schunk_egk40.urdf", "left_finger_mount_joint", 1, rate=200.0),
         _of(d, "dexd_gripper", "dexd_gripper/dexd_gripper.urdf", "gripper_j1", 1, order="no_mimics"),
         _of(d, "f5d6_finger", "f5d6_hand/f5d6_left.urdf", "L_ff_j1", 1, rate=200.0, command="group"),
         _of(d, "f5d6_thumb", "f5d6_hand/f5d6_right.urdf", "R_th_j1", 2, rate=250.0),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -109,8 +109,10 @@ def read_urdf(path: Path) -> Urdf:
     text = re.sub(r"(</?|\s)(\w+):(?=\w+[\s=>/])", r"\1\2_", path.read_text(encoding="utf-8"))
     robot = ET.fromstring(text.encode())
     links = {str(link.get("name")): _link(link) for link in robot.findall("link")}
-    joints = [_joint(joint) for joint in robot.findall("joint")]
-    return Urdf(links, {joint.name: joint for joint in joints})
+    joints = {joint.name: joint for joint in map(_joint, robot.findall("joint"))}
+    # some files name a joint that is not there; nothing can follow it
+    lost = {name for name, joint in joints.items() if joint.mimic and joint.mimic.of not in joints}
+    return Urdf(links, {name: replace(joint, mimic=None) if name in lost else joint for name, joint in joints.items()})
 
 
 def rotation(rpy: Array) -> Array:

@@ -67,8 +67,10 @@ def _watched(trials: range, deep: bool) -> Iterator[dict[str, Any]]:
                 left = range(report["trial"] + 1, trials.stop)
                 yield report
             started = True
-        ended = process.poll()
-        if ended is None:
+        try:
+            ended = process.wait(5.0)  # after the end of its pipe it has little left to do
+        except subprocess.TimeoutExpired:
+            ended = None
             process.kill()
             process.wait()
         if left and started:
@@ -136,7 +138,7 @@ def _text(findings: list[dict[str, Any]], trials: int, minutes: float, megabytes
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python benchmarks/fuzz_bags.py",
-        description="Puts damaged bags through the verbs; below an hour. One trial again: fuzz_bags.py --first 17 --trials 1",
+        description="Puts damaged bags through the verbs; below an hour. One trial again: --first 17 --trials 1",
     )
     parser.add_argument("--trials", type=int, default=TRIALS, metavar="N", help="through info and init")
     parser.add_argument("--deep", type=int, default=DEEP, metavar="N", help="through calibrate and replay")
