@@ -41,6 +41,20 @@ class Value(NamedTuple):
     sigma: float
 
 
+class Driven(NamedTuple):
+    """What of one recording tells about drives.
+
+    Attributes:
+        encoder: positions from zero [rad].
+        command: what drives the joints.
+        left_out: stretches of time in which something else acted [s].
+    """
+
+    encoder: Stream
+    command: Stream
+    left_out: Sequence[tuple[float, float]] = ()
+
+
 @dataclass(frozen=True)
 class DriveEquation:
     """The windowed equation of motion of one joint's drive.
@@ -70,14 +84,18 @@ class DriveEquation:
             return {}
         total, noise = self.sums.total, self.sums.noise
         count = float(self.sums.counts.sum())
-        noise = noise * min(1.0, MOST_NOISE / max(float(np.max(count * np.diag(noise) / _positive(np.diag(total)))), 1e-300))
+        noise = noise * min(
+            1.0, MOST_NOISE / max(float(np.max(count * np.diag(noise) / _positive(np.diag(total)))), 1e-300)
+        )
 
         def values(products: Array, windows: float) -> Array:
             found = _least_squares(combine.T @ (products - windows * noise) @ combine)
             return found if GAIN in given else np.append(1.0, found[1:]) / found[0]
 
         best = values(total, count)
-        others = np.array([values(total - p, count - c) for p, c in zip(self.sums.products, self.sums.counts, strict=True)])
+        others = np.array(
+            [values(total - p, count - c) for p, c in zip(self.sums.products, self.sums.counts, strict=True)]
+        )
         sigmas = np.sqrt((blocks - 1.0) / blocks * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
         return {n: Value(float(x), float(s)) for n, x, s in zip(names, best, sigmas, strict=True)}
 
@@ -107,34 +125,36 @@ class DriveEquation:
 
 def drive_equations(
     tree: RigidTree,
-    recordings: Sequence[tuple[Stream, Stream]],
+    recordings: Sequence[Driven],
     sigmas: Array,
     *,
     held: bool = True,
     sharpness: float = 1e4,
-    longest: Sequence[float] = (),
 ) -> list[DriveEquation]:
     """The equation of each joint, each with the windows that suit it.
 
     Args:
         tree: rigid bodies with masses.
-        recordings: positions from zero [rad] and commands of each.
+        recordings: what drove the joints, and how they moved.
         sigmas: noise of the encoders, shape (n,) [rad].
         held: whether a command acts until the next one.
         sharpness: k in tanh(k v), which stands for sign(v) [s/rad].
     """
     found: list[dict[float, DriveEquation]] = []
-    for encoder, command in recordings:
-        cells = motion_cells(encoder, command, sigmas, held)
+    for encoder, command, left_out in recordings:
+        cells = motion_cells(encoder, command, sigmas, held, left_out)
         now = equations_by_width(cells, load_of(tree, cells), tree.mass_matrix(cells.q[:1])[0], sigmas, sharpness)
-        merged = [{w: _both(a, b[w]) for w, a in old.items()} for old, b in zip(found, now, strict=True)] if found else now
+        merged = (
+            [{w: _both(a, b[w]) for w, a in old.items()} for old, b in zip(found, now, strict=True)] if found else now
+        )
         found = merged
     return [best_width(equations) for equations in found]
 
 
 def load_of(tree: RigidTree, cells: MotionCells) -> Array:
     """Torques M a + c + g of the cells, shape (m, n) [N m]."""
-    return tree.torque(cells.q, 0.5 * (cells.v_smooth[1:] + cells.v_smooth[:-1]), cells.a)
+    v = 0.5 * (cells.v_smooth[1:] + cells.v_smooth[:-1])
+    return tree.torque(cells.q, v if tree.coriolis else np.zeros_like(v), cells.a)
 
 
 def equations_by_width(

@@ -8,6 +8,7 @@ same filter, however they were sampled: half a sample of delay between them cost
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,7 @@ class MotionCells:
         v_smooth: velocities at the edges without most of the noise, shape (m + 1, n) [rad/s].
         a: mean accelerations, shape (m, n) [rad/s^2].
         u: mean commands, shape (m, n).
-        known: cells in which friction has the size of sliding and no sample is missing, shape (m, n).
+        known: cells in which friction has the size of sliding, and no sample is missing, shape (m, n).
         period: of the encoders' samples [s].
     """
 
@@ -58,7 +59,13 @@ class MotionCells:
     period: float
 
 
-def motion_cells(encoder: Stream, command: Stream, sigmas: Array, held: bool = True) -> MotionCells:
+def motion_cells(
+    encoder: Stream,
+    command: Stream,
+    sigmas: Array,
+    held: bool = True,
+    left_out: Sequence[tuple[float, float]] = (),
+) -> MotionCells:
     """Cells where both streams are.
 
     Args:
@@ -66,6 +73,7 @@ def motion_cells(encoder: Stream, command: Stream, sigmas: Array, held: bool = T
         command: what drives the joints.
         sigmas: noise of the encoders, shape (n,) [rad].
         held: whether a command acts until the next one; else it was measured and is linear between samples.
+        left_out: stretches of time in which something else acted [s].
     """
     period = float(np.median(np.diff(encoder.times)))
     t0 = float(max(encoder.times[0], command.times[0]))
@@ -81,7 +89,10 @@ def motion_cells(encoder: Stream, command: Stream, sigmas: Array, held: bool = T
     resting = np.abs(v_smooth) < slow
     rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
     fewest = np.maximum(DWELL + REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
-    known = ~_dwelling(resting[1:] & resting[:-1], fewest) & ~_missing(encoder.times, middle)[:, None]
+    usable = ~_missing(encoder.times, middle)
+    for begin, end in left_out:
+        usable &= (middle < begin - h) | (middle > end + h)
+    known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
     return MotionCells(
         h, middle, path(middle), np.diff(q, axis=0) / h, v_smooth, np.diff(v, axis=0) / h, means, known, period
     )

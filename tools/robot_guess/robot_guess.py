@@ -16,9 +16,9 @@ from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree, moving_joints
 from jointscope.robots.units import si_factor
 from jointscope.tools.bags.open_bag import Progress
-from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
+from jointscope.tools.robot_guess.drive_values import DriveValues, find_drives, find_signs
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
-from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
+from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
@@ -118,10 +118,10 @@ def guess_robot(
     signs = joint_signs(tree, joint_motion(seen, np.zeros(len(roles.joints))), streams)
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
     gyros, left_out = _gyros(tree, seen, roles.imus, streams)
-    drive = command_unit(roles.command)
-    command = _stream(roles.command, roles.joints)
+    elastic = _seen(tree, gyros) if masses else ()
+    noises = _noises(roles.motor_encoder, roles, units)
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
-    per_unit = SUPPLY if drive[0] == "duty" else 1.0
+    drive, drives = _drives(tree, turned, roles, factor * [noise.sigma for noise in noises], torque, elastic, masses)
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
         name=name or urdf.stem,
@@ -132,16 +132,33 @@ def guess_robot(
         position_units=units,
         encoder_signs=signs,
         command_unit=drive,
-        drives=drive_values(tree, turned, command, per_unit, torque, masses),
-        encoder_noise=_noises(roles.motor_encoder, roles, units),
+        drives=drives,
+        encoder_noise=noises,
         link_noise=None if roles.link_encoder is None else _noises(roles.link_encoder, roles, units),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
-        elastic=_seen(tree, gyros) if masses else (),
+        elastic=elastic,
     )
+
+
+def _drives(
+    tree: RigidTree,
+    encoder: Stream,
+    roles: Roles,
+    sigmas: Array,
+    torque: Stream | None,
+    elastic: tuple[str, ...],
+    masses: bool,
+) -> tuple[tuple[str, str], list[DriveValues]]:
+    """Unit of the command and why, and the drive of each joint."""
+    command = _stream(roles.command, roles.joints)
+    if not masses:
+        return find_signs(encoder, command, sigmas, torque)
+    measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
+    return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
 
 
 def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
