@@ -88,14 +88,13 @@ class DriveEquation:
             1.0, MOST_NOISE / max(float(np.max(count * np.diag(noise) / _positive(np.diag(total)))), 1e-300)
         )
 
-        def values(products: Array, windows: float) -> Array:
-            found = _least_squares(combine.T @ (products - windows * noise) @ combine)
-            return found if GAIN in given else np.append(1.0, found[1:]) / found[0]
+        def values(products: Array, windows: Array | float) -> Array:
+            found = _least_squares(combine.T @ (products - np.multiply.outer(windows, noise)) @ combine)
+            gain = found[..., :1]
+            return found if GAIN in given else np.concatenate([1.0 / gain, found[..., 1:] / gain], axis=-1)
 
         best = values(total, count)
-        others = np.array(
-            [values(total - p, count - c) for p, c in zip(self.sums.products, self.sums.counts, strict=True)]
-        )
+        others = values(total - self.sums.products, count - self.sums.counts)
         sigmas = np.sqrt((blocks - 1.0) / blocks * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
         return {n: Value(float(x), float(s)) for n, x, s in zip(names, best, sigmas, strict=True)}
 
@@ -118,9 +117,10 @@ class DriveEquation:
         if len(self.sums.counts) < FEWEST_BLOCKS or self.rms[0] == 0.0 or not some:
             return Value(1.0, np.inf)
         combine = np.eye(5)[:, [0, *some]] / np.sqrt(_positive(np.diag(self.sums.total)[[0, *some]]))
-        pull = [float(_least_squares(combine.T @ (self.sums.total - p) @ combine).sum()) for p in self.sums.products]
-        best, blocks = float(_least_squares(combine.T @ self.sums.total @ combine).sum()), len(pull)
-        return Value(best, float(np.sqrt((blocks - 1.0) * np.var(pull))))
+        total = self.sums.total
+        others = _least_squares(combine.T @ (total - self.sums.products) @ combine).sum(axis=1)
+        best = float(_least_squares(combine.T @ total @ combine).sum())
+        return Value(best, float(np.sqrt((len(others) - 1.0) * np.var(others))))
 
 
 def drive_equations(
@@ -210,10 +210,12 @@ def _combination(known: Mapping[str, float], wanted: Sequence[str]) -> Array:
 
 
 def _least_squares(products: Array) -> Array:
-    """Coefficients of the regression of the first signal on all others, from their products, shape (p,)."""
-    size = np.sqrt(_positive(np.diag(products)))
-    scaled = products / np.outer(size, size)
-    return np.asarray(np.linalg.lstsq(scaled[1:, 1:], scaled[1:, 0], rcond=1e-12)[0] * size[0] / size[1:])
+    """Coefficients of the regression of the first signal on all others, from products (..., 1 + p, 1 + p)."""
+    size = np.sqrt(_positive(np.diagonal(products, axis1=-2, axis2=-1)))
+    scaled = products / (size[..., :, None] * size[..., None, :])
+    inverse = np.linalg.pinv(scaled[..., 1:, 1:], rcond=1e-12, hermitian=True)
+    found = (inverse @ scaled[..., 1:, :1])[..., 0]
+    return np.asarray(found * size[..., :1] / size[..., 1:])
 
 
 def _tells_first(products: Array) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.units import joined, of_slide
 from jointscope.tools.robot_guess.robot_guess import RobotGuess
@@ -13,6 +15,7 @@ GAIN_UNIT = {"N m": "1", "A": "N m/A", "V": "N m/V", "duty": "N m"}  # of torque
 QUANTITIES = {"gain": "", "inertia": "kg m2", "dry": "N m", "viscous": "N m s/rad"}
 HEADS = {"gain": "k", "inertia": "inertia", "dry": "dry friction", "viscous": "viscous friction"}
 UNKNOWN = "-"
+MOST_DECIMALS = 9
 
 
 def drive_content(guess: RobotGuess) -> dict[str, Any]:
@@ -55,4 +58,8 @@ def _unit(guess: RobotGuess, name: str, joint: str) -> str:
 
 
 def _cell(found: Value | None) -> str:
-    return UNKNOWN if found is None else f"{found.value:.4g} +- {found.sigma:.1g}"
+    """A value with as many digits as its sigma leaves."""
+    if found is None or not 0.0 < found.sigma < np.inf:
+        return UNKNOWN
+    decimals = int(np.clip(-np.floor(np.log10(found.sigma)), 0, MOST_DECIMALS))
+    return f"{found.value:.{decimals}f} +- {found.sigma:.{decimals}f}"

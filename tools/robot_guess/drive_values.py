@@ -25,7 +25,8 @@ from jointscope.graphs.starts.drive_regression import (
 from jointscope.graphs.starts.motion_cells import motion_cells
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
-from jointscope.tools.robot_guess.drive_unit import drive_unit
+from jointscope.tools.robot_guess.drive_unit import SURE, drive_unit
+from jointscope.tools.robot_guess.gravity_guess import clearer_gravity
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ OPPOSITE = 10.0  # [sigma] from which a motor turns against its command
 TOLD = 2.0  # [sigma] above zero from which a value is one
 SMALLEST = 0.02  # of the rms torque that a start value explains at least: it must be above zero
 MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least where springs hide it, or nothing tells
+HEAVY = 0.25  # of the link's inertia; as much below zero the rotor's may be where masses are wrong
+EXPLAINED = 0.9  # of the driving torque that must be explained before anything is concluded from it
 SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
 SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
 
@@ -65,6 +68,23 @@ class DriveValues:
         return value is None or self.unknown_scale or value.value <= TOLD * value.sigma
 
 
+@dataclass(frozen=True)
+class Drives:
+    """What was found about all drives.
+
+    Attributes:
+        unit: of the command, and why.
+        joints: one drive for each joint.
+        gravity: in the base frame, shape (3,) [m/s^2].
+        gravity_reason: why it is not the usual one; empty where it is.
+    """
+
+    unit: tuple[str, str]
+    joints: list[DriveValues]
+    gravity: Array
+    gravity_reason: str = ""
+
+
 def find_drives(
     tree: RigidTree,
     encoder: Stream,
@@ -73,8 +93,8 @@ def find_drives(
     *,
     held: bool = True,
     elastic: Sequence[str] = (),
-) -> tuple[tuple[str, str], list[DriveValues]]:
-    """Unit of the command with its reason, and the drive of every joint.
+) -> Drives:
+    """Unit of the command and the drive of every joint.
 
     Args:
         tree: the robot, with masses.
@@ -86,26 +106,44 @@ def find_drives(
     """
     cells = motion_cells(encoder, command, sigmas, held)
     M = tree.mass_matrix(cells.q[:1])[0]
-    by_width = equations_by_width(cells, load_of(tree, cells), M, sigmas, SHARPNESS)
-    soft = [
-        {w: e for w, e in some.items() if w >= SOFT or j not in elastic}
-        for j, some in zip(tree.joints, by_width, strict=True)
-    ]
-    equations = [best_width(some) for some in soft]
+
+    def equations_of(tree: RigidTree) -> list[DriveEquation]:
+        by_width = equations_by_width(cells, load_of(tree, cells), M, sigmas, SHARPNESS)
+        return [
+            best_width({w: e for w, e in some.items() if w >= SOFT or joint not in elastic})
+            for joint, some in zip(tree.joints, by_width, strict=True)
+        ]
+
+    tree, reason = clearer_gravity(tree, equations_of)
+    equations = equations_of(tree)
     directions = [_direction(equation.direction(), equation.solve().get(GAIN)) for equation in equations]
     gains = [_gain(equation, sign) for equation, (sign, _) in zip(equations, directions, strict=True)]
-    unit = drive_unit(tree.joints, gains, float(np.nanmax(np.abs(command.values), initial=0.0)))
+    links = np.diag(M).tolist()
+    heavy = [
+        joint
+        for joint, equation, (sign, _), link in zip(tree.joints, equations, directions, links, strict=True)
+        if _needs_more_than_newton_metres(equation, sign, link)
+    ]
+    unit = drive_unit(tree.joints, gains, float(np.nanmax(np.abs(command.values), initial=0.0)), heavy)
     known = {GAIN: 1.0} if unit[0] == "N m" else {}
     drives = [
-        _drive(equation, known, direction, float(link), joint in elastic)
-        for joint, equation, direction, link in zip(tree.joints, equations, directions, np.diag(M), strict=True)
+        _drive(equation, known, direction, link, joint in elastic)
+        for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
     ]
-    return unit, drives
+    return Drives(unit, drives, tree.gravity, reason)
 
 
-def find_signs(
-    encoder: Stream, command: Stream, sigmas: Array, torque: Stream | None
-) -> tuple[tuple[str, str], list[DriveValues]]:
+def _needs_more_than_newton_metres(equation: DriveEquation, sign: float, link: float) -> bool:
+    """Whether a command in N m would be too little: the rotor's inertia would be far below zero."""
+    values = equation.solve({GAIN: sign})
+    inertia = values.get(INERTIA)
+    if inertia is None or inertia.value > -max(SURE * inertia.sigma, HEAVY * link):
+        return False
+    plain = {GAIN: sign, **{name: value.value for name, value in values.items()}}
+    return equation.missing(plain) ** 2 < (1.0 - EXPLAINED) * equation.torque(1.0) ** 2
+
+
+def find_signs(encoder: Stream, command: Stream, sigmas: Array, torque: Stream | None, gravity: Array) -> Drives:
     """The same for a robot whose masses are not known: signs, and the unit by size; only ratios could be found.
 
     Args:
@@ -113,6 +151,7 @@ def find_signs(
         command: what drives them.
         sigmas: noise of the encoders, shape (n,) [rad].
         torque: measured behind the motors, where it is.
+        gravity: in the base frame, shape (3,) [m/s^2].
     """
     cells = motion_cells(encoder, command, sigmas)
     n = cells.q.shape[1]
@@ -124,7 +163,8 @@ def find_signs(
     pulls = [max((e.direction() for e in some.values()), key=lambda pull: abs(_ratio(pull))) for some in by_width]
     directions = [_direction(pull) for pull in pulls]
     unit = drive_unit([""] * n, [None] * n, float(np.nanmax(np.abs(command.values), initial=0.0)))
-    return unit, [DriveValues(ones, sign=sign, confidence=confidence) for sign, confidence in directions]
+    joints = [DriveValues(ones, sign=sign, confidence=confidence) for sign, confidence in directions]
+    return Drives(unit, joints, gravity)
 
 
 def _ratio(value: Value) -> float:
@@ -154,20 +194,26 @@ def _drive(
         found = {**equation.solve(given), INERTIA: Value(MATCHED * link, np.inf)}
     gain = given.get(GAIN, found.get(GAIN, Value(0.0, np.inf)).value)
     if gain * sign <= 0.0:
-        gain = sign * float(equation.rms[1] / equation.rms[0]) if equation.rms[0] > 0.0 else sign
-    torque = abs(gain) * float(equation.rms[0])
-    start = {GAIN: abs(gain)}
-    for name, place in PLACES.items():
-        least = (
-            SMALLEST * torque / float(equation.rms[place]) if equation.rms[place] > 0.0 else SMALLEST * torque or 1.0
-        )
-        start[name] = max(found[name].value if name in found else 0.0, least)
-    if elastic or INERTIA not in found:
-        start[INERTIA] = max(start[INERTIA], MATCHED * link)
+        gain = sign * float(equation.rms[1] / equation.rms[0] if equation.rms[0] > 0.0 else 1.0)
     plain = {**{name: value.value for name, value in found.items()}, GAIN: gain}
     driving = equation.torque(gain)
     explained = 1.0 - (equation.missing(plain) / driving) ** 2 if found and driving > 0.0 else 0.0
     # where the unit is N m, the constant was tested all the same
     found |= {name: value for name, value in equation.solve().items() if name == GAIN and not guessed}
     turned = {n: Value(sign * x.value if n == GAIN else x.value, x.sigma) for n, x in found.items()}
+    start = {GAIN: abs(gain), **_above_zero(equation, found, abs(gain))}
+    if elastic or INERTIA not in found:
+        start[INERTIA] = max(start[INERTIA], MATCHED * link)
     return DriveValues(start, turned, explained, sign, confidence, link, guessed)
+
+
+def _above_zero(equation: DriveEquation, found: Mapping[str, Value], gain: float) -> dict[str, float]:
+    """Start values of all but the gain: as found, or so large that they explain a little of the torque."""
+    torque = gain * float(equation.rms[0]) or 1.0
+    starts = {}
+    for name, place in PLACES.items():
+        size = float(equation.rms[place])
+        least = SMALLEST * torque / (size if size > 0.0 else 1.0)
+        value = found.get(name, Value(0.0, np.inf))
+        starts[name] = value.value if value.value > TOLD * value.sigma else max(value.value, least)
+    return starts

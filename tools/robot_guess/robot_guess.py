@@ -16,7 +16,7 @@ from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree, moving_joints
 from jointscope.robots.units import si_factor
 from jointscope.tools.bags.open_bag import Progress
-from jointscope.tools.robot_guess.drive_values import DriveValues, find_drives, find_signs
+from jointscope.tools.robot_guess.drive_values import Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
 from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
@@ -58,6 +58,8 @@ class RobotGuess:
         left_out: what the bag also holds and why it is not used.
         stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
+        gravity: in the base frame [m/s^2].
+        gravity_reason: why it does not point along -z; empty if it does.
     """
 
     name: str
@@ -77,6 +79,8 @@ class RobotGuess:
     elastic: tuple[str, ...] = ()
     slides: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
+    gravity: tuple[float, ...] = GRAVITY
+    gravity_reason: str = ""
 
     @property
     def free_links(self) -> bool:
@@ -121,7 +125,7 @@ def guess_robot(
     elastic = _seen(tree, gyros) if masses else ()
     noises = _noises(roles.motor_encoder, roles, units)
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
-    drive, drives = _drives(tree, turned, roles, factor * [noise.sigma for noise in noises], torque, elastic, masses)
+    drives = _drives(tree, turned, roles, factor * [noise.sigma for noise in noises], torque, elastic, masses)
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
         name=name or urdf.stem,
@@ -131,8 +135,10 @@ def guess_robot(
         masses=masses,
         position_units=units,
         encoder_signs=signs,
-        command_unit=drive,
-        drives=drives,
+        command_unit=drives.unit,
+        drives=drives.joints,
+        gravity=tuple(drives.gravity.tolist()),
+        gravity_reason=drives.gravity_reason,
         encoder_noise=noises,
         link_noise=None if roles.link_encoder is None else _noises(roles.link_encoder, roles, units),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
@@ -152,11 +158,11 @@ def _drives(
     torque: Stream | None,
     elastic: tuple[str, ...],
     masses: bool,
-) -> tuple[tuple[str, str], list[DriveValues]]:
-    """Unit of the command and why, and the drive of each joint."""
+) -> Drives:
+    """Unit of the command, and the drive of each joint."""
     command = _stream(roles.command, roles.joints)
     if not masses:
-        return find_signs(encoder, command, sigmas, torque)
+        return find_signs(encoder, command, sigmas, torque, tree.gravity)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.units import joined, of_slide, si_factor, si_unit
-from jointscope.tools.robot_guess.drive_values import DriveValues
+from jointscope.tools.robot_guess.drive_values import EXPLAINED, DriveValues
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess
-from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, GuessedGyro, RobotGuess
+from jointscope.tools.robot_guess.robot_guess import SUPPLY, GuessedGyro, RobotGuess
 from jointscope.tools.robot_guess.roles import Chosen
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
 from jointscope.tools.robot_guess.signals import Signal
@@ -54,7 +54,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         "format: 1",
         f"name: {_plain(guess.name)}",
         f"urdf: {_plain(urdf)}",
-        _line(f"gravity: {_list(GRAVITY)}", "[m/s^2] in the base frame; z of the base points up", sure=False),
+        _line(f"gravity: {_list(guess.gravity)}", f"[m/s^2] in the base frame; {_gravity(guess)}", sure=False),
         _line(f"joints: {_list(joints)}", "moving joints of the URDF that the recording shows"),
         "",
         "model:",
@@ -90,6 +90,10 @@ def guesses(text: str) -> list[str]:
 def _line(text: str, comment: str, sure: bool = True, indent: int = 0) -> str:
     place = " " * indent + text
     return f"{place.ljust(COLUMN)} # {comment if sure else f'{GUESS}: {comment}'}"
+
+
+def _gravity(guess: RobotGuess) -> str:
+    return guess.gravity_reason or "z of the base points up"
 
 
 def _model(free: bool, rigid_joints: tuple[str, ...]) -> list[str]:
@@ -274,7 +278,7 @@ def _effects(guess: RobotGuess) -> list[str]:
 def _parameters(guess: RobotGuess) -> list[str]:
     if guess.free_links:
         return ["parameters: {}"]
-    lines = [_line("parameters:", "start values by regression; a calibration finds them", False)]
+    lines = [_line("parameters:", "start values by regression; a calibration finds them", False), *_unexplained(guess)]
     for joint, drive in zip(guess.roles.joints, guess.drives, strict=True):
         for row in (
             *_drive_rows(guess.command_unit[0], drive),
@@ -289,6 +293,19 @@ def _parameters(guess: RobotGuess) -> list[str]:
             text = f"{joint}.{row.name}: {{value: {_number(row.value, 5)}, unit: {unit}, {prior}}}"
             lines.append(_line(text, row.comment, indent=2) if row.comment else f"  {text}")
     return lines
+
+
+def _unexplained(guess: RobotGuess) -> list[str]:
+    """Joints whose torque the regression does not explain."""
+    poor = [
+        f"{100.0 * max(drive.explained, 0.0):.3g} % of that of {joint}"
+        for joint, drive in zip(guess.roles.joints, guess.drives, strict=True)
+        if drive.explained < EXPLAINED
+    ]
+    if not poor:
+        return []
+    why = "a spring, wrong masses, gravity, names or units"
+    return [f"  # {GUESS}: the regression explains only {', '.join(poor)}: {why} may be the reason"]
 
 
 def _drive_rows(unit: str, drive: DriveValues) -> list[_Row]:
@@ -312,7 +329,7 @@ def _row(name: str, unit: str, drive: DriveValues, law: str, per: float = 1.0) -
 
 def _why_lost(drive: DriveValues, found: Value | None) -> str:
     if drive.unknown_scale:
-        return "the recording gives ratios of drive values only"
+        return "the recording gives ratios of drive values only; hold one that you know with `fixed: true`"
     if found is None:
         return "the recording is too short, or moves too little, to tell"
     return f"lost in its uncertainty: the regression says {found.value:.2g} +- {found.sigma:.1g}"
