@@ -82,21 +82,26 @@ class DriveEquation:
             return {}
         if GAIN not in given and not _tells_first(combine.T @ self.sums.total @ combine):
             return {}
-        total, noise = self.sums.total, self.sums.noise
-        count = float(self.sums.counts.sum())
-        noise = noise * min(
-            1.0, MOST_NOISE / max(float(np.max(count * np.diag(noise) / _positive(np.diag(total)))), 1e-300)
-        )
+        total, count, noise = self.sums.total, float(self.sums.counts.sum()), self._noise()
 
         def values(products: Array, windows: Array | float) -> Array:
             found = _least_squares(combine.T @ (products - np.multiply.outer(windows, noise)) @ combine)
-            gain = found[..., :1]
-            return found if GAIN in given else np.concatenate([1.0 / gain, found[..., 1:] / gain], axis=-1)
+            if GAIN in given:
+                return found
+            # an inverse constant of exactly zero is a constant beyond all numbers
+            inverse = np.where(found[..., :1] == 0.0, 1e-99, found[..., :1])
+            return np.concatenate([1.0 / inverse, found[..., 1:] / inverse], axis=-1)
 
         best = values(total, count)
         others = values(total - self.sums.products, count - self.sums.counts)
         sigmas = np.sqrt((blocks - 1.0) / blocks * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
         return {n: Value(float(x), float(s)) for n, x, s in zip(names, best, sigmas, strict=True)}
+
+    def _noise(self) -> Array:
+        """Part of the products of one window that is noise, as far as that can be believed, shape (5, 5)."""
+        noise, mean = self.sums.noise, self.sums.total / max(float(self.sums.counts.sum()), 1.0)
+        worst = float(np.max(np.diag(noise) / _positive(np.diag(mean))))
+        return np.asarray(noise * min(1.0, MOST_NOISE / max(worst, 1e-300)))
 
     def missing(self, values: Mapping[str, float]) -> float:
         """Rms of the torque that is missing with given values, in the windows [N m]; all that are left out are zero."""
