@@ -7,6 +7,8 @@ the equations of motion are linear in the parameters; both sides pass the same f
 
     link    M a + c + g = -K deflection - D deflection_rate
     motor   M a + c + g = k_pwm U u - k_mi v_motor - mu tanh(k v) - b a_motor
+
+Both are used at elastic joints; rigid ones have a regression of their own, `starts.drive_starts`.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.starts.drive_starts import with_drive_starts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.joint_parameters import JointParameters
 from jointscope.robots.robot import Robot
@@ -77,15 +80,22 @@ def initial_biases(problem: BagProblem, calibration: Calibration) -> Calibration
 
 
 def initial_dynamics(problems: Sequence[BagProblem], states: Sequence[Array], calibration: Calibration) -> Calibration:
-    """Parameters by linear regression; those it cannot find keep the robot file's value."""
+    """Parameters by linear regression; those it cannot find keep the robot file's value.
+
+    Raises:
+        RecordingError: a joint moves against its command.
+    """
     robot = problems[0].robot
+    calibration = with_drive_starts(problems, calibration)
+    elastic = [i for i, joint in enumerate(robot.joints) if joint in robot.layout.motors]
+    if not elastic or robot.command.unit == "N m":
+        return calibration
     signals = [_regression_signals(p, x) for p, x in zip(problems, states, strict=True)]
     merged = {key: np.concatenate([s[key] for s in signals]) for key in signals[0]}
     found: dict[str, list[tuple[float, float]]] = {}
-    if robot.command.unit == "N m":
-        return calibration
     parameters = JointParameters(robot)
-    for i, joint in enumerate(robot.joints):
+    for i in elastic:
+        joint = robot.joints[i]
         link = np.column_stack([-merged["deflection"][:, i], -merged["deflection_rate"][:, i]])
         _regress(found, robot, parameters, joint, ("stiffness", "damping"), link, merged["load"][:, i])
         laws = (*robot.drive_laws, "coulomb_torque", "inertia")

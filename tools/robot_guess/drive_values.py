@@ -1,133 +1,219 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Start values of the drives and the signs of their commands, by regression on the recorded motion.
+"""Start values of the drives, the signs and the unit of their commands, from the regression on the recorded motion.
 
-With rigid joints  M a + c + g = k u - k_mi v - mu sign(v) - b a  is linear in what is wanted. All signals pass the same
-band-pass, so noise and slow drift stay out. Only a start: the calibration finds the values.
+What the regression cannot tell from zero gets a small start above zero, and is marked as lost: its prior is wide.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
-from scipy.signal import butter, savgol_filter, sosfiltfilt
 
+from jointscope.graphs.starts.drive_regression import (
+    GAIN,
+    INERTIA,
+    PLACES,
+    DriveEquation,
+    Value,
+    best_width,
+    equations_by_width,
+    load_of,
+)
+from jointscope.graphs.starts.motion_cells import motion_cells
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
+from jointscope.tools.robot_guess.drive_unit import SURE, drive_unit
+from jointscope.tools.robot_guess.gravity_guess import clearer_gravity
 
 Array = NDArray[np.float64]
 
-BAND = (0.3, 8.0)  # [Hz]
-SAMPLES_PER_PERIOD = 6.0  # of the fastest motion that is used
 OPPOSITE = 10.0  # [sigma] from which a motor turns against its command
-SMALLEST = 0.02  # of the rms torque that a term explains at least: a start value must be above zero
-MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least; springs hide it from this regression
-SHARPNESS = 200.0  # [s/rad]
+TOLD = 2.0  # [sigma] above zero from which a value is one
+SMALLEST = 0.02  # of the rms torque that a start value explains at least: it must be above zero
+MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least where springs hide it, or nothing tells
+HEAVY = 0.25  # of the link's inertia; as much below zero the rotor's may be where masses are wrong
+EXPLAINED = 0.9  # of the driving torque that must be explained before anything is concluded from it
+SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
+SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
 
 
 @dataclass(frozen=True)
 class DriveValues:
-    """One joint's drive, on the link side.
+    """One joint's drive, on the side of the joint; per unit of the command, which may have been turned round.
 
     Attributes:
-        k: torque per unit of the command [N m/V] or [1].
-        k_mi: torque per speed [N m s/rad].
-        coulomb: dry friction [N m].
-        inertia: of the motor [kg m2].
+        start: value above zero of "gain" [N m per unit], "viscous" [N m s/rad], "dry" [N m], "inertia" [kg m2].
+        found: what the regression says, with sigmas; empty where it cannot tell.
+        explained: share of the driving torque's mean square that the equation of motion explains.
         sign: -1 where the command turns the joint backwards.
         confidence: how far the sign is from the other one [sigma].
         link: inertia of everything behind the joint at the first posture [kg m2]; 1 where masses are not known.
+        unknown_scale: whether all values are relative to a guessed rotor inertia, as the recording gives ratios only.
     """
 
-    k: float
-    k_mi: float
-    coulomb: float
-    inertia: float
-    sign: float
-    confidence: float
+    start: Mapping[str, float]
+    found: Mapping[str, Value] = field(default_factory=dict)
+    explained: float = 0.0
+    sign: float = 1.0
+    confidence: float = 0.0
     link: float = 1.0
+    unknown_scale: bool = False
+
+    def is_lost(self, name: str) -> bool:
+        """Whether the regression cannot tell a value from zero."""
+        value = self.found.get(name)
+        return value is None or self.unknown_scale or value.value <= TOLD * value.sigma
 
 
-def drive_values(
-    tree: RigidTree, encoder: Stream, command: Stream, per_unit: float, torque: Stream | None, masses: bool
-) -> list[DriveValues]:
-    """Drives of all joints.
+@dataclass(frozen=True)
+class Drives:
+    """What was found about all drives.
+
+    Attributes:
+        unit: of the command, and why.
+        joints: one drive for each joint.
+        gravity: in the base frame, shape (3,) [m/s^2].
+        gravity_reason: why it is not the usual one; empty where it is.
+    """
+
+    unit: tuple[str, str]
+    joints: list[DriveValues]
+    gravity: Array
+    gravity_reason: str = ""
+
+
+def find_drives(
+    tree: RigidTree,
+    encoder: Stream,
+    command: Stream,
+    sigmas: Array,
+    *,
+    held: bool = True,
+    elastic: Sequence[str] = (),
+) -> Drives:
+    """Unit of the command and the drive of every joint.
 
     Args:
-        tree: the robot; its masses are used only if `masses`.
+        tree: the robot, with masses.
         encoder: positions of the motors [rad].
         command: what drives them.
-        per_unit: volts per unit of the command; 1 for torques.
-        torque: measured behind the motors, used where there are no masses.
-        masses: whether the URDF has them.
+        sigmas: noise of the encoders, shape (n,) [rad].
+        held: whether a command acts until the next one; else it was measured and is linear between samples.
+        elastic: joints with a spring between motor and link.
     """
-    h = float(np.median(np.diff(encoder.times)))
-    times = np.arange(encoder.times[0], encoder.times[-1], h)
-    q = np.column_stack([np.interp(times, encoder.times, column) for column in encoder.values.T])
-    index = np.clip(np.searchsorted(command.times, times, side="right") - 1, 0, len(command.times) - 1)
-    u = per_unit * command.values[index]
-    width = min(2 * max(round(0.03 / h / 2.0), 2) + 1, len(times) - 1 + len(times) % 2)
-    v, a = (savgol_filter(q, width, 3, deriv=order, delta=h, axis=0) for order in (1, 2))
-    if torque is not None and not masses:
-        load = np.column_stack([np.interp(times, torque.times, column) for column in torque.values.T])
-    else:
-        load = tree.torque(q, v, a) if masses else np.zeros_like(q)
-    inertias = np.diagonal(tree.mass_matrix(q[:1])[0]) if masses else np.ones(q.shape[1])
-    high = min(BAND[1], 1.0 / (SAMPLES_PER_PERIOD * h))
-    band = butter(2, [BAND[0], high], btype="band", fs=1.0 / h, output="sos")
-    # a band-passed signal is known from two samples per period of its bandwidth
-    count = 2.0 * (high - BAND[0]) * float(times[-1] - times[0])
-    filtered = [sosfiltfilt(band, part, axis=0) for part in (load, u, -v, -np.tanh(SHARPNESS * v), -a)]
-    joints = range(q.shape[1])
-    return [
-        _joint(*(p[:, j] for p in filtered), count=count, inertia=float(inertias[j]), masses=masses) for j in joints
+    cells = motion_cells(encoder, command, sigmas, held)
+    M = tree.mass_matrix(cells.q[:1])[0]
+
+    def equations_of(tree: RigidTree) -> list[DriveEquation]:
+        by_width = equations_by_width(cells, load_of(tree, cells), M, sigmas, SHARPNESS)
+        return [
+            best_width({w: e for w, e in some.items() if w >= SOFT or joint not in elastic})
+            for joint, some in zip(tree.joints, by_width, strict=True)
+        ]
+
+    tree, reason = clearer_gravity(tree, equations_of)
+    equations = equations_of(tree)
+    directions = [_direction(equation.direction(), equation.solve().get(GAIN)) for equation in equations]
+    gains = [_gain(equation, sign) for equation, (sign, _) in zip(equations, directions, strict=True)]
+    links = np.diag(M).tolist()
+    heavy = [
+        joint
+        for joint, equation, (sign, _), link in zip(tree.joints, equations, directions, links, strict=True)
+        if _needs_more_than_newton_metres(equation, sign, link)
     ]
+    unit = drive_unit(tree.joints, gains, float(np.nanmax(np.abs(command.values), initial=0.0)), heavy)
+    known = {GAIN: 1.0} if unit[0] == "N m" else {}
+    drives = [
+        _drive(equation, known, direction, link, joint in elastic)
+        for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
+    ]
+    return Drives(unit, drives, tree.gravity, reason)
 
 
-def _joint(
-    load: Array,
-    u: Array,
-    minus_v: Array,
-    minus_sign: Array,
-    minus_a: Array,
-    *,
-    count: float,
-    inertia: float,
-    masses: bool,
-) -> DriveValues:
-    sign, confidence = _sign(load if np.any(load) else -minus_a, u, minus_v, minus_sign, count)
-    if not masses:
-        # without masses only ratios are known: everything per unit of torque
-        return DriveValues(1.0, 1.0, 1.0, 1.0, sign, confidence)
-    X = np.column_stack([sign * u, minus_v, minus_sign, minus_a])
-    size = np.sqrt(np.mean(X**2, axis=0))
-    torque = float(np.sqrt(np.mean(load**2)))
-    X, scale = X[:, size > 0], size[size > 0]
-    values = np.zeros(4)
-    values[size > 0] = nnls(X / scale, load)[0] / scale
-    least = SMALLEST * torque / np.where(size > 0, size, np.inf)
-    k, k_mi, coulomb, b = np.maximum(values, least)
-    k = float(k) if values[0] > 0 else torque / float(size[0] or 1.0)
-    return DriveValues(k, float(k_mi), float(coulomb), max(float(b), MATCHED * inertia), sign, confidence, inertia)
+def _needs_more_than_newton_metres(equation: DriveEquation, sign: float, link: float) -> bool:
+    """Whether a command in N m would be too little: the rotor's inertia would be far below zero."""
+    values = equation.solve({GAIN: sign})
+    inertia = values.get(INERTIA)
+    if inertia is None or inertia.value > -max(SURE * inertia.sigma, HEAVY * link):
+        return False
+    plain = {GAIN: sign, **{name: value.value for name, value in values.items()}}
+    return equation.missing(plain) ** 2 < (1.0 - EXPLAINED) * equation.torque(1.0) ** 2
 
 
-def _sign(load: Array, u: Array, minus_v: Array, minus_sign: Array, count: float) -> tuple[float, float]:
-    """Sign of the command against the joint, and its distance from the other one in sigmas.
+def find_signs(encoder: Stream, command: Stream, sigmas: Array, torque: Stream | None, gravity: Array) -> Drives:
+    """The same for a robot whose masses are not known: signs, and the unit by size; only ratios could be found.
 
-    The command is regressed on load, speed and direction, all of which it drives in its own direction.
+    Args:
+        encoder: positions of the motors [rad].
+        command: what drives them.
+        sigmas: noise of the encoders, shape (n,) [rad].
+        torque: measured behind the motors, where it is.
+        gravity: in the base frame, shape (3,) [m/s^2].
     """
-    X = np.column_stack([load, -minus_v, -minus_sign])
-    size = np.sqrt(np.mean(X**2, axis=0))
-    if np.any(size == 0.0) or not np.any(u):
-        return 1.0, 0.0
-    X = X / size
-    values, _, rank, _ = np.linalg.lstsq(X, u, rcond=None)
-    if rank < X.shape[1]:
-        return 1.0, 0.0
-    rest = u - X @ values
-    covariance = np.linalg.inv(X.T @ X) * len(u) / max(count, 4.0) * float(np.mean(rest**2))
-    pull, sigma = float(values.sum()), float(np.sqrt(np.sum(covariance)))
-    confidence = abs(pull) / max(sigma, 1e-300)
-    return (-1.0 if pull < 0 and confidence > OPPOSITE else 1.0), confidence
+    cells = motion_cells(encoder, command, sigmas)
+    n = cells.q.shape[1]
+    load = cells.a
+    if torque is not None:
+        load = np.column_stack([np.interp(cells.times, torque.times, column) for column in torque.values.T])
+    by_width = equations_by_width(cells, load, np.eye(n), 0.0 * sigmas, SHARPNESS)
+    ones = dict.fromkeys((GAIN, *PLACES), 1.0)
+    pulls = [max((e.direction() for e in some.values()), key=lambda pull: abs(_ratio(pull))) for some in by_width]
+    directions = [_direction(pull) for pull in pulls]
+    unit = drive_unit([""] * n, [None] * n, float(np.nanmax(np.abs(command.values), initial=0.0)))
+    joints = [DriveValues(ones, sign=sign, confidence=confidence) for sign, confidence in directions]
+    return Drives(unit, joints, gravity)
+
+
+def _ratio(value: Value) -> float:
+    return value.value / value.sigma if value.sigma > 0.0 else 0.0
+
+
+def _direction(pull: Value, gain: Value | None = None) -> tuple[float, float]:
+    """Sign of a command against its joint, and its distance from the other one in sigmas; the surer of two tells."""
+    distance = max((_ratio(value) for value in (pull, gain) if value is not None), key=abs)
+    return (-1.0 if distance < -OPPOSITE else 1.0), abs(distance)
+
+
+def _gain(equation: DriveEquation, sign: float) -> Value | None:
+    gain = equation.solve().get(GAIN)
+    return None if gain is None else Value(sign * gain.value, gain.sigma)
+
+
+def _drive(
+    equation: DriveEquation, known: Mapping[str, float], direction: tuple[float, float], link: float, elastic: bool
+) -> DriveValues:
+    sign, confidence = direction
+    given = {name: sign * value for name, value in known.items()}
+    found = equation.solve(given)
+    guessed = not given and (GAIN not in found or found[GAIN].value * sign <= TOLD * found[GAIN].sigma)
+    if guessed:
+        given = {INERTIA: MATCHED * link}
+        found = {**equation.solve(given), INERTIA: Value(MATCHED * link, np.inf)}
+    gain = given.get(GAIN, found.get(GAIN, Value(0.0, np.inf)).value)
+    if gain * sign <= 0.0:
+        gain = sign * float(equation.rms[1] / equation.rms[0] if equation.rms[0] > 0.0 else 1.0)
+    plain = {**{name: value.value for name, value in found.items()}, GAIN: gain}
+    driving = equation.torque(gain)
+    explained = 1.0 - (equation.missing(plain) / driving) ** 2 if found and driving > 0.0 else 0.0
+    # where the unit is N m, the constant was tested all the same
+    found |= {name: value for name, value in equation.solve().items() if name == GAIN and not guessed}
+    turned = {n: Value(sign * x.value if n == GAIN else x.value, x.sigma) for n, x in found.items()}
+    start = {GAIN: abs(gain), **_above_zero(equation, found, abs(gain))}
+    if elastic or INERTIA not in found:
+        start[INERTIA] = max(start[INERTIA], MATCHED * link)
+    return DriveValues(start, turned, explained, sign, confidence, link, guessed)
+
+
+def _above_zero(equation: DriveEquation, found: Mapping[str, Value], gain: float) -> dict[str, float]:
+    """Start values of all but the gain: as found, or so large that they explain a little of the torque."""
+    torque = gain * float(equation.rms[0]) or 1.0
+    starts = {}
+    for name, place in PLACES.items():
+        size = float(equation.rms[place])
+        least = SMALLEST * torque / (size if size > 0.0 else 1.0)
+        value = found.get(name, Value(0.0, np.inf))
+        starts[name] = value.value if value.value > TOLD * value.sigma else max(value.value, least)
+    return starts

@@ -16,9 +16,9 @@ from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree, moving_joints
 from jointscope.robots.units import si_factor
 from jointscope.tools.bags.open_bag import Progress
-from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
+from jointscope.tools.robot_guess.drive_values import Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
-from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
+from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
@@ -58,6 +58,8 @@ class RobotGuess:
         left_out: what the bag also holds and why it is not used.
         stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
+        gravity: in the base frame [m/s^2].
+        gravity_reason: why it does not point along -z; empty if it does.
     """
 
     name: str
@@ -77,6 +79,8 @@ class RobotGuess:
     elastic: tuple[str, ...] = ()
     slides: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
+    gravity: tuple[float, ...] = GRAVITY
+    gravity_reason: str = ""
 
     @property
     def free_links(self) -> bool:
@@ -118,10 +122,10 @@ def guess_robot(
     signs = joint_signs(tree, joint_motion(seen, np.zeros(len(roles.joints))), streams)
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
     gyros, left_out = _gyros(tree, seen, roles.imus, streams)
-    drive = command_unit(roles.command)
-    command = _stream(roles.command, roles.joints)
+    elastic = _seen(tree, gyros) if masses else ()
+    noises = _noises(roles.motor_encoder, roles, units)
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
-    per_unit = SUPPLY if drive[0] == "duty" else 1.0
+    drives = _drives(tree, turned, roles, factor * [noise.sigma for noise in noises], torque, elastic, masses)
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
         name=name or urdf.stem,
@@ -131,17 +135,36 @@ def guess_robot(
         masses=masses,
         position_units=units,
         encoder_signs=signs,
-        command_unit=drive,
-        drives=drive_values(tree, turned, command, per_unit, torque, masses),
-        encoder_noise=_noises(roles.motor_encoder, roles, units),
+        command_unit=drives.unit,
+        drives=drives.joints,
+        gravity=tuple(drives.gravity.tolist()),
+        gravity_reason=drives.gravity_reason,
+        encoder_noise=noises,
         link_noise=None if roles.link_encoder is None else _noises(roles.link_encoder, roles, units),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
-        elastic=_seen(tree, gyros) if masses else (),
+        elastic=elastic,
     )
+
+
+def _drives(
+    tree: RigidTree,
+    encoder: Stream,
+    roles: Roles,
+    sigmas: Array,
+    torque: Stream | None,
+    elastic: tuple[str, ...],
+    masses: bool,
+) -> Drives:
+    """Unit of the command, and the drive of each joint."""
+    command = _stream(roles.command, roles.joints)
+    if not masses:
+        return find_signs(encoder, command, sigmas, torque, tree.gravity)
+    measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
+    return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
 
 
 def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:

@@ -20,7 +20,6 @@ LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
 IMU = "sensor_msgs/msg/Imu"
 TURNS = (2.0 * np.pi, 360.0, 1.0)  # periods of counters, in rad, degrees, turns
 NEAR_A_TURN = 0.1  # relative; the joint moves on while its counter jumps
-LARGEST_DUTY = 1.0 + 1e-6
 
 
 @dataclass(frozen=True)
@@ -161,13 +160,3 @@ def _torque(signal: Signal | None, names: tuple[str, ...]) -> Chosen | None:
     if signal is None or not signal.moving(names):
         return None
     return Chosen(signal, names, "efforts beside the positions of the links", sure=False)
-
-
-def command_unit(command: Chosen) -> tuple[str, str]:
-    """Unit of the drive and why."""
-    values = command.signal.values
-    largest = float(np.nanmax(np.abs(values)))
-    if largest <= LARGEST_DUTY:
-        return "duty", f"it never exceeds {largest:.3g}"
-    text = "volts, too, would be possible" if largest <= 60.0 else "too large for a duty cycle or volts"
-    return "N m", f"it reaches {largest:.3g}; {text}"

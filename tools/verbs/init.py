@@ -43,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
     from jointscope.robots.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.robot_guess.drive_table import drive_content, drive_table
     from jointscope.tools.robot_guess.robot_guess import guess_robot
     from jointscope.tools.robot_guess.robot_text import guesses, robot_text
 
@@ -56,9 +57,11 @@ def run(args: argparse.Namespace) -> int:
         description = describe_bag(args.bag, robot)
     if args.json is not None:
         content = {"robot": str(args.output), "joints": list(guess.roles.joints), "guesses": guesses(text)}
+        content["drives"] = drive_content(guess)
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
     print("\n".join(f"  {line}" for line in guesses(text)))
+    print("\n".join(drive_table(guess)))
     for line in (*(f"  not used: {text}" for text in guess.left_out), *(f"note: {n}" for n in description.notices)):
         print(line)
     verdict = "can" if description.usable else "cannot"

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a calibration begins: parameters of the drives of rigid joints, from the regression or from the robot file.
+
+The regression knows torques by a constant, inertia, dry and viscous friction, and leaves alone what is fixed. The file
+keeps the word where its values explain the motion better, and, where a joint has effects that the regression does
+not know, where they explain it nearly as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.starts.drive_regression import (
+    DRY,
+    GAIN,
+    INERTIA,
+    VISCOUS,
+    DriveEquation,
+    Driven,
+    Value,
+    drive_equations,
+)
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.parameter import Parameter
+from jointscope.robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+OPPOSITE = 20.0  # [sigma] from which a drive turns against its command
+EXPLAINED = 0.7  # of the torque that may be missing where that is believed
+TOLD = 2.0  # [sigma] above zero from which a value is one
+PLAIN = "motor_viscous"  # the effect that the regression knows
+NEARLY = 3.0  # times the missing torque with which a file of a joint with further effects keeps the word
+
+
+def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) -> Calibration:
+    """The calibration with values for the drives of rigid joints that the recordings ask for.
+
+    Args:
+        problems: whole recordings.
+        calibration: the values of the robot file.
+
+    Raises:
+        RecordingError: a joint moves against its command.
+    """
+    robot = problems[0].robot
+    rigid = [joint for joint in robot.joints if joint not in robot.layout.motors]
+    if not rigid:
+        return calibration
+    encoder = robot.motor_encoder
+    driven = []
+    for recording in (problem.recording for problem in problems):
+        stream = recording.streams[encoder.name]
+        positions = replace(stream, values=stream.values - encoder.zero)
+        driven.append(Driven(positions, recording.command, recording.left_out))
+    held = bool(getattr(robot.command, "held", True))
+    sharpness = robot.choices.friction_sharpness
+    equations = drive_equations(robot.tree, driven, np.asarray(encoder.sigmas), held=held, sharpness=sharpness)
+    found: dict[str, list[Value]] = {}
+    for joint, equation in zip(robot.joints, equations, strict=True):
+        if joint in rigid:
+            _check_sign(joint, equation)
+            for name, value in _joint_starts(robot, joint, equation).items():
+                found.setdefault(name, []).append(value)
+    return _with_values(calibration, {name: _mean(values) for name, values in found.items()})
+
+
+def _joint_starts(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:
+    """Values by the name of the parameter; empty where the file explains the motion as well."""
+    parts = _parts(robot, joint)
+    file = {GAIN: 1.0, **{law: sum(factor * p.value for p, factor in some) for law, some in parts.items()}}
+    known = {law: value for law, value in file.items() if all(p.fixed for p, _ in parts.get(law, ()))}
+    if VISCOUS not in parts:
+        known[VISCOUS] = 0.0
+    values = equation.solve(known)
+    if not values:
+        return {}
+    allowed = NEARLY if _has_more(robot, joint) else 1.0
+    full = {**file, **known, **{law: value.value for law, value in values.items()}}
+    if equation.missing(file) <= allowed * equation.missing(full):
+        return {}
+    starts = {}
+    for law, value in values.items():
+        *others, (last, factor) = sorted(parts[law], key=lambda part: not part[0].fixed)
+        rest = value.value - sum(f * p.value for p, f in others)
+        start = Value(rest / factor, value.sigma / factor)
+        if not last.positive or start.value > TOLD * start.sigma:
+            starts[last.name] = start
+    return starts
+
+
+def _parts(robot: Robot, joint: str) -> dict[str, list[tuple[Parameter, float]]]:
+    """For each value of the regression the parameters that it is the sum of, each with a factor."""
+    parts = {DRY: [(robot.drive_parameter(joint, "coulomb_torque"), 1.0)]}
+    parts[INERTIA] = [(robot.drive_parameter(joint, "inertia"), 1.0)]
+    if robot.drive_gain is not None:
+        parts[GAIN] = [(robot.drive_parameter(joint, robot.drive_gain), robot.command_volts)]
+    viscous = [(robot.drive_parameter(joint, "k_mi"), 1.0)] if "k_mi" in robot.drive_laws else []
+    if robot.has_effect(PLAIN, joint):
+        viscous.insert(0, (robot.parameter(f"{joint}.{PLAIN}.coefficient"), 1.0))
+    return {**parts, VISCOUS: viscous} if viscous else parts
+
+
+def _has_more(robot: Robot, joint: str) -> bool:
+    """Whether effects act on a joint, or on the whole robot, that the regression does not know."""
+    return any(here.owner in (joint, "robot") and here.effect.id != PLAIN for here in robot.effects)
+
+
+def _check_sign(joint: str, equation: DriveEquation) -> None:
+    """A motor that turns against its command is a wiring or file mistake, not a parameter."""
+    values = equation.solve()
+    gain = values.get(GAIN)
+    if gain is None or gain.value > -OPPOSITE * gain.sigma:
+        return
+    missing = equation.missing({law: value.value for law, value in values.items()})
+    if missing < EXPLAINED * equation.torque(gain.value):
+        raise RecordingError(
+            f"{joint} moves against its command ({-gain.value / gain.sigma:.0f} sigma): the sign of the command or of "
+            "the encoder is wrong; check the joint's axis in the URDF and the names and fields of the topics"
+        )
+
+
+def _mean(values: Sequence[Value]) -> float:
+    """Weighted mean of what several joints say about one parameter."""
+    weights = np.array([1.0 / max(value.sigma, 1e-9 * abs(value.value), 1e-99) ** 2 for value in values])
+    return float(weights @ [value.value for value in values] / weights.sum())
+
+
+def _with_values(calibration: Calibration, found: dict[str, float]) -> Calibration:
+    values = calibration.values
+    for i, name in enumerate(calibration.names):
+        values[i] = found.get(name, values[i])
+    dynamics = np.where(calibration.positive, np.log(np.where(calibration.positive, values, 1.0)), values)
+    return replace(calibration, dynamics=dynamics)

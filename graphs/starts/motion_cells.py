@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Motion and command as exact means over short, equal cells of time.
+
+A mean acceleration is the difference of two velocities, a mean velocity that of two positions, and the mean of a
+command that is held from its stamp to the next follows from the stamps alone. So command and motion pass one and the
+same filter, however they were sampled: half a sample of delay between them costs percents at 50 Hz.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from jointscope.robots.recording import Stream
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+CELLS_PER_SAMPLE = 4  # of the encoders; the command changes between their samples
+SHORTEST_CELL = 1.5e-3  # [s] motion is smooth within it
+MOST_CELLS = 40_000
+GAP = 4.5  # [sample periods] between two samples from which nobody knows what happened there
+MEMORY = 0.03  # [s] over which accelerations are alike
+UNCLEAR = 3.0  # [sigma] of a velocity below which its sign is not known
+AT_REST = 0.01  # of the rms velocity
+DWELL = 0.02  # [s] at such velocities that is no mere reversal: dry friction is then smaller than its limit
+REVERSAL = 2.0  # [times as long as a reversal at the rms acceleration takes] the same for noisy velocities
+
+
+@dataclass(frozen=True)
+class MotionCells:
+    """Means over m cells of n joints.
+
+    Attributes:
+        h: length of a cell [s].
+        times: middles, shape (m,) [s].
+        q: positions at the middles, shape (m, n) [rad].
+        v: mean velocities, shape (m, n) [rad/s].
+        v_smooth: velocities at the edges without most of the noise, shape (m + 1, n) [rad/s].
+        a: mean accelerations, shape (m, n) [rad/s^2].
+        u: mean commands, shape (m, n).
+        known: cells in which friction has the size of sliding, and no sample is missing, shape (m, n).
+        period: of the encoders' samples [s].
+    """
+
+    h: float
+    times: Array
+    q: Array
+    v: Array
+    v_smooth: Array
+    a: Array
+    u: Array
+    known: Flags
+    period: float
+
+
+def motion_cells(
+    encoder: Stream,
+    command: Stream,
+    sigmas: Array,
+    held: bool = True,
+    left_out: Sequence[tuple[float, float]] = (),
+) -> MotionCells:
+    """Cells where both streams are.
+
+    Args:
+        encoder: positions, zero at zero [rad].
+        command: what drives the joints.
+        sigmas: noise of the encoders, shape (n,) [rad].
+        held: whether a command acts until the next one; else it was measured and is linear between samples.
+        left_out: stretches of time in which something else acted [s].
+    """
+    period = float(np.median(np.diff(encoder.times)))
+    t0 = float(max(encoder.times[0], command.times[0]))
+    t1 = float(min(encoder.times[-1], command.times[-1] + (period if held else 0.0)))
+    h = max(period / CELLS_PER_SAMPLE, SHORTEST_CELL, (t1 - t0) / MOST_CELLS)
+    edges = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1)
+    path = CubicSpline(encoder.times, encoder.values)
+    q, v = path(edges), path(edges, 1)
+    v_smooth, v_sigma = _smooth(v, sigmas, period, h)
+    means = np.diff(_integral(command, edges, held), axis=0) / h
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    slow = np.maximum(UNCLEAR * v_sigma, AT_REST * np.sqrt(np.mean(v_smooth**2, axis=0)))
+    resting = np.abs(v_smooth) < slow
+    rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
+    fewest = np.maximum(DWELL + REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
+    usable = ~_missing(encoder.times, middle)
+    for begin, end in left_out:
+        usable &= (middle < begin - h) | (middle > end + h)
+    known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
+    return MotionCells(
+        h, middle, path(middle), np.diff(q, axis=0) / h, v_smooth, np.diff(v, axis=0) / h, means, known, period
+    )
+
+
+def _integral(command: Stream, edges: Array, held: bool) -> Array:
+    """Integral of the commands from the first stamp to the edges, shape (m, n)."""
+    times, values, steps = command.times, command.values, np.diff(command.times)[:, None]
+    total = np.zeros_like(values)
+    np.cumsum(steps * (values[:-1] if held else 0.5 * (values[:-1] + values[1:])), axis=0, out=total[1:])
+    i = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(times) - 1)
+    since = (edges - times[i])[:, None]
+    slope = np.zeros_like(values)
+    if not held:
+        slope[:-1] = np.diff(values, axis=0) / steps
+    return np.asarray(total[i] + since * (values[i] + 0.5 * since * slope[i]))
+
+
+def _smooth(v: Array, sigmas: Array, period: float, h: float) -> tuple[Array, Array]:
+    """Velocities smoothed as far as their noise asks for, and the noise that is left, shape (n,).
+
+    Where accelerations are white with density S, the best smoother of positions with noise sigma at every period is
+    1 / (1 + (omega / omega_c)^4) with omega_c^4 = S / (sigma^2 period): a Butterworth filter there and back.
+    """
+    out, left = v.copy(), np.zeros(v.shape[1])
+    for j, sigma in enumerate(sigmas):
+        if sigma <= 0.0 or len(v) < 20:
+            continue
+        density = 2.0 * MEMORY * float(np.mean(np.gradient(v[:, j], h) ** 2))
+        for _ in range(3):  # the noise is in the first guess of the accelerations, too
+            omega = float(np.clip((density / (sigma**2 * period)) ** 0.25, 2.0, 0.45 * 2.0 * np.pi / h))
+            low = butter(2, omega / (2.0 * np.pi), fs=1.0 / h, output="sos")
+            out[:, j] = sosfiltfilt(low, v[:, j])
+            density = 2.0 * MEMORY * float(np.mean(np.gradient(out[:, j], h) ** 2))
+        left[j] = sigma * np.sqrt(period * omega**3 / (8.0 * np.sqrt(2.0)))
+    return out, left
+
+
+def _dwelling(slow: Flags, fewest: Array) -> Flags:
+    """Cells in runs of at least so many slow ones, shape (m, n); `fewest` of each joint, shape (n,)."""
+    found = np.zeros_like(slow)
+    for j in range(slow.shape[1]):
+        change = np.flatnonzero(np.diff(np.concatenate([[False], slow[:, j], [False]]).astype(np.int8)))
+        for start, stop in change.reshape(-1, 2):
+            found[start:stop, j] = stop - start >= fewest[j]
+    return found
+
+
+def _missing(times: Array, instants: Array) -> Flags:
+    """Instants in gaps between samples, shape (m,)."""
+    steps = np.diff(times)
+    i = np.clip(np.searchsorted(times, instants) - 1, 0, len(steps) - 1)
+    return np.asarray(steps[i] > GAP * np.median(steps))

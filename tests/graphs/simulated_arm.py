@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Arms that MuJoCo moves: a controller's torques held from stamp to stamp, positions sampled at their own times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jointscope.robots.recording import Stream
+
+mujoco = pytest.importorskip("mujoco", reason="arms are moved by MuJoCo, which the extra `sim` brings")
+
+STEP = 5e-4  # [s]
+SHARP = 400.0  # [s/rad] of the simulated dry friction
+LINK = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="of_{name}"/>
+ <origin xyz="0 0 {place}"/><axis xyz="{axis}"/><limit effort="900" velocity="30" lower="-6" upper="6"/></joint>
+<link name="of_{name}"><inertial><origin xyz="0.02 0.01 -0.18"/><mass value="{mass}"/>
+ <inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What moves: axes of the joints ("x", "y", "z"; "X" for one that slides), and what the drives are.
+
+    Attributes:
+        axes: one letter for each joint.
+        inertia, dry, viscous: of the drives, one number for each joint.
+        gravity: in the base frame [m/s^2].
+    """
+
+    axes: str = "yxy"
+    inertia: tuple[float, ...] = (0.7, 0.2, 0.05)
+    dry: tuple[float, ...] = (2.0, 0.8, 0.2)
+    viscous: tuple[float, ...] = (1.5, 0.6, 0.1)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(f"j{i}" for i in range(len(self.axes)))
+
+    @property
+    def urdf(self) -> str:
+        """Links that become lighter."""
+        parts, parent = ['<robot name="arm">{options}<link name="base"/>'], "base"
+        for i, (name, letter) in enumerate(zip(self.joints, self.axes, strict=True)):
+            mass, axis = 3.0 * 0.6**i, {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}[letter.lower()]
+            kind = "prismatic" if letter.isupper() else "revolute"
+            sizes = {key: f"{mass * part:.6f}" for key, part in (("ixx", 0.014), ("iyy", 0.015), ("izz", 0.004))}
+            place = -0.36 if i else 0.0
+            parts.append(LINK.format(name=name, kind=kind, parent=parent, place=place, axis=axis, mass=mass, **sizes))
+            parent = f"of_{name}"
+        return "\n".join(parts) + "</robot>"
+
+    def truth(self, joint: int) -> dict[str, float]:
+        """What a regression has to find."""
+        return {"gain": 1.0, "inertia": self.inertia[joint], "dry": self.dry[joint], "viscous": self.viscous[joint]}
+
+
+def moved(
+    arm: Arm,
+    *,
+    seconds: float = 8.0,
+    encoder_rate: float = 100.0,
+    command_rate: float = 100.0,
+    noise: float = 1e-5,
+    counts: int = 0,
+    pause: float = 0.0,
+    seed: int = 1,
+) -> tuple[Stream, Stream]:
+    """Positions and torques of a motion around a posture, stamps with a little jitter.
+
+    Args:
+        arm: what moves.
+        seconds: how long.
+        encoder_rate, command_rate: in Hz.
+        noise: of the positions [rad].
+        counts: of an encoder per turn; 0 for one that is only noisy.
+        pause: share of the time in which the commands hold the joints at rest.
+        seed: of motion, jitter and noise.
+    """
+    rng, n = np.random.default_rng(seed), len(arm.axes)
+    text = arm.urdf.format(options='<mujoco><compiler balanceinertia="false"/></mujoco>')
+    model = mujoco.MjModel.from_xml_string(text)
+    model.opt.timestep, model.opt.gravity[:] = STEP, arm.gravity
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    model.dof_armature[:], model.dof_damping[:] = arm.inertia, arm.viscous
+    data = mujoco.MjData(model)
+    middle, size = rng.uniform(-0.8, 0.8, n), np.where([a.isupper() for a in arm.axes], 0.06, 0.35)
+    speeds, phases = rng.uniform(1.5, 9.0, (4, n)), rng.uniform(0.0, 6.0, (4, n))
+    data.qpos[:] = middle
+    due = np.unique(np.rint(_stamps(rng, seconds, command_rate) / STEP).astype(int))
+    sampled = _stamps(rng, seconds, encoder_rate)
+    path, commands = np.zeros((int(seconds / STEP) + 1, n)), np.zeros((len(due), n))
+    path[0], u, sent, heavy = middle, np.zeros(n), 0, np.array(arm.inertia) + 0.15
+    for k in range(len(path) - 1):
+        if sent < len(due) and k == due[sent]:
+            t = k * STEP
+            run = 1.0 if pause == 0.0 or (t % 2.0) / 2.0 > pause else 0.0
+            target = middle + run * (size / 2.0 * (np.sin(speeds * t + phases) - np.sin(phases))).sum(axis=0)
+            u = data.qfrc_bias + heavy * (150.0 * (target - data.qpos) - 12.0 * data.qvel)
+            commands[sent], sent = u, sent + 1
+        data.qfrc_applied[:] = u - np.array(arm.dry) * np.tanh(SHARP * data.qvel)
+        mujoco.mj_step(model, data)
+        path[k + 1] = data.qpos
+    positions = np.column_stack([np.interp(sampled, STEP * np.arange(len(path)), column) for column in path.T])
+    if counts:
+        positions = 2.0 * np.pi / counts * np.rint(positions * counts / (2.0 * np.pi))
+    positions += noise * rng.standard_normal(positions.shape)
+    # the engine turns a torque into speed at once and not over the step: it acts half a step early
+    stamps = STEP * due - STEP / 2.0
+    return Stream("encoder", sampled, positions, arm.joints, "rad"), Stream(
+        "command", stamps, commands, arm.joints, "N m"
+    )
+
+
+def divided(command: Stream, constants: tuple[float, ...]) -> Stream:
+    """The command in a unit that makes so many N m."""
+    return replace(command, values=command.values / np.array(constants))
+
+
+def written(arm: Arm, folder: Path) -> Path:
+    """The URDF as a file."""
+    (folder / "arm.urdf").write_text(arm.urdf.format(options=""), encoding="utf-8")
+    return folder / "arm.urdf"
+
+
+def _stamps(rng: np.random.Generator, seconds: float, rate: float) -> np.ndarray:
+    stamps = np.arange(0.0, seconds - 2.0 / rate, 1.0 / rate)
+    return stamps + rng.uniform(0.0, 0.05 / rate, len(stamps))

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which way gravity points in the base frame, where the usual way contradicts the recording.
+
+Robots hang from ceilings, stand on walls, or have their weight compensated; a URDF says nothing of that. Torques that
+the equation of motion explains with one direction alone do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.graphs.starts.drive_regression import GAIN, DriveEquation
+from jointscope.robots.rigid_tree import RigidTree
+
+Array = NDArray[np.float64]
+
+STANDARD = 9.81  # [m/s^2]
+DOUBTFUL = 0.9  # of the torque of some joint, below which the usual direction is doubted
+CLEARER = 0.25  # of the missing torque's mean square that another direction may leave at most
+OTHERS = {
+    "none: the weight is compensated": (0.0, 0.0, 0.0),
+    "the base hangs upside down": (0.0, 0.0, STANDARD),
+    "the base is mounted on a wall": (STANDARD, 0.0, 0.0),
+    "the base is mounted on a wall, the other way round": (-STANDARD, 0.0, 0.0),
+    "the base is mounted on a wall, on its side": (0.0, STANDARD, 0.0),
+    "the base is mounted on a wall, on its other side": (0.0, -STANDARD, 0.0),
+}
+
+
+def clearer_gravity(
+    tree: RigidTree, equations_of: Callable[[RigidTree], Sequence[DriveEquation]]
+) -> tuple[RigidTree, str]:
+    """The tree with the gravity that the recording asks for, and why; the same tree and nothing where that will do.
+
+    Args:
+        tree: with gravity as it usually is.
+        equations_of: equations of the drives of a tree.
+    """
+    usual = _missing(equations_of(tree))
+    if not len(usual) or np.max(usual) <= 1.0 - DOUBTFUL:
+        return tree, ""
+    found = []
+    for words, gravity in OTHERS.items():
+        other = _with_gravity(tree, gravity)
+        missing = _missing(equations_of(other))
+        if len(missing) == len(usual):
+            found.append((float(np.sum(missing)), float(np.max(missing)), words, other))
+    total, worst, words, best = min(found, key=lambda entry: entry[0], default=(np.inf, np.inf, "", tree))
+    if total > CLEARER * float(np.sum(usual)) or worst > 1.0 - DOUBTFUL:
+        return tree, ""
+    shares = f"{_percent(total / len(usual))} of the torque is explained so, {_percent(float(np.mean(usual)))} with -z"
+    return best, f"{words}: {shares}"
+
+
+def _percent(missing: float) -> str:
+    return f"{100.0 * max(1.0 - missing, 0.0):.3g} %"
+
+
+def _missing(equations: Sequence[DriveEquation]) -> Array:
+    """Share of each driving torque's mean square that is missing, shape (k,), of those that can be told."""
+    shares = []
+    for equation in equations:
+        values = {name: value.value for name, value in equation.solve().items()}
+        if values:
+            # a drive that makes no torque explains nothing
+            gain = values[GAIN]
+            shares.append((equation.missing(values) / max(equation.torque(gain), 1e-300)) ** 2)
+    return np.array(shares)
+
+
+def _with_gravity(tree: RigidTree, gravity: Sequence[float]) -> RigidTree:
+    model = tree.model.copy()
+    model.gravity = pin.Motion(np.array(gravity), np.zeros(3))
+    other = tree.with_model(model)
+    other.joints, other.gravity = tree.joints, np.array(gravity)
+    return other
