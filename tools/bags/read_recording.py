@@ -19,6 +19,7 @@ from jointscope.robots.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.fast_columns import fast_columns
+from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.own_stamps import at_message_stamps
@@ -130,7 +131,7 @@ def check_topic(bag: Bag, source: Topic) -> MessageType:
     if bag.count(source.topic) == 0:
         raise RecordingError(f"{place} is empty: it holds no message; check that its driver ran while recording")
     message_type = bag.message_type(source.topic)
-    message_type.check_field(source.field, source.topic)
+    field_path(message_type, source.field, source.topic)
     return message_type
 
 
@@ -198,7 +199,8 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
                 f"{place}: {need.name} expects {len(need.channels)} values ({', '.join(need.channels)}), got {width}"
             )
         text = f"{need.name}: the messages name no joints; the order of the robot file is assumed"
-        return np.arange(width), [Notice(need.name, "info", 0, text)] if columns.names == () else []
+        unchecked = wanted and not names and width > 1
+        return np.arange(width), [Notice(need.name, "info", 0, text)] if unchecked else []
     if width != len(names):
         raise RecordingError(f"{place}: {width} values for {len(names)} joint names ({', '.join(names)})")
     missing = [name for name in wanted if name not in names]
