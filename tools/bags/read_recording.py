@@ -193,6 +193,8 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
     place = f"topic {need.source.topic}, field {need.source.field!r}"
     width, wanted = columns.values.shape[1], need.source.names
     names = columns.names or ()
+    if wanted and not names and all(name.isdecimal() for name in wanted):
+        return _by_place(need, width), []
     if not wanted or not names:
         if width != len(need.channels):
             raise RecordingError(
@@ -214,6 +216,17 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
     text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
     notices = [Notice(need.name, "info", len(extra), text)] if extra else []
     return np.array([names.index(name) for name in wanted]), notices
+
+
+def _by_place(need: StreamSource, width: int) -> NDArray[np.intp]:
+    """Columns of messages without names, where the robot file counts their places from 0."""
+    order = np.array([int(name) for name in need.source.names])
+    if order.max() >= width:
+        raise RecordingError(
+            f"topic {need.source.topic}, field {need.source.field!r}: {width} values, `names` of {need.name} asks for "
+            f"place {order.max()}; expected 0 to {width - 1}"
+        )
+    return order
 
 
 def _refuse_repeated(names: Sequence[str], place: str) -> None:
