@@ -16,7 +16,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.joint_motion import JointMotion, window_mean
 from jointscope.robots.recording import Notice, Recording
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import AXES, Gyro
+from jointscope.robots.sensors import AXES, RIGHT_FROM_LEFT, Gyro
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
 Array = NDArray[np.float64]
@@ -145,7 +145,20 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         f"{gyro.name}: the axes seem swapped or flipped against R_imu_body: {wrong}; as it stands "
         f"{100 * expected:.0f} % of the signal do not fit, with those axes {100 * best:.0f} %"
     )
+    if np.linalg.det(_axes_matrix(axes)) < 0:
+        text += f"; no rotation does that: {_mirrored(gyro, _axes_matrix(axes))}, or a joint counts backwards"
     return [Notice(gyro.name, "axes", 0, text)]
+
+
+def _mirrored(gyro: Gyro, axes: Array) -> str:
+    """What to write for axes of the other hand: R_imu_body is that of axes whose x was turned."""
+    turned = np.diag(RIGHT_FROM_LEFT) @ axes @ gyro.R_imu_body
+    value = "true" if not gyro.left_handed else "false"
+    text = f"set `left_handed: {value}` of sensors.{gyro.name}"
+    if np.allclose(turned, gyro.R_imu_body):
+        return text
+    rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row + 0.0) + "]" for row in turned.round(6))
+    return f"{text} and its R_imu_body to [{rows}]"
 
 
 Axes = tuple[tuple[int, int], ...]

@@ -54,7 +54,13 @@ def point(kinds, *positions):
 def examples(kinds):
     """Messages, a field in them, names and values that it should give."""
     names = ["b", "a"]
-    yield "Trajectory", message(kinds, "Trajectory", names, [point(kinds, 1.0, 2.0)]), "points.0.effort", names, [10, 20]
+    yield (
+        "Trajectory",
+        message(kinds, "Trajectory", names, [point(kinds, 1.0, 2.0)]),
+        "points.0.effort",
+        names,
+        [10, 20],
+    )
     yield "State", message(kinds, "State", ["x"], names, point(kinds, 1.0, 2.0)), "actual.positions", names, [1, 2]
     shapes = (["position", "effort"], [1.0, 2.0]), (["effort", "position"], [4.0, 3.0])
     parts = [message(kinds, "Interface", found, np.array(values)) for found, values in shapes]

@@ -85,9 +85,7 @@ class FieldPath:
         return tuple(str(text) for part in found for text in ([part] if isinstance(part, str) else part))
 
     def _one_of(self, block: Block, path: tuple[str, ...], layout: ByteLayout) -> Block:
-        here = tuple(
-            ours if part == EVERY else part for part, ours in zip(self.chosen_by, (*path, ""), strict=False)
-        )
+        here = tuple(ours if part == EVERY else part for part, ours in zip(self.chosen_by, (*path, ""), strict=False))
         return _entry(block, layout.texts[".".join(here)].index(self.chosen))
 
 
@@ -116,12 +114,11 @@ def field_path(message_type: MessageType, field: str, topic: str) -> FieldPath:
     return FieldPath(parts, "", (), _names(message_type, levels))
 
 
-def _no_field(
-    message_type: MessageType, field: str, topic: str, part: str, fields: tuple[str, ...]
-) -> RecordingError:
+def _no_field(message_type: MessageType, field: str, topic: str, part: str, fields: tuple[str, ...]) -> RecordingError:
     there = f"it has {', '.join(fields)}" if fields else "there is nothing below"
     return RecordingError(
-        f"topic {topic}: {message_type.name} has no field {field!r}: no {part!r}; {there}; set `field` in the robot file"
+        f"topic {topic}: {message_type.name} has no field {field!r}: no {part!r}; {there}; set `field` in the robot "
+        "file"
     )
 
 
@@ -147,7 +144,9 @@ def _list_of_texts(message_type: MessageType, level: Level) -> tuple[str, ...] |
 
 def _text_of_element(message_type: MessageType, level: Level) -> tuple[str, ...] | None:
     path, msgtype = level
-    there = [name for name, kind in message_type.fields_of(msgtype) if is_text(kind) and _unusual(name) < len(USUAL) + 2]
+    there = [
+        name for name, kind in message_type.fields_of(msgtype) if is_text(kind) and _unusual(name) < len(USUAL) + 2
+    ]
     return (*path, min(there, key=_unusual)) if there else None
 
 

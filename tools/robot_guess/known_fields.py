@@ -19,8 +19,8 @@ IMU = "sensor_msgs/msg/Imu"
 ARRAYS = re.compile(r"std_msgs/msg/Float(32|64)(MultiArray)?")
 WORDS = {
     "position": "position positions q present_position joint_position joint_positions angles",
-    "effort": "effort efforts tau tau_est tauest tau_j tau_j_d torque torques joint_torque joint_torques current currents "
-    "pwm duty voltage displacements",
+    "effort": "effort efforts tau tau_est tauest tau_j tau_j_d torque torques joint_torque joint_torques "
+    "current currents pwm duty voltage",
 }
 """Quantity: what its field may be called."""
 QUANTITIES = {word: quantity for quantity, words in WORDS.items() for word in words.split()}
@@ -115,7 +115,5 @@ def _is_list_of_floats(what: Any) -> bool:
     from rosbags.interfaces import Nodetype
 
     return bool(
-        what[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE)
-        and what[1][0][0] == Nodetype.BASE
-        and what[1][0][1][0] in FLOATS
+        what[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE) and what[1][0][0] == Nodetype.BASE and what[1][0][1][0] in FLOATS
     )

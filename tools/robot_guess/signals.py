@@ -31,21 +31,21 @@ class Signal:
 
     Attributes:
         topic, msgtype, field: where it is.
-        quantity: what its field says it is: "position", "effort", "rate" or "numbers".
         names: joint names of its columns; empty where the messages name none.
         times: stamps, strictly increasing, shape (n,) [s]; zero is the same for all signals of a bag.
         values: shape (n, m), in the unit of the bag.
         stamped: whether the messages carry a stamp.
+        quantity: what its field says it is: "position", "effort", "rate" or "numbers".
     """
 
     topic: str
     msgtype: str
     field: str
-    quantity: str
     names: tuple[str, ...]
     times: Array
     values: Array
     stamped: bool
+    quantity: str = ""
 
     @property
     def timing(self) -> Timing:
@@ -122,4 +122,4 @@ def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) 
     samples, _ = in_time_order(raw.name, TimedSamples(stamps, raw.received_ns, columns.values))
     times = (samples.stamps - start_ns) / 1e9
     stamped = columns.stamps is not None
-    return Signal(raw.name, kind.name, known.path, known.quantity, names, times, samples.values, stamped)
+    return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity)
