@@ -19,6 +19,8 @@ from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.byte_layout import Block, ByteLayout
 from jointscope.tools.bags.message_type import MessageType, inner_type, is_list_of_texts, is_text
 
+Level = tuple[tuple[str, ...], str]  # path to a message inside a message, and its type
+
 EVERY = "*"
 USUAL = ("name", "names", "joint_names", "joint_name", "joints", "joint")
 """What fields with the names of joints are usually called, most telling first."""
@@ -95,7 +97,8 @@ def field_path(message_type: MessageType, field: str, topic: str) -> FieldPath:
     Raises:
         RecordingError: there is no such field; the message lists the fields at that level.
     """
-    parts, levels = tuple(field.split(".")), [((), message_type.name)]
+    parts = tuple(field.split("."))
+    levels: list[Level] = [((), message_type.name)]
     msgtype: str | None = message_type.name
     for k, part in enumerate(parts):
         if part.isdecimal() or part == EVERY:
@@ -120,9 +123,6 @@ def _no_field(message_type: MessageType, field: str, topic: str, part: str, fiel
         f"topic {topic}: {message_type.name} has no field {field!r}: no {part!r}; {there}; set `field` in the robot "
         "file"
     )
-
-
-Level = tuple[tuple[str, ...], str]
 
 
 def _names(message_type: MessageType, levels: list[Level]) -> tuple[str, ...] | None:

@@ -110,7 +110,7 @@ def _turning(tree: RigidTree, gyros: Sequence[SeenRate]) -> tuple[int, ...]:
 def _all_patterns(left: _Left, joints: Sequence[int], straight: Signs) -> list[Signs]:
     """The best patterns, fewest turned joints first."""
     chosen = (np.flatnonzero(turned) for turned in product((False, True), repeat=len(joints)))
-    patterns = sorted((_turned(straight, [joints[i] for i in which]) for which in chosen), key=lambda s: -sum(s))
+    patterns = sorted((_turned(straight, [joints[int(i)] for i in which]) for which in chosen), key=lambda s: -sum(s))
     least = min(left.of(signs) for signs in patterns)
     return [signs for signs in patterns if left.of(signs) < least + ALIKE]
 

@@ -67,7 +67,11 @@ def run(args: argparse.Namespace) -> int:
             robot = load_robot(unfinished)
         description = describe_bag(args.bag, robot)
     if args.json is not None:
-        content = {"robot": str(args.output), "joints": list(guess.roles.joints), "guesses": guesses(text)}
+        content: dict[str, Any] = {
+            "robot": str(args.output),
+            "joints": list(guess.roles.joints),
+            "guesses": guesses(text),
+        }
         content["locked"] = {h.joint: h.position for h in guess.held}
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
