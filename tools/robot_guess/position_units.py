@@ -14,6 +14,7 @@ from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.units import si_factor
 from jointscope.tools.robot_guess.gyro_mount import SeenRate, find_mount, seen_rate
+from jointscope.tools.robot_guess.joint_signs import joint_left, joint_signs
 
 Array = NDArray[np.float64]
 
@@ -79,7 +80,12 @@ def seen_rates(encoder: Stream, gyros: Sequence[Stream], most: int = INSTANTS) -
 
 
 def _left(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream], guess: UnitGuess) -> float:
-    """Mean share of the gyroscopes' power that remains; 0 where none says anything."""
+    """Mean share of the gyroscopes' power that remains, whichever way joints count; 0 where none says anything."""
     seen = seen_rates(replace(encoder, values=encoder.values * guess.factor), gyros)
+    if not seen:
+        return 0.0
     mounts = [find_mount(tree, rate, mirrored=True) for rate in seen]
-    return float(np.mean([1.0 if mount is None else mount.left for mount in mounts])) if mounts else 0.0
+    as_is = float(np.mean([1.0 if mount is None else mount.left for mount in mounts]))
+    if as_is < WORTH_CHANGING:
+        return as_is
+    return min(as_is, joint_left(tree, seen, joint_signs(tree, seen).signs))

@@ -23,7 +23,7 @@ from jointscope.tools.robot_guess.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.robot_guess.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.robot_guess.other_joints import HeldJoint, Typed, held_joints
 from jointscope.tools.robot_guess.position_units import UnitGuess, position_units, seen_rates
-from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles, command_unit
+from jointscope.tools.robot_guess.roles import Chosen, Roles, Wish, assign_roles, command_unit
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
@@ -108,6 +108,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     """
     urdf, known = typed.urdf, moving_joints(typed.urdf)
     bodies = UrdfBodies.read(urdf)
+    _no_followers(bodies, typed.wish)
     signals = read_signals(typed.bag, progress)
     roles = assign_roles(signals, known, _slides(bodies), typed.wish)
     masses, trouble = _masses(urdf, roles.joints)
@@ -161,6 +162,20 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         held=held,
         following=_following(bodies, roles.joints),
     )
+
+
+def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
+    """Complains about mimic joints among those that the user named.
+
+    Raises:
+        RobotError: there is one.
+    """
+    for joint in (*wish.joints, *wish.locked):
+        if joint in bodies.followers:
+            raise RobotError(
+                f"{joint} is a mimic joint of {bodies.path.name}: {joint} follows {bodies.followers[joint].leader} and "
+                f"is modelled with it; leave it out of --joints and --lock"
+            )
 
 
 def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
