@@ -38,6 +38,7 @@ class BodyRates:
 
     def __init__(self, model: pin.Model):
         self._model = model
+        self._links: dict[int, _Link] = {}
         self._chains: dict[int, tuple[list[_Link], Array]] = {}
 
     def rate(self, frame: int, q: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -63,6 +64,26 @@ class BodyRates:
             columns[:, :, 0] += link.axis * v[:, link.column, None]
         columns = R_joint_frame.T @ columns
         return columns[:, :, 0], columns[:, :, 1 : 1 + n], columns[:, :, 1 + n :]
+
+    def of_joints(self, q: Array, v: Array) -> Array:
+        """Angular velocities of everything that moves, each in the frame behind its joint.
+
+        Args:
+            q: positions, shape (m, n) [rad].
+            v: velocities, shape (m, n) [rad/s].
+
+        Returns:
+            Rates by index of the joint in the model, the first one of the base, shape (n + 1, m, 3) [rad/s].
+        """
+        rates = np.zeros((self._model.njoints, len(q), 3))
+        for joint in range(1, self._model.njoints):
+            if joint not in self._links:
+                self._links[joint] = self._link(joint)
+            link = self._links[joint]
+            R = _rotation(link.axis, q[:, link.column]) @ link.R_parent_joint.T
+            rates[joint] = (R @ rates[self._model.parents[joint], :, :, None])[:, :, 0]
+            rates[joint] += link.axis * v[:, link.column, None]
+        return rates
 
     def _chain(self, frame: int) -> tuple[list[_Link], Array]:
         """Joints from the base to a frame, and the frame's rotation on the last one."""

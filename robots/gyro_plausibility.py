@@ -16,7 +16,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.joint_motion import JointMotion, window_mean
 from jointscope.robots.recording import Notice, Recording
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import AXES, Gyro
+from jointscope.robots.sensors import AXES, RIGHT_FROM_LEFT, Gyro
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
 Array = NDArray[np.float64]
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 ENOUGH_RATE = 0.05  # [rad/s] rms; below, noise decides
 SAME_RATE = 5.0  # ratios up to this are flexibility, not units
 UNIT_TOLERANCE = 2.4  # a unit explains a ratio that it meets within this factor
+CLEARLY_WORSE = float(np.log(1.3))  # by which another unit explains a ratio worse, to be left unsaid
 SAME_MOTION = 0.5  # correlation of the two rates' norms
 BAD_FIT, BETTER = 0.6, 0.35  # the expected axes leave more than that share of the gyro's power, others that much less
 ODD_FIT, MUCH_BETTER = 0.2, 0.1  # where they leave less, others must be clearly better
@@ -93,17 +94,25 @@ def _check_unit(gyro: Gyro, robot: Robot, pair: RatePair, encoders_confirmed: bo
     norms = np.linalg.norm(pair.measured, axis=1), np.linalg.norm(pair.implied, axis=1)
     together = bool(np.ptp(norms[0]) > 0 and np.ptp(norms[1]) > 0) and np.corrcoef(*norms)[0, 1] > SAME_MOTION
     encoder = robot.motor_encoder
-    fits = [
-        f"its values look like {unit}: set `unit` of sensors.{gyro.name} in the robot file (now {gyro.source.unit}) "
-        f"to {unit}"
-        for unit in _units_that_explain(ratio, gyro.source.unit)
+    found = [
+        (
+            misfit,
+            f"its values look like {unit}: set `unit` of sensors.{gyro.name} in the robot file (now "
+            f"{gyro.source.unit}) to {unit}",
+        )
+        for unit, misfit in _units_that_explain(ratio, gyro.source.unit)
     ]
     if not encoders_confirmed:
-        fits += [
-            f"the encoders look like {unit}: set `unit` of sensors.{encoder.name} in the robot file "
-            f"(now {encoder.source.unit}) to {unit}"
-            for unit in _units_that_explain(1.0 / ratio, encoder.source.unit)
+        found += [
+            (
+                misfit,
+                f"the encoders look like {unit}: set `unit` of sensors.{encoder.name} in the robot file "
+                f"(now {encoder.source.unit}) to {unit}",
+            )
+            for unit, misfit in _units_that_explain(1.0 / ratio, encoder.source.unit)
         ]
+    found.sort()
+    fits = [text for misfit, text in found if misfit < found[0][0] + CLEARLY_WORSE]
     if not fits and abs(abs(np.log(ratio)) - np.log(DEGREES)) < np.log(UNIT_TOLERANCE):
         fits = ["that is the factor between degrees and radians: check what its driver publishes"]
     if together and fits:
@@ -113,15 +122,18 @@ def _check_unit(gyro: Gyro, robot: Robot, pair: RatePair, encoders_confirmed: bo
     return [Notice(gyro.name, "unit", 0, f"{text}; check its unit, its body and its topic")]
 
 
-def _units_that_explain(ratio: float, declared: str) -> list[str]:
-    """The unit that a signal must have if it is `ratio` times too large when read as `declared`; none or one."""
+def _units_that_explain(ratio: float, declared: str) -> list[tuple[str, float]]:
+    """The unit that a signal must have if it is `ratio` times too large when read as `declared`; none or one.
+
+    With it stands how far off the ratio is, as a logarithm.
+    """
     misfits = {
         unit: abs(float(np.log(ratio * si_factor(unit) / si_factor(declared))))
         for unit in UNITS
         if si_unit(unit) == si_unit(declared) and unit != declared
     }
     best = min(misfits, key=misfits.__getitem__)
-    return [best] if misfits[best] < np.log(UNIT_TOLERANCE) else []
+    return [(best, misfits[best])] if misfits[best] < np.log(UNIT_TOLERANCE) else []
 
 
 def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
@@ -145,7 +157,20 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         f"{gyro.name}: the axes seem swapped or flipped against R_imu_body: {wrong}; as it stands "
         f"{100 * expected:.0f} % of the signal do not fit, with those axes {100 * best:.0f} %"
     )
+    if np.linalg.det(_axes_matrix(axes)) < 0:
+        text += f"; no rotation does that: {_mirrored(gyro, _axes_matrix(axes))}, or a joint counts backwards"
     return [Notice(gyro.name, "axes", 0, text)]
+
+
+def _mirrored(gyro: Gyro, axes: Array) -> str:
+    """What to write for axes of the other hand: R_imu_body is that of axes whose x was turned."""
+    turned = np.diag(RIGHT_FROM_LEFT) @ axes @ gyro.R_imu_body
+    value = "true" if not gyro.left_handed else "false"
+    text = f"set `left_handed: {value}` of sensors.{gyro.name}"
+    if np.allclose(turned, gyro.R_imu_body):
+        return text
+    rows = ", ".join("[" + ", ".join(f"{x:.4g}" for x in row + 0.0) + "]" for row in turned.round(6))
+    return f"{text} and its R_imu_body to [{rows}]"
 
 
 Axes = tuple[tuple[int, int], ...]

@@ -249,6 +249,11 @@ class RigidTree:
         omega, by_q, by_v = self._rates.rate(frame, coupling.positions(q), coupling.rates(v))
         return omega, by_q @ coupling.G, by_v @ coupling.G
 
+    def joint_rates(self, q: Array, v: Array) -> Array:
+        """Angular velocities behind all joints of `model`, see `BodyRates.of_joints`, shape (joints, m, 3) [rad/s]."""
+        coupling = self.coupling
+        return self._rates.of_joints(*((q, v) if coupling is None else (coupling.positions(q), coupling.rates(v))))
+
     def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:
         """Pose of a body in the base frame: R_base_body, shape (m, 3, 3), and p_base_body, shape (m, 3) [m]."""
         frame = self.frame_id(body)

@@ -4,12 +4,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.sensors import BY_MESSAGE, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
+from jointscope.robots.sensors import (
+    BY_MESSAGE,
+    RIGHT_FROM_LEFT,
+    Gyro,
+    LinkEncoder,
+    MotorEncoder,
+    Sensor,
+    Topic,
+    TorqueSensor,
+)
 from jointscope.robots.units import UNITS, si_unit
 from jointscope.robots.yaml_section import Section
 
@@ -124,6 +134,9 @@ def _gyro(name: str, section: Section) -> Gyro:
     source = topic(section)
     if si_unit(source.unit) != "rad/s":
         raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {source.unit!r}")
+    left_handed = section.flag("left_handed", False)
+    if left_handed:
+        source = replace(source, scale=RIGHT_FROM_LEFT)
     form = section.text("form", "full", GYRO_FORMS)
     bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
     rotation = section.section("R_imu_body")
@@ -142,6 +155,7 @@ def _gyro(name: str, section: Section) -> Gyro:
         reference=section.text("reference") if form == "relative" else None,
         bias_sigma=bias.array("sigma", (3,), None),
         R_sigma=rotation.array("sigma", (3,), None),
+        left_handed=left_handed,
     )
     bias.finish()
     rotation.finish()
@@ -153,5 +167,9 @@ def _rotation(R: Array, place: str) -> Array:
     U, _, Vt = np.linalg.svd(R)
     nearest = U @ Vt
     if np.linalg.det(nearest) < 0 or np.abs(nearest - R).max() > 0.02:
-        raise RobotError(f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1")
+        mirrored = np.linalg.det(R) < -0.9
+        hint = "; axes that are left-handed: negate the first row and set `left_handed: true`" if mirrored else ""
+        raise RobotError(
+            f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1{hint}"
+        )
     return nearest

@@ -13,6 +13,7 @@ from jointscope.robots.units import si_factor, si_unit
 AXES = ("x", "y", "z")
 
 
+RIGHT_FROM_LEFT = (-1.0, 1.0, 1.0)  # factors on left-handed axes that make them right-handed
 BY_MESSAGE = "message"  # a joint that was sampled at the stamp of its message
 
 
@@ -168,6 +169,9 @@ class Gyro:
         R_prior_sigma: standard deviation of the rotation's prior about each axis of the body [rad].
         reference: for form "relative": the gyro whose measured rate is used.
         bias_sigma, R_sigma: standard deviations after calibration, shape (3,) [rad/s], [rad]; None before.
+        left_handed: whether the axes in the bag are left-handed. Their x is turned when they are read (`source.scale`),
+            so that omega_bag = diag(-1, 1, 1) (R_imu_body omega_body + bias): rotation and bias are those of
+            right-handed axes.
     """
 
     name: str
@@ -183,6 +187,7 @@ class Gyro:
     reference: str | None = None
     bias_sigma: NDArray[np.float64] | None = None
     R_sigma: NDArray[np.float64] | None = None
+    left_handed: bool = False
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -154,7 +154,8 @@ def test_without_a_header_the_time_of_reception_counts_and_is_noted(doggy, tmp_p
     assert np.array_equal(read.command.values, recording.command.values)
     assert np.array_equal(read.command.times, read.command.received)
     assert [n.text for n in read.notices if n.kind == "info"] == [
-        "command: std_msgs/msg/Float64MultiArray carries no stamp; the time of reception stands in for it"
+        "command: the messages name no joints; the order of the robot file is assumed",
+        "command: std_msgs/msg/Float64MultiArray carries no stamp; the time of reception stands in for it",
     ]
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 STAMP = "header.stamp"
-NAMES = "name"
 
 
 @dataclass(frozen=True)
@@ -19,7 +18,7 @@ class Columns:
     Attributes:
         stamps: header stamps, shape (n,) [ns]; None where the message type has no header.
         values: the field's numbers in the order of the message, shape (n, m), in the unit of the bag.
-        names: entries of the message's `name` field, the same in all messages; None where there is no such field.
+        names: what the messages call the columns, the same in all of them; None where their type has no such texts.
     """
 
     stamps: NDArray[np.int64] | None

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.tools.bags.byte_layout import Block, byte_layout
-from jointscope.tools.bags.columns import NAMES, STAMP, Columns
+from jointscope.tools.bags.columns import STAMP, Columns
+from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.message_type import MessageType
 
 
@@ -36,10 +37,14 @@ def fast_columns(raw: Sequence[bytes], message_type: MessageType, field: str) ->
     if message_type.has_header:
         seconds, nanoseconds = (_numbers(table, layout.blocks_of(f"{STAMP}.{part}")) for part in ("sec", "nanosec"))
         stamps = seconds[:, 0].astype(np.int64) * 1_000_000_000 + nanoseconds[:, 0].astype(np.int64)
-    names = tuple(layout.texts.get(NAMES, ())) if message_type.has_names else None
     if any(path == field or path.startswith(field + ".") for path in layout.texts):
         return None
-    return Columns(stamps, _numbers(table, layout.blocks_of(field)), names)
+    where = field_path(message_type, field, "")
+    try:
+        blocks = where.blocks(layout)
+    except (KeyError, ValueError):
+        return None
+    return Columns(stamps, _numbers(table, blocks), where.names_of(layout))
 
 
 def _numbers(table: NDArray[np.uint8], blocks: list[Block]) -> NDArray[np.float64]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.byte_layout import byte_layout
 from jointscope.tools.bags.columns import STAMP
-from jointscope.tools.bags.message_type import NUMPY_TYPES, MessageType, is_sequence_of_texts
+from jointscope.tools.bags.field_path import field_path
+from jointscope.tools.bags.message_type import NUMPY_TYPES, MessageType, is_list_of_texts
 
 
 def fill_messages(
@@ -35,7 +36,7 @@ def fill_messages(
         RecordingError: the type has no such field or no room for m numbers there.
     """
     for field in fields:
-        message_type.check_field(field, "to write")
+        field_path(message_type, field, "to write")
     lengths = {field: values.shape[1] for field, values in fields.items()}
     template = message_type.encode(_blank(message_type, message_type.name, "", lengths, names))
     layout = byte_layout(template, message_type)
@@ -67,7 +68,7 @@ def _blank(message_type: MessageType, msgtype: str, path: str, lengths: dict[str
     values = {}
     for name, kind in message_type.fields_of(msgtype):
         inside = f"{path}.{name}" if path else name
-        if inside == "name" and is_sequence_of_texts(kind):
+        if inside == "name" and is_list_of_texts(kind):
             values[name] = list(names)
         else:
             values[name] = _blank_field(message_type, kind, inside, lengths, names)

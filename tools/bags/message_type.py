@@ -44,11 +44,6 @@ class MessageType:
         """Whether the messages carry a stamp of their own."""
         return any(name == "header" and str(kind[1]) == "std_msgs/msg/Header" for name, kind in self.fields)
 
-    @property
-    def has_names(self) -> bool:
-        """Whether the messages name their columns, as JointState does."""
-        return any(name == "name" and is_sequence_of_texts(kind) for name, kind in self.fields)
-
     def decode(self, raw: bytes) -> Any:
         """The message with these bytes."""
         if self.ros2:
@@ -61,25 +56,6 @@ class MessageType:
             return bytes(self.typestore.serialize_cdr(message, self.name))
         return bytes(self.typestore.serialize_ros1(message, self.name))
 
-    def check_field(self, field: str, topic: str) -> None:
-        """Checks that a dotted field exists.
-
-        Raises:
-            RecordingError: it does not; the message lists the fields at that level.
-        """
-        msgtype: str | None = self.name
-        for part in field.split("."):
-            if part.isdecimal():
-                continue
-            fields = dict(self.fields_of(msgtype)) if msgtype else {}
-            if part not in fields:
-                there = f"it has {', '.join(fields)}" if fields else "there is nothing below"
-                raise RecordingError(
-                    f"topic {topic}: {self.name} has no field {field!r}: no {part!r}; {there}; "
-                    "set `field` in the robot file"
-                )
-            msgtype = inner_type(fields[part])
-
 
 def inner_type(kind: Any) -> str | None:
     """The message type inside a field or its elements; None for primitives."""
@@ -90,11 +66,18 @@ def inner_type(kind: Any) -> str | None:
     return str(kind[1]) if kind[0] == Nodetype.NAME else None
 
 
-def is_sequence_of_texts(kind: Any) -> bool:
+def is_list_of_texts(kind: Any) -> bool:
     """Whether a field is a list of texts."""
     from rosbags.interfaces import Nodetype
 
-    return bool(kind[0] == Nodetype.SEQUENCE and kind[1][0][0] == Nodetype.BASE and kind[1][0][1][0] == "string")
+    return kind[0] in (Nodetype.SEQUENCE, Nodetype.ARRAY) and is_text(kind[1][0])
+
+
+def is_text(kind: Any) -> bool:
+    """Whether a field is one text."""
+    from rosbags.interfaces import Nodetype
+
+    return bool(kind[0] == Nodetype.BASE and kind[1][0] == "string")
 
 
 def known_message_type(name: str, ros2: bool) -> MessageType:

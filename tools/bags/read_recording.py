@@ -19,6 +19,7 @@ from jointscope.robots.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.fast_columns import fast_columns
+from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.own_stamps import at_message_stamps
@@ -130,7 +131,7 @@ def check_topic(bag: Bag, source: Topic) -> MessageType:
     if bag.count(source.topic) == 0:
         raise RecordingError(f"{place} is empty: it holds no message; check that its driver ran while recording")
     message_type = bag.message_type(source.topic)
-    message_type.check_field(source.field, source.topic)
+    field_path(message_type, source.field, source.topic)
     return message_type
 
 
@@ -192,13 +193,16 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
     place = f"topic {need.source.topic}, field {need.source.field!r}"
     width, wanted = columns.values.shape[1], need.source.names
     names = columns.names or ()
+    if wanted and not names and all(name.isdecimal() for name in wanted):
+        return _by_place(need, width), []
     if not wanted or not names:
         if width != len(need.channels):
             raise RecordingError(
                 f"{place}: {need.name} expects {len(need.channels)} values ({', '.join(need.channels)}), got {width}"
             )
         text = f"{need.name}: the messages name no joints; the order of the robot file is assumed"
-        return np.arange(width), [Notice(need.name, "info", 0, text)] if columns.names == () else []
+        unchecked = wanted and not names and width > 1
+        return np.arange(width), [Notice(need.name, "info", 0, text)] if unchecked else []
     if width != len(names):
         raise RecordingError(f"{place}: {width} values for {len(names)} joint names ({', '.join(names)})")
     missing = [name for name in wanted if name not in names]
@@ -212,6 +216,17 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
     text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
     notices = [Notice(need.name, "info", len(extra), text)] if extra else []
     return np.array([names.index(name) for name in wanted]), notices
+
+
+def _by_place(need: StreamSource, width: int) -> NDArray[np.intp]:
+    """Columns of messages without names, where the robot file counts their places from 0."""
+    order = np.array([int(name) for name in need.source.names])
+    if order.max() >= width:
+        raise RecordingError(
+            f"topic {need.source.topic}, field {need.source.field!r}: {width} values, `names` of {need.name} asks for "
+            f"place {order.max()}; expected 0 to {width - 1}"
+        )
+    return order
 
 
 def _refuse_repeated(names: Sequence[str], place: str) -> None:

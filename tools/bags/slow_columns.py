@@ -10,6 +10,7 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.columns import Columns
+from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.message_type import MessageType
 
 
@@ -30,6 +31,7 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
         RecordingError: a message cannot be decoded, holds no numbers there, or differs in the joint names or in the
             number of values.
     """
+    where = field_path(message_type, field, topic)
     rows: list[list[float]] = []
     stamps = np.zeros(len(raw), dtype=np.int64)
     names: tuple[str, ...] | None = None
@@ -38,13 +40,12 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
         message = _decode(data, message_type, topic, k)
         if message_type.has_header:
             stamps[row_number] = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        if message_type.has_names:
-            names = _same_names(names, tuple(message.name), topic, k)
-        row: list[float] = []
         try:
-            _flatten(_descend(message, field), row)
+            here = where.names_in(message)
+            row = where.numbers(message)
         except (AttributeError, IndexError, TypeError, ValueError) as err:
             raise RecordingError(f"topic {topic}, message {k}: the field {field!r} holds no numbers") from err
+        names = names if here is None else _same_names(names, here, topic, k)
         if rows and len(row) != len(rows[0]):
             raise RecordingError(
                 f"topic {topic}, message {k}: the field {field!r} holds {len(row)} values; "
@@ -72,25 +73,3 @@ def _same_names(before: tuple[str, ...] | None, now: tuple[str, ...], topic: str
             f"got {', '.join(now) or 'none'}"
         )
     return now
-
-
-def _descend(message: Any, field: str) -> Any:
-    for part in field.split("."):
-        message = message[int(part)] if part.isdecimal() else getattr(message, part)
-    return message
-
-
-def _flatten(value: Any, row: list[float]) -> None:
-    if isinstance(value, np.ndarray):
-        row.extend(float(x) for x in value.tolist())
-    elif isinstance(value, list | tuple):
-        for item in value:
-            _flatten(item, row)
-    elif hasattr(value, "__dataclass_fields__"):
-        for name, kind in value.__dataclass_fields__.items():
-            if "ClassVar" not in str(kind.type):
-                _flatten(getattr(value, name), row)
-    elif isinstance(value, str):
-        raise TypeError("a text is not a number")
-    else:
-        row.append(float(value))

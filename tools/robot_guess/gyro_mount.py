@@ -3,11 +3,17 @@
 
 For every link the rotation that turns its rate into the measured one best (Wahba's problem, solved by an SVD as in
 Markley 1988) is found; the link that leaves least is chosen. Mountings in right angles come first: many motions turn a
-link about one axis only and say nothing about the rotation around it.
+link about one axis only and say nothing about the rotation around it. All that is needed of two rates is the sum of
+their products C = sum omega_imu omega_body^T:
+
+    sum |omega_imu - R omega_body|^2 = sum |omega_imu|^2 + sum |omega_body|^2 - 2 tr(R^T C)
+
+A gyroscope whose frame is left-handed is one that a reflection explains and no rotation does; its x axis is turned.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations, product
@@ -27,8 +33,10 @@ CLEARLY = 0.03  # share of the power by which a mounting out of square must be b
 ALIKE = 0.02  # share of the power that decides between two links
 FITS = 0.5  # share of the power left, above which no link explains a gyroscope
 DEGREES = (20.0, 150.0)  # ratio of the rates at which the gyroscope must be in deg/s
-HALF, WORTH_TURNING = 0.5, 0.1  # turned joints must leave less than this part, and that much less of the power
 ONE_AXIS = 1e-3  # share of the power about the other axes that shows a rotation
+MIRRORED, WORTH_MIRRORING = 0.5, 0.1  # a reflection must leave less than this part, and that much less of the power
+FEWEST = 10  # instants
+MIRROR = np.diag([-1.0, 1.0, 1.0])  # from left-handed sensor coordinates to right-handed ones and back
 
 
 @dataclass(frozen=True)
@@ -37,12 +45,13 @@ class Mount:
 
     Attributes:
         body: link of the URDF.
-        R_imu_body: from body to sensor coordinates, shape (3, 3).
+        R_imu_body: from body to sensor coordinates, those with x turned where they are left-handed, shape (3, 3).
         left: share of the gyroscope's power that remains, 0 to 1.
         unit: of its values, "rad/s" or "deg/s".
         square: whether it is mounted in right angles.
         open_axis: the link turned about one axis only: the rotation about it is not known.
         others: links that explain it as well.
+        left_handed: whether only a reflection explains it.
     """
 
     body: str
@@ -52,100 +61,114 @@ class Mount:
     square: bool
     open_axis: bool
     others: tuple[str, ...]
-
-
-def find_mount(tree: RigidTree, motion: JointMotion, gyro: Stream) -> Mount | None:
-    """The link that a gyroscope sits on; None where it stands still or no link explains it.
-
-    Args:
-        tree: the robot.
-        motion: of its joints.
-        gyro: samples as they stand in the bag.
-    """
-    inside = (motion.times > gyro.times[0]) & (motion.times < gyro.times[-1])
-    if np.count_nonzero(inside) < 10:
-        return None
-    measured = window_mean(gyro, motion.times[inside], motion.window)
-    measured = measured - measured.mean(axis=0)
-    power = float(np.mean(np.sum(measured**2, axis=1)))
-    found = []
-    for body in _one_body_per_joint(tree):
-        rate = tree.body_rate(body, motion.q[inside], motion.v[inside])[0]
-        rate = rate - rate.mean(axis=0)
-        size = float(np.mean(np.sum(rate**2, axis=1)))
-        if size < STANDS_STILL**2:
-            continue
-        ratio = float(np.sqrt(power / size))
-        unit = "deg/s" if DEGREES[0] < ratio < DEGREES[1] else "rad/s"
-        scaled = measured * si_factor(unit)
-        if np.mean(np.sum(scaled**2, axis=1)) < STANDS_STILL**2:
-            continue
-        found.append(_mounted(body, scaled, rate, unit))
-    found.sort(key=lambda mount: mount.left)
-    if not found or found[0].left > FITS:
-        return None
-    best = found[0]
-    others = tuple(m.body for m in found[1:] if m.left < best.left + ALIKE)
-    return replace(best, others=others)
+    left_handed: bool = False
 
 
 @dataclass(frozen=True)
-class SignGuess:
-    """Which way the encoders count.
+class SeenRate:
+    """What a gyroscope measured, without its mean, and the motion of the joints at those instants.
 
     Attributes:
-        signs: of the joints, 1 where nothing speaks against it, shape (n,).
-        others: other signs with which the gyroscopes agree as well, with as few turned joints.
+        measured: as in the bag, shape (m, 3).
+        q, v: of the joints, shape (m, n) [rad], [rad/s].
     """
 
-    signs: tuple[float, ...]
-    others: tuple[tuple[float, ...], ...] = ()
+    measured: Array
+    q: Array
+    v: Array
+
+    @property
+    def power(self) -> float:
+        """Mean square of the rate [unit of the bag squared]."""
+        return float(np.mean(np.sum(self.measured**2, axis=1)))
 
 
-def joint_signs(tree: RigidTree, motion: JointMotion, gyros: list[Stream]) -> SignGuess:
-    """Signs of the joints that let the gyroscopes agree with the encoders, fewest turned joints first."""
-    n = motion.q.shape[1]
-    patterns = sorted(product((1.0, -1.0), repeat=n), key=lambda signs: -sum(signs))
-    left = {signs: _left_of_all(tree, motion, gyros, np.array(signs)) for signs in patterns}
-    as_is, least = left[patterns[0]], min(left.values())
-    if least > HALF * as_is or as_is - least < WORTH_TURNING:
-        return SignGuess(patterns[0])
-    best = [signs for signs in patterns if left[signs] < least + ALIKE]
-    return SignGuess(best[0], tuple(signs for signs in best[1:] if sum(signs) == sum(best[0])))
+def seen_rate(motion: JointMotion, gyro: Stream, most: int) -> SeenRate | None:
+    """What a gyroscope saw; None where it has too few samples or stands still.
+
+    Args:
+        motion: of the joints.
+        gyro: samples as they stand in the bag.
+        most: number of instants that are enough.
+    """
+    if len(gyro.times) < FEWEST:
+        return None
+    inside = np.flatnonzero((motion.times > gyro.times[0]) & (motion.times < gyro.times[-1]))
+    if len(inside) < FEWEST:
+        return None
+    chosen = inside[:: max(len(inside) // most, 1)]
+    measured = window_mean(gyro, motion.times[chosen], motion.window)
+    seen = SeenRate(measured - measured.mean(axis=0), motion.q[chosen], motion.v[chosen])
+    return seen if seen.power > STANDS_STILL**2 else None
 
 
-def _left_of_all(tree: RigidTree, motion: JointMotion, gyros: list[Stream], signs: Array) -> float:
-    turned = JointMotion(motion.times, motion.window, motion.q * signs, motion.v * signs)
-    mounts = [find_mount(tree, turned, gyro) for gyro in gyros]
-    return float(np.mean([1.0 if mount is None else mount.left for mount in mounts])) if mounts else 0.0
+def find_mount(tree: RigidTree, seen: SeenRate, mirrored: bool = False) -> Mount | None:
+    """The link that a gyroscope sits on; None where no link explains it.
+
+    Args:
+        tree: the robot.
+        seen: what the gyroscope and the encoders saw.
+        mirrored: whether its frame may be left-handed.
+    """
+    found = [m for m in (_on(tree, body, rate, seen, mirrored) for body, rate in _rates(tree, seen)) if m is not None]
+    found.sort(key=lambda mount: mount.left)
+    if not found or found[0].left > FITS:
+        return None
+    others = tuple(m.body for m in found[1:] if m.left < found[0].left + ALIKE)
+    return replace(found[0], others=others)
 
 
-def _one_body_per_joint(tree: RigidTree) -> list[str]:
-    """The first link behind every joint; further ones on the same joint turn alike."""
-    seen: dict[tuple[int, ...], str] = {}
-    for body in tree.bodies:
-        joints = tree.joints_below(body)
-        if joints:
-            seen.setdefault(joints, body)
-    return list(seen.values())
+def least_left(tree: RigidTree, seen: SeenRate) -> float:
+    """Share of a gyroscope's power that remains at the best link, 1 where none explains it."""
+    mount = find_mount(tree, seen)
+    return 1.0 if mount is None else mount.left
 
 
-def _mounted(body: str, measured: Array, rate: Array, unit: str) -> Mount:
-    power = np.sum(measured**2)
+def _rates(tree: RigidTree, seen: SeenRate) -> Sequence[tuple[str, Array]]:
+    """The first link behind every joint and its rate without its mean; further ones on the same joint turn alike."""
+    rates = tree.joint_rates(seen.q, seen.v)
+    found: dict[int, tuple[str, Array]] = {}
+    for frame in tree.model.frames:
+        joint = int(frame.parentJoint)
+        if frame.name in tree.bodies and joint > 0 and joint not in found:
+            rate = rates[joint] @ frame.placement.rotation
+            found[joint] = (frame.name, rate - rate.mean(axis=0))
+    return [(body, rate) for body, rate in found.values() if np.mean(np.sum(rate**2, axis=1)) > STANDS_STILL**2]
+
+
+def _on(tree: RigidTree, body: str, rate: Array, seen: SeenRate, mirrored: bool) -> Mount | None:
+    """The gyroscope on one link; None where it stands still."""
+    size = float(np.mean(np.sum(rate**2, axis=1)))
+    ratio = float(np.sqrt(seen.power / size))
+    unit = "deg/s" if DEGREES[0] < ratio < DEGREES[1] else "rad/s"
+    measured = seen.measured * si_factor(unit)
+    if np.mean(np.sum(measured**2, axis=1)) < STANDS_STILL**2:
+        return None
     axes = np.linalg.svd(rate, compute_uv=False) ** 2
     open_axis = bool(axes[1] < ONE_AXIS * axes[0])
-    square = min(_right_angles(), key=lambda R: float(np.sum((measured - rate @ R.T) ** 2)))
-    left_square = float(np.sum((measured - rate @ square.T) ** 2) / power)
-    free = _wahba(measured, rate)
-    left_free = float(np.sum((measured - rate @ free.T) ** 2) / power)
+    proper = _turned(body, measured, rate, unit, open_axis)
+    if not mirrored or open_axis:
+        return proper
+    other = replace(_turned(body, measured @ MIRROR, rate, unit, open_axis), left_handed=True)
+    needed = other.left < MIRRORED * proper.left and other.left < proper.left - WORTH_MIRRORING
+    return other if needed else proper
+
+
+def _turned(body: str, measured: Array, rate: Array, unit: str, open_axis: bool) -> Mount:
+    power, C = float(np.sum(measured**2)), measured.T @ rate
+    both = power + float(np.sum(rate**2))
+    square = max(_right_angles(), key=lambda R: float(np.sum(R * C)))
+    left_square = (both - 2.0 * float(np.sum(square * C))) / power
+    free = _wahba(C)
+    left_free = (both - 2.0 * float(np.sum(free * C))) / power
     if left_free < left_square - CLEARLY:
         return Mount(body, free, left_free, unit, False, open_axis, ())
     return Mount(body, square, left_square, unit, True, open_axis, ())
 
 
-def _wahba(measured: Array, rate: Array) -> Array:
-    """The rotation R with measured = R rate, least squares, shape (3, 3)."""
-    U, _, Vt = np.linalg.svd(measured.T @ rate)
+def _wahba(C: Array) -> Array:
+    """The rotation R with the largest tr(R^T C), shape (3, 3)."""
+    U, _, Vt = np.linalg.svd(C)
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt, dtype=np.float64)
 
 

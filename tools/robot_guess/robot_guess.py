@@ -15,10 +15,15 @@ from jointscope.robots.joint_motion import joint_motion
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree, moving_joints
 from jointscope.robots.units import si_factor
+from jointscope.robots.urdf_bodies import UrdfBodies
 from jointscope.tools.bags.open_bag import Progress
 from jointscope.tools.robot_guess.drive_values import Drives, DriveValues, find_drives, find_signs
-from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess, find_mount, joint_signs
-from jointscope.tools.robot_guess.roles import Chosen, Roles, assign_roles
+from jointscope.tools.robot_guess.encoder_noise import encoder_noise
+from jointscope.tools.robot_guess.gyro_mount import Mount, find_mount, seen_rate
+from jointscope.tools.robot_guess.joint_signs import SignGuess, encoder_signs
+from jointscope.tools.robot_guess.other_joints import HeldJoint, Typed, held_joints
+from jointscope.tools.robot_guess.position_units import UnitGuess, position_units, seen_rates
+from jointscope.tools.robot_guess.roles import Chosen, Roles, Wish, assign_roles
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
@@ -27,6 +32,7 @@ Array = NDArray[np.float64]
 
 GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] ROS: z of the base points up
 SUPPLY = 24.0  # [V]
+ENOUGH = 3000  # instants for the mounting of a gyroscope
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ class RobotGuess:
         bag: path of the bag.
         roles: which signal is what.
         masses: whether the URDF has inertias for all moving bodies.
-        position_units: of the encoders in the bag, by joint: "rad" or "deg", of a prismatic joint "m" or "mm".
+        position_units: of the encoders in the bag.
         encoder_signs: which way the joints' encoders count.
         command_unit: unit of the drive and why.
         drives: start values by joint.
@@ -57,6 +63,8 @@ class RobotGuess:
         gyros: those that sit on a moving link.
         left_out: what the bag also holds and why it is not used.
         stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
+        held: other joints that matter, and where they stand [rad or m].
+        following: sentences about mimic joints of the URDF.
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
@@ -67,7 +75,7 @@ class RobotGuess:
     bag: str
     roles: Roles
     masses: bool
-    position_units: tuple[str, ...]
+    position_units: UnitGuess
     encoder_signs: SignGuess
     command_unit: tuple[str, str]
     drives: list[DriveValues]
@@ -81,6 +89,8 @@ class RobotGuess:
     stamped_by: tuple[str, ...] = ()
     gravity: tuple[float, ...] = GRAVITY
     gravity_reason: str = ""
+    held: tuple[HeldJoint, ...] = ()
+    following: tuple[str, ...] = ()
 
     @property
     def free_links(self) -> bool:
@@ -88,49 +98,55 @@ class RobotGuess:
         return not self.masses and self.roles.link_encoder is not None
 
 
-def guess_robot(
-    urdf: Path, bag: Path, joints: Sequence[str] = (), name: str = "", progress: Progress | None = None
-) -> RobotGuess:
+def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     """Guesses a robot.
 
     Args:
-        urdf: its bodies and joints.
-        bag: a recording in which all joints move.
-        joints: those to use; all that the bag shows if empty.
-        name: of the robot; that of the URDF's file if empty.
+        typed: URDF, bag and what the user said about them.
         progress: called with the number of messages read and expected.
 
     Raises:
         RobotError: the URDF cannot be read, or has neither masses nor are there encoders on the links.
-        RecordingError: the bag cannot be read, or lacks positions or what drives the motors.
+        RecordingError: the bag cannot be read, lacks positions or what drives the motors, or a joint moves that must
+            not be left out.
     """
-    known = moving_joints(urdf)
-    signals = read_signals(bag, progress)
-    roles = assign_roles(signals, known, tuple(joints))
-    tree, masses = _tree(urdf, roles.joints)
-    if not masses and roles.link_encoder is None:
-        raise RobotError(
-            f"{urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected one of "
-            "them; add <inertial> to the links, or record a topic with the positions of the links"
-        )
-    units = _position_units(tree, roles)
-    factor = np.array([si_factor(unit) for unit in units])
-    encoder = _stream(roles.motor_encoder, roles.joints, factor)
+    urdf, known = typed.urdf, moving_joints(typed.urdf)
+    bodies = UrdfBodies.read(urdf)
+    _no_followers(bodies, typed.wish)
+    signals = read_signals(typed.bag, progress)
+    roles = assign_roles(signals, known, _slides(bodies), typed.wish)
+    masses, trouble = _masses(urdf, roles.joints)
+    if not masses:
+        roles = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
+        if roles.link_encoder is None:
+            raise RobotError(
+                f"{urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected one "
+                f"of them; add <inertial> to the links, or record a topic with the positions of the links ({trouble})"
+            )
+    held = held_joints(bodies, roles, typed, free_links=not masses)
+    tree = RigidTree(urdf, roles.joints, np.array(GRAVITY), inertias=masses)
+    raw = _stream(roles.motor_encoder, roles.joints)
+    links = None if roles.link_encoder is None else _stream(roles.link_encoder, roles.joints)
     streams = [s.stream(("x", "y", "z")) for s in roles.imus]
+    units = position_units(tree, links or raw, streams)
+    held = _in_si(held, bodies, tree, units.units)
+    tree = tree.locked_at({h.joint: h.position for h in held})
     # the links turn the gyroscopes, and their encoders know where zero is
-    seen = encoder if roles.link_encoder is None else _stream(roles.link_encoder, roles.joints, factor)
-    signs = joint_signs(tree, joint_motion(seen, np.zeros(len(roles.joints))), streams)
-    turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
-    gyros, left_out = _gyros(tree, seen, roles.imus, streams)
-    elastic = _seen(tree, gyros) if masses else ()
-    noises = _noises(roles.motor_encoder, roles, units)
+    encoder, seen = (replace(stream, values=stream.values * units.factor) for stream in (raw, links or raw))
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
-    drives = _drives(tree, turned, roles, factor * [noise.sigma for noise in noises], torque, elastic, masses)
+    noises = encoder_noise(raw, units.units, tree.slides, roles.stances)
+    sigmas = units.factor * [noise.sigma for noise in noises]
+    first = _drives(tree, encoder, roles, sigmas, torque, (), masses) if streams else None
+    signs = encoder_signs(tree, seen_rates(seen, streams), [drive.sign for drive in first.joints] if first else ())
+    turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
+    gyros, left_out = _gyros(tree, seen, roles.imus, streams, signs)
+    elastic = _seen(tree, gyros) if masses else ()
+    drives = _drives(tree, turned, roles, sigmas, torque, elastic, masses)
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
-        name=name or urdf.stem,
+        name=typed.name or urdf.stem,
         urdf=urdf,
-        bag=str(bag),
+        bag=str(typed.bag),
         roles=roles,
         masses=masses,
         position_units=units,
@@ -140,13 +156,15 @@ def guess_robot(
         gravity=tuple(drives.gravity.tolist()),
         gravity_reason=drives.gravity_reason,
         encoder_noise=noises,
-        link_noise=None if roles.link_encoder is None else _noises(roles.link_encoder, roles, units),
+        link_noise=None if links is None else encoder_noise(links, units.units, tree.slides, roles.stances),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
         elastic=elastic,
+        held=held,
+        following=_following(bodies, roles.joints),
     )
 
 
@@ -167,6 +185,41 @@ def _drives(
     return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
 
 
+def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
+    """Complains about mimic joints among those that the user named.
+
+    Raises:
+        RobotError: there is one.
+    """
+    for joint in (*wish.joints, *wish.locked):
+        if joint in bodies.followers:
+            raise RobotError(
+                f"{joint} is a mimic joint of {bodies.path.name}: {joint} follows {bodies.followers[joint].leader} and "
+                f"is modelled with it; leave it out of --joints and --lock"
+            )
+
+
+def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
+    """Prismatic joints of a URDF."""
+    kinds = {name: joint.shortname() for name, joint in zip(bodies.model.names, bodies.model.joints, strict=True)}
+    return tuple(joint for joint in bodies.free if kinds[joint].startswith("JointModelP"))
+
+
+def _in_si(
+    held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, units: tuple[str, ...]
+) -> tuple[HeldJoint, ...]:
+    """Joints that are held, their positions in rad and m: they are measured in the unit of others of their kind."""
+    of_kind = {joint in tree.slides: unit for joint, unit in zip(tree.joints, units, strict=True)}
+    slides = _slides(bodies)
+    unit = {h.joint: of_kind.get(h.joint in slides, "m" if h.joint in slides else "rad") for h in held}
+    return tuple(replace(h, position=h.position * si_factor(unit[h.joint])) for h in held)
+
+
+def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:
+    """Sentences about mimic joints that move with the robot's."""
+    return tuple(f"{name} follows {f.leader}" for name, f in bodies.followers.items() if f.leader in joints)
+
+
 def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     """Whose stamps the joints' samples have; the finer encoders tell."""
     chosen = roles.link_encoder or roles.motor_encoder
@@ -179,33 +232,13 @@ def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
 
 
-def _tree(urdf: Path, joints: tuple[str, ...]) -> tuple[RigidTree, bool]:
-    """The bodies, and whether they have masses."""
-    gravity = np.array(GRAVITY)
+def _masses(urdf: Path, joints: tuple[str, ...]) -> tuple[bool, str]:
+    """Whether the bodies have masses, and what is wrong if not."""
     try:
-        return RigidTree(urdf, joints, gravity), True
-    except RobotError:
-        return RigidTree(urdf, joints, gravity, inertias=False), False
-
-
-def _position_units(tree: RigidTree, roles: Roles) -> tuple[str, ...]:
-    """Degrees, or millimetres, where joints that turn, or slide, go far beyond the limits of the URDF."""
-    names = roles.motor_encoder.names or roles.joints
-    span = np.ptp(roles.motor_encoder.signal.stream(names).values, axis=0)
-    beyond = span > 5.0 * (tree.limits[:, 1] - tree.limits[:, 0])
-    slides = np.isin(tree.joints, tree.slides)
-    turning, sliding = "deg" if np.any(beyond & ~slides) else "rad", "mm" if np.any(beyond & slides) else "m"
-    return tuple(sliding if slide else turning for slide in slides)
-
-
-def _noises(chosen: Chosen, roles: Roles, units: tuple[str, ...]) -> tuple[NoiseGuess, ...]:
-    """Noise of each joint's encoder; those that measure in the same unit have the same."""
-    stream = _stream(chosen, roles.joints)
-    by_unit = {
-        unit: guess_noise(stream.times, stream.values[:, [j for j, u in enumerate(units) if u == unit]], unit)
-        for unit in dict.fromkeys(units)
-    }
-    return tuple(by_unit[unit] for unit in units)
+        RigidTree(urdf, joints, np.array(GRAVITY))
+    except RobotError as err:
+        return False, str(err)
+    return True, ""
 
 
 def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
@@ -213,14 +246,15 @@ def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float | Array = 1.0
 
 
 def _gyros(
-    tree: RigidTree, encoder: Stream, imus: Sequence[Signal], streams: Sequence[Stream]
+    tree: RigidTree, encoder: Stream, imus: Sequence[Signal], streams: Sequence[Stream], signs: SignGuess
 ) -> tuple[list[GuessedGyro], list[str]]:
     """Gyroscopes with their links, and a sentence for each one that is on none."""
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
     found: list[GuessedGyro] = []
     left_out = []
     for signal, stream in zip(imus, streams, strict=True):
-        mount = find_mount(tree, motion, stream)
+        seen = seen_rate(motion, stream, ENOUGH)
+        mount = None if seen is None else find_mount(tree, seen, mirrored=signs.mirrored)
         if mount is None:
             left_out.append(f"{signal.topic}: stands still, or no link turns like it")
             continue

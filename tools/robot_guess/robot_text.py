@@ -12,7 +12,9 @@ import numpy as np
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.units import joined, of_slide, si_factor, si_unit
 from jointscope.tools.robot_guess.drive_values import EXPLAINED, DriveValues
-from jointscope.tools.robot_guess.gyro_mount import Mount, SignGuess
+from jointscope.tools.robot_guess.gyro_mount import Mount
+from jointscope.tools.robot_guess.joint_signs import SignGuess
+from jointscope.tools.robot_guess.other_joints import NOT_THERE, HeldJoint
 from jointscope.tools.robot_guess.robot_guess import SUPPLY, GuessedGyro, RobotGuess
 from jointscope.tools.robot_guess.roles import Chosen
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
@@ -25,6 +27,7 @@ VISCOUS_EFFECT = ("N m", "A")  # units of commands whose viscous friction is an 
 ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
 SPREAD, LOST_SPREAD = 2.0, 5.0  # [value] priors of logarithms: a factor 7, or 150, either way
 NO_PULL = 10.0  # times wider, about zero
+RESERVED = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -55,7 +58,9 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         f"name: {_plain(guess.name)}",
         f"urdf: {_plain(urdf)}",
         _line(f"gravity: {_list(guess.gravity)}", f"[m/s^2] in the base frame; {_gravity(guess)}", sure=False),
-        _line(f"joints: {_list(joints)}", "moving joints of the URDF that the recording shows"),
+        _line(f"joints: {_list(joints)}", "joints of the URDF that move and are driven in the recording"),
+        *(f"# {text}" for text in guess.following),
+        *_held(guess.held),
         "",
         "model:",
         *_model(free, tuple(joint for joint in joints if joint not in guess.elastic)),
@@ -67,7 +72,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *_motor_encoder(guess),
         *_link_encoder(guess),
         *(_torque(guess) if free else ()),
-        *(line for gyro in guess.gyros for line in _gyro(gyro)),
+        *(line for gyro in guess.gyros for line in _gyro(gyro, guess)),
         *(f"  # not used: {text}" for text in guess.left_out),
         "",
         *_effects(guess),
@@ -75,6 +80,21 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *([] if free else _noise(len(joints))),
     ]
     return "\n".join(lines) + "\n"
+
+
+def locked_line(guess: RobotGuess) -> str:
+    """One line for the screen about joints that are held; empty if there are none."""
+    ways = (
+        ("stand still in the recording", [h for h in guess.held if h.seen and not h.on_word]),
+        ("held at their mean on your word", [h for h in guess.held if h.on_word]),
+        (NOT_THERE, [h for h in guess.held if not h.seen]),
+    )
+    parts = [
+        ", ".join(f"{h.joint} {h.position:.4g}" if h.seen else h.joint for h in held) + f" ({why})"
+        for why, held in ways
+        if held
+    ]
+    return f"locked: {'; '.join(parts)}" if parts else ""
 
 
 def guesses(text: str) -> list[str]:
@@ -104,6 +124,19 @@ def _model(free: bool, rigid_joints: tuple[str, ...]) -> list[str]:
     return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", *rigid]
 
 
+def _held(held: tuple[HeldJoint, ...]) -> list[str]:
+    """Where other joints stand."""
+    if not held:
+        return []
+    lines = ["locked:                                          # other joints that matter, [rad] or [m]"]
+    return lines + [_line(f"{_plain(h.joint)}: {_position(h.position)}", h.reason, False, 2) for h in held]
+
+
+def _position(value: float) -> str:
+    """A position to a tenth of a milliradian or better, as YAML reads a float."""
+    return f"{value:.6f}".rstrip("0").ljust(3 + (value < 0), "0")
+
+
 def _constants(guess: RobotGuess) -> list[str]:
     if guess.command_unit[0] != "duty":
         return []
@@ -131,7 +164,15 @@ def _timing(signal: Signal) -> str:
 def _names(chosen: Chosen, joints: tuple[str, ...], indent: int) -> list[str]:
     if not chosen.names or chosen.names == joints:
         return []
-    return [_line(f"names: {_list(chosen.names)}", "in the messages, in the order of `joints`", False, indent)]
+    if not chosen.signal.names:
+        text = "places in the messages, counted from 0, in the order of `joints`"
+    elif chosen.by_order:
+        text = "nothing in common with the URDF: taken in its order, which may be wrong"
+    elif chosen.by_ending:
+        text = "in the messages, in the order of `joints`; matched by their endings"
+    else:
+        text = "in the messages, in the order of `joints`"
+    return [_line(f"names: {_list(chosen.names)}", text, False, indent)]
 
 
 def _signs(signs: Iterable[float], reason: str, indent: int) -> list[str]:
@@ -185,7 +226,7 @@ def _sigma(noise: NoiseGuess, unit: str) -> str:
 
 def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
     """The line with the noise of encoders, a list where they measure in different units."""
-    if len(set(units)) == 1:
+    if len(set(units)) == len(set(noises)) == 1:
         return _sigma(noises[0], units[0])
     values = [f"{_number(si_factor(unit) * (n.sigma or 1e-4))}" for n, unit in zip(noises, units, strict=True)]
     reasons = "; ".join(dict.fromkeys(n.reason for n in noises))
@@ -209,11 +250,15 @@ def _link_encoder(guess: RobotGuess) -> list[str]:
 def _encoder(
     kind: str, chosen: Chosen, guess: RobotGuess, signs: str, noise: tuple[NoiseGuess, ...], zero: list[str]
 ) -> list[str]:
-    units = guess.position_units
+    units = guess.position_units.units
+    unit = units[0] if len(set(units)) == 1 else _list(units)
+    source = _source(chosen.signal, unit)
+    if guess.position_units.reason:
+        source[-1] = _line(f"unit: {unit}", guess.position_units.reason, False, 4)
     return [
         f"  {kind}:",
         _line(f"kind: {kind}", chosen.reason, chosen.sure, 4),
-        *_source(chosen.signal, units[0] if len(set(units)) == 1 else _list(units)),
+        *source,
         *_names(chosen, guess.roles.joints, 4),
         *_wraps(chosen),
         *_stamps(chosen, guess),
@@ -237,7 +282,7 @@ def _torque(guess: RobotGuess) -> list[str]:
     ]
 
 
-def _gyro(gyro: GuessedGyro) -> list[str]:
+def _gyro(gyro: GuessedGyro, guess: RobotGuess) -> list[str]:
     mount = gyro.mount
     R = [[round(float(x), 4) + 0.0 for x in row] for row in mount.R_imu_body]
     return [
@@ -248,10 +293,21 @@ def _gyro(gyro: GuessedGyro) -> list[str]:
         "    form: full",
         _sigma(gyro.noise, mount.unit),
         "    bias: {value: [0.0, 0.0, 0.0], prior_sigma: 0.1}",
+        *_handed(mount, guess.encoder_signs),
         _line("R_imu_body:", _turned(mount), False, 4),
         f"      value: [{', '.join(_list(row) for row in R)}]",
         "      prior_sigma: 0.1",
     ]
+
+
+def _handed(mount: Mount, signs: SignGuess) -> list[str]:
+    if not mount.left_handed:
+        return []
+    text = "only a reflection explains it; x is turned, then R_imu_body holds"
+    if signs.others:
+        others = " or ".join(_list(other) for other in signs.others)
+        text += f"; as well: no reflection, but `scale: {others}` of command and encoder, joints that count backwards"
+    return [_line("left_handed: true", text, False, 4)]
 
 
 def _seat(mount: Mount) -> str:
@@ -369,7 +425,13 @@ def _number(value: float, digits: int = 3) -> str:
 
 def _plain(text: str) -> str:
     """A text as YAML reads it back."""
-    simple = re.fullmatch(r"[A-Za-z_/.][\w./:-]*", text) and text.lower() not in ("yes", "no", "true", "false", "null")
+    simple = re.fullmatch(r"[A-Za-z_/.]([\w./-]|:(?=\S))*", text) and text.lower() not in (
+        "yes",
+        "no",
+        "true",
+        "false",
+        "null",
+    )
     return text if simple else "'" + text.replace("'", "''") + "'"
 
 

@@ -1,25 +1,43 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which signal drives the motors, which ones measure them: by type, by name, by whether it moves.
 
-Every choice keeps its reason, for the user to agree or not.
+The joints of the robot are those that move and are driven. Every choice keeps its reason, for the user to agree or not.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.wrapped_counter import continued, wrapping_jump
+from jointscope.tools.robot_guess.joint_names import match_names
+from jointscope.tools.robot_guess.known_fields import IMU
 from jointscope.tools.robot_guess.signals import Signal
+from jointscope.tools.robot_guess.standing import Stance, stances
 
-COMMAND = re.compile(r"command|cmd|desired|target|setpoint|reference|goal")
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
-IMU = "sensor_msgs/msg/Imu"
+DRIVEN = re.compile(r"effort|torque|current|duty|pwm|volt")
 TURNS = (2.0 * np.pi, 360.0, 1.0)  # periods of counters, in rad, degrees, turns
 NEAR_A_TURN = 0.1  # relative; the joint moves on while its counter jumps
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What the user said.
+
+    Attributes:
+        joints: those to use; empty for all that move and are driven.
+        names: what messages call some of them, where that is not to be guessed.
+        locked: joints to hold at their mean although they move.
+    """
+
+    joints: tuple[str, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+    locked: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -28,10 +46,13 @@ class Chosen:
 
     Attributes:
         signal: where it is.
-        names: joint names in the messages, one per joint of the robot; empty where the messages name none.
+        names: joint names in the messages, one per joint of the robot; places, counted from 0, where the messages
+            name none, and empty where those are all places in order.
         reason: why this one.
         sure: whether nothing else could be meant.
         wraps: period after which its counter begins anew, in the unit of the bag; the signal is continued already.
+        by_ending: joints whose names are not those of the URDF.
+        by_order: whether the names have nothing in common with those of the URDF and are taken in its order.
     """
 
     signal: Signal
@@ -39,6 +60,8 @@ class Chosen:
     reason: str
     sure: bool
     wraps: float = 0.0
+    by_ending: tuple[str, ...] = ()
+    by_order: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,10 +69,12 @@ class Roles:
     """Who is who.
 
     Attributes:
-        joints: joints of the URDF that the bag shows, base to tip.
+        joints: joints of the URDF that the bag shows moving and driven, base to tip.
         motor_encoder, command: as a robot file needs them.
         link_encoder, joint_torque: where there are any.
         imus: gyroscopes, in the order of the bag.
+        stances: joints of the URDF that the bag knows, and whether they move.
+        driven: joints whose command or measured effort varies.
     """
 
     joints: tuple[str, ...]
@@ -58,105 +83,311 @@ class Roles:
     link_encoder: Chosen | None
     joint_torque: Chosen | None
     imus: tuple[Signal, ...]
+    stances: Mapping[str, Stance] = field(default_factory=dict)
+    driven: tuple[str, ...] = ()
 
 
-def assign_roles(signals: list[Signal], urdf_joints: tuple[str, ...], wanted: tuple[str, ...] = ()) -> Roles:
+@dataclass(frozen=True)
+class _Named:
+    """A signal and what it calls the joints of the URDF; who else could be meant, if that is not clear."""
+
+    signal: Signal
+    names: Mapping[str, str]
+    by_ending: tuple[str, ...] = ()
+    unclear: str = ""
+    turns: Mapping[str, float] = field(default_factory=dict)
+    by_order: bool = False
+
+    def chosen(self, joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
+        """The signal in a role."""
+        names = tuple(self.names[joint] for joint in joints)
+        turn = max((self.turns.get(name, 0.0) for name in names), default=0.0)
+        if not self.signal.names and names == tuple(map(str, range(self.signal.values.shape[1]))):
+            names = ()
+        by_ending = tuple(joint for joint in joints if joint in self.by_ending)
+        return Chosen(self.signal, names, reason, sure, turn, by_ending, self.by_order)
+
+    def varies(self, joint: str) -> bool:
+        """Whether a joint has samples that differ."""
+        if joint not in self.names:
+            return False
+        column = self.signal.columns((self.names[joint],))[:, 0]
+        good = column[np.isfinite(column)]
+        return bool(len(good) > len(column) / 2 and np.ptp(good) > 0)
+
+
+def assign_roles(
+    signals: list[Signal],
+    urdf_joints: tuple[str, ...],
+    slides: Sequence[str] = (),
+    wish: Wish | None = None,
+    linked: bool = False,
+) -> Roles:
     """Gives every role its signal.
 
     Args:
         signals: of the bag.
         urdf_joints: moving joints of the URDF, base to tip.
-        wanted: joints that the user named; those that the bag shows moving if empty.
+        slides: those of them that are prismatic.
+        wish: what the user said.
+        linked: without masses, joints that have no encoder on their link show nothing of their transmission; those
+            that have one are the robot's, if there are any.
 
     Raises:
-        RecordingError: no positions, no joints of the URDF, or nothing that drives the motors.
+        RecordingError: no positions, no joints of the URDF, nothing that moves, or nothing that drives the motors.
     """
-    positions = [s for s in signals if s.field == "position" and not COMMAND.search(s.topic.lower())]
+    wish = wish or Wish()
+    _check_wish(wish, urdf_joints)
+    positions = [s for s in signals if s.quantity == "position" and not s.commanded]
     if not positions:
-        raise RecordingError("the bag holds no joint positions (sensor_msgs/msg/JointState besides commands)")
-    motor_side = [s for s in positions if not LINK_SIDE.search(s.topic.lower())]
-    link_side = [s for s in positions if LINK_SIDE.search(s.topic.lower())]
+        raise RecordingError(
+            "the bag holds no joint positions; expected sensor_msgs/msg/JointState.position or the state of a "
+            "controller, besides commands"
+        )
+    named = [_named(s, urdf_joints, wish) for s in positions]
+    link_side = [n for n in named if LINK_SIDE.search(n.signal.topic.lower())]
     # encoders whose topics say nothing else sit on the motors
-    motors = (motor_side or positions)[0]
-    joints, names = _joints(motors, link_side, urdf_joints, wanted)
-    rivals = [s.topic for s in motor_side[1:]]
-    reason = f"also there: {', '.join(rivals)}" if rivals else "the positions that are not those of links or commands"
-    encoder = _encoder(motors, names, joints, reason, sure=not rivals)
-    links = next((s for s in link_side if s is not motors and s.moving(names)), None)
-    said = "its topic speaks of links or loads"
-    link = None if links is None else _encoder(links, names, joints, said, sure=False)
-    torque = next((s for s in signals if s.field == "effort" and links and s.topic == links.topic), None)
+    candidates = [n for n in named if n not in link_side] or named
+    seen = [_stances(n, slides) for n in candidates]
+    best = max(range(len(candidates)), key=lambda k: (_count(seen[k]), -k))
+    motors, stance = candidates[best], {joint: s for found in (*seen[::-1], seen[best]) for joint, s in found.items()}
+    _need_joints(motors, urdf_joints, stance)
+    drive, reason, sure = _drive(signals, motors, urdf_joints, stance, wish)
+    joints = _joints(motors, drive, stance, urdf_joints, wish)
+    if linked and not wish.joints:
+        seen_twice = [joint for joint in joints if any(n.varies(joint) for n in link_side if n is not motors)]
+        joints = tuple(seen_twice) or joints
+    rivals = [n.signal.topic for k, n in enumerate(candidates) if k != best]
+    encoder = _encoder(motors, joints, _why(rivals), sure=not rivals)
+    links = next((n for n in link_side if n is not motors and all(n.varies(joint) for joint in joints)), None)
+    link = None if links is None else _encoder(links, joints, "its topic speaks of links or loads", sure=False)
     return Roles(
         joints=joints,
         motor_encoder=encoder,
-        command=_drive(signals, motors, names),
+        command=drive.chosen(joints, reason, sure),
         link_encoder=link,
-        joint_torque=_torque(torque, names),
+        joint_torque=_torque(signals, link_side, urdf_joints, wish, joints),
         imus=tuple(s for s in signals if s.msgtype == IMU),
+        stances=stance,
+        driven=tuple(joint for joint in urdf_joints if drive.varies(joint)),
     )
 
 
-def _encoder(signal: Signal, names: tuple[str, ...], joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
-    """An encoder; one whose counter begins anew after a turn is continued."""
-    columns = signal.columns(names or joints)
-    jump = max(wrapping_jump(signal.times, column) for column in columns.T)
-    turn = next((turn for turn in TURNS if abs(jump / turn - 1.0) < NEAR_A_TURN), 0.0)
-    if turn:
-        signal = replace(signal, values=continued(signal.values, turn))
-    return Chosen(signal, names, reason, sure, turn)
+def _check_wish(wish: Wish, urdf_joints: tuple[str, ...]) -> None:
+    for option, names in (("--joints", wish.joints), ("--lock", wish.locked)):
+        unknown = [name for name in names if name not in urdf_joints]
+        if unknown:
+            raise RecordingError(
+                f"{option}: the URDF has no moving joint {unknown[0]!r}; it has {', '.join(urdf_joints)}"
+            )
+    both = [name for name in wish.locked if name in wish.joints]
+    if both:
+        raise RecordingError(f"{both[0]} stands under --joints and under --lock; expected one of them")
+
+
+def _named(signal: Signal, urdf_joints: tuple[str, ...], wish: Wish) -> _Named:
+    """Which columns of a signal belong to which joints; by place only where the messages name none."""
+    turns = _turns(signal) if signal.quantity == "position" else {}
+    signal = _continued(signal, turns)
+    said = {joint: name for joint, name in wish.names.items() if name in signal.names}
+    if not signal.names:
+        candidates = tuple(joint for joint in urdf_joints if not wish.joints or joint in wish.joints)
+        fits = next((c for c in (candidates, urdf_joints) if len(c) == signal.values.shape[1]), ())
+        return _Named(signal, {joint: str(place) for place, joint in enumerate(fits)}, turns=turns)
+    left = [joint for joint in urdf_joints if joint not in said]
+    rest = [name for name in signal.names if name not in said.values()]
+    # a name that several joints could have belongs to the one that the user named
+    match = match_names(left, rest)
+    if match.ambiguous and wish.joints:
+        match = match_names([joint for joint in left if joint in wish.joints], rest)
+    names = {**match.found, **said}
+    strangers = not names and not match.ambiguous
+    candidates = tuple(joint for joint in urdf_joints if not wish.joints or joint in wish.joints)
+    if strangers and len(candidates) == len(signal.names):
+        by_order = dict(zip(candidates, signal.names, strict=True))
+        return _Named(signal, by_order, candidates, "", turns, by_order=True)
+    return _Named(signal, names, match.alike, _unclear(signal, match.ambiguous), turns)
+
+
+def _unclear(signal: Signal, ambiguous: Sequence[tuple[str, tuple[str, ...]]]) -> str:
+    """A complaint about a moving joint that could be several; empty where there is none."""
+    for name, others in ambiguous:
+        known = name in signal.names
+        columns = signal.columns((name,) if known else others)
+        if not np.any(np.nanmax(columns, axis=0) > np.nanmin(columns, axis=0)):
+            continue
+        joint, in_bag = (others[0], name) if known else (name, others[0])
+        here, there = (signal.topic, "the URDF") if known else ("the URDF", signal.topic)
+        return (
+            f"{name} of {here} could be {' or '.join(others)} of {there}; say which, as in "
+            f"--joints {joint}={in_bag}, with all joints that the robot shall have"
+        )
+    return ""
+
+
+def _turns(signal: Signal) -> dict[str, float]:
+    """Periods of counters that begin anew, by the name or place of their column."""
+    labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
+    jumps = {label: wrapping_jump(signal.times, column) for label, column in zip(labels, signal.values.T, strict=True)}
+    found = {
+        label: next((turn for turn in TURNS if abs(jump / turn - 1.0) < NEAR_A_TURN), 0.0)
+        for label, jump in jumps.items()
+    }
+    return {label: turn for label, turn in found.items() if turn}
+
+
+def _continued(signal: Signal, turns: Mapping[str, float]) -> Signal:
+    if not turns:
+        return signal
+    labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
+    columns = [
+        continued(signal.values[:, [k]], turns[label]) if label in turns else signal.values[:, [k]]
+        for k, label in enumerate(labels)
+    ]
+    return replace(signal, values=np.hstack(columns))
+
+
+def _stances(named: _Named, slides: Sequence[str]) -> dict[str, Stance]:
+    """How the joints of a position signal behave."""
+    joints = {name: joint for joint, name in named.names.items()}
+    found = stances(named.signal, tuple(joints), [joint in slides for joint in joints.values()])
+    return {joints[name]: stance for name, stance in found.items()}
+
+
+def _count(stance: Mapping[str, Stance]) -> tuple[int, int]:
+    return sum(s.moves for s in stance.values()), len(stance)
+
+
+def _why(rivals: Sequence[str]) -> str:
+    return f"also there: {', '.join(rivals)}" if rivals else "the positions that are not those of links or commands"
+
+
+def _need_joints(motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance]) -> None:
+    """Complains where the positions belong to no joint of the URDF, or none of them moves.
+
+    Raises:
+        RecordingError: it is so.
+    """
+    signal = motors.signal
+    if motors.unclear:
+        raise RecordingError(motors.unclear)
+    if not motors.names and signal.names:
+        raise RecordingError(
+            f"{signal.topic} names {', '.join(signal.names)}, the URDF has {', '.join(urdf_joints)}: none in common; "
+            "say who is who, as in --joints "
+            + ",".join(f"{j}={n}" for j, n in zip(urdf_joints, signal.names, strict=False))
+        )
+    if not motors.names:
+        width = signal.values.shape[1]
+        raise RecordingError(
+            f"{signal.topic} names no joints and has {width} columns for {len(urdf_joints)} joints of the URDF "
+            f"({', '.join(urdf_joints)}); choose {width} of them with --joints"
+        )
+    if not any(s.moves for s in stance.values()):
+        spans = ", ".join(f"{joint} {s.span:.2g}" for joint, s in stance.items())
+        raise RecordingError(
+            f"no joint moves in the recording (they span {spans} in the unit of the bag); record a motion of the "
+            "joints that shall be calibrated"
+        )
 
 
 def _joints(
-    motors: Signal, link_side: list[Signal], urdf_joints: tuple[str, ...], wanted: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Joints of the robot and their names in the messages."""
-    unknown = [name for name in wanted if name not in urdf_joints]
-    if unknown:
-        raise RecordingError(f"--joints: the URDF has no moving joint {unknown[0]!r}; it has {', '.join(urdf_joints)}")
-    candidates = tuple(name for name in urdf_joints if not wanted or name in wanted)
-    if not motors.names:
-        if motors.values.shape[1] != len(candidates):
-            raise RecordingError(
-                f"{motors.topic} names no joints and has {motors.values.shape[1]} columns for {len(candidates)} joints "
-                f"of the URDF ({', '.join(candidates)}); choose them with --joints"
-            )
-        return candidates, ()
-    shown = tuple(name for name in candidates if name in motors.names)
-    if not shown and len(motors.names) == len(candidates):
-        return candidates, motors.names  # other names, as many: in the same order
-    if not shown:
+    motors: _Named,
+    drive: _Named,
+    stance: Mapping[str, Stance],
+    urdf_joints: tuple[str, ...],
+    wish: Wish,
+) -> tuple[str, ...]:
+    """Joints of the robot: those that move and are driven, or those of them that the user named."""
+    here = [joint for joint in urdf_joints if joint in motors.names and joint in stance and joint not in wish.locked]
+    missing = [joint for joint in wish.joints if joint not in here]
+    if missing:
         raise RecordingError(
-            f"{motors.topic} names {', '.join(motors.names)}, the URDF has {', '.join(candidates)}: none in common; "
-            "rename one of them, or choose as many joints as the bag has with --joints"
+            f"--joints: {motors.signal.topic} has no positions of {missing[0]}; it names "
+            f"{', '.join(motors.names.values())}"
         )
-    # encoders on links may be fewer than motors; without them those joints show nothing of their transmission
-    seen = [s for s in link_side if s.names]
-    with_links = tuple(name for name in shown if any(s.moving((name,)) for s in seen))
-    kept = with_links if with_links and not wanted else shown
-    return kept, kept
+    idle = [joint for joint in wish.joints if stance[joint].moves and not drive.varies(joint)]
+    if idle:
+        raise RecordingError(
+            f"--joints: nothing drives {', '.join(idle)}: {drive.signal.topic} has no varying command for it; leave it "
+            "out, or hold it at its mean with --lock"
+        )
+    driven = [joint for joint in here if stance[joint].moves and drive.varies(joint)]
+    if wish.joints:
+        found = tuple(joint for joint in driven if joint in wish.joints)
+        if not found:
+            raise RecordingError(f"--joints: {', '.join(wish.joints)} stand still in the recording; expected motion")
+        return found
+    return tuple(driven)
 
 
-def _drive(signals: list[Signal], motors: Signal, names: tuple[str, ...]) -> Chosen:
-    """What acts on the motors: a commanded effort, else one that was measured."""
-    efforts = [s for s in signals if s.field == "effort" and s.moving(names)]
-    commanded = [s for s in efforts if COMMAND.search(s.topic.lower())]
-    if commanded:
-        return Chosen(commanded[0], names, "its topic speaks of commands", sure=len(commanded) == 1)
-    measured = [s for s in efforts if s.topic == motors.topic]
-    if measured:
-        reason = "no effort was commanded: the effort that the motors report drives the model"
-        return Chosen(measured[0], names, reason, sure=False)
-    arrays = [s for s in signals if s.field == "data" and s.values.shape[1] == len(names or motors.values[0])]
-    named = [s for s in arrays if COMMAND.search(s.topic.lower()) or "effort" in s.topic.lower()]
-    if named:
-        return Chosen(named[0], (), "an array with one value per joint, named like a command", sure=False)
+def _encoder(named: _Named, joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
+    """An encoder; one that has no names is a guess, too."""
+    chosen = named.chosen(joints, reason, sure)
+    if named.signal.names:
+        return chosen
+    return replace(chosen, reason=f"{reason}; its columns are taken in the order of the URDF", sure=False)
+
+
+def _drive(
+    signals: list[Signal], motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance], wish: Wish
+) -> tuple[_Named, str, bool]:
+    """What acts on the motors, why, and whether nothing else could: a commanded effort, else a measured one.
+
+    Raises:
+        RecordingError: there is none, or it is not clear whom it drives.
+    """
+    moving = tuple(joint for joint in urdf_joints if joint in stance and stance[joint].moves)
+    efforts = [s for s in signals if s.quantity == "effort"]
+    commanded = [s for s in efforts if s.commanded]
+    measured = [s for s in efforts if not s.commanded and not LINK_SIDE.search(s.topic.lower())]
+    beside = [s for s in measured if s.topic == motors.signal.topic]
+    arrays = [s for s in signals if s.quantity == "numbers" and (s.commanded or DRIVEN.search(s.topic.lower()))]
+    ways = (
+        (commanded, "its topic or field speaks of commands", True),
+        (arrays, "an array with one value per joint, named like a command", False),
+        (beside, "no effort was commanded: the effort that the motors report drives the model", False),
+        (measured, "no effort was commanded: a measured one drives the model", False),
+    )
+    for candidates, reason, sure in ways:
+        named = [_driving(s, motors, urdf_joints, moving, wish) for s in candidates]
+        counts = [sum(n.varies(joint) for joint in moving) for n in named]
+        if not any(counts):
+            continue
+        found = named[int(np.argmax(counts))]
+        if found.unclear:
+            raise RecordingError(found.unclear)
+        if not found.signal.names:
+            reason, sure = f"{reason}; it names no joints, its columns are taken in the order of the URDF", False
+        return found, reason, sure and sum(count == max(counts) for count in counts) == 1
     raise RecordingError(
-        "nothing in the bag drives the motors: no effort on a command topic nor with the joint positions; record the "
-        "duty cycle, voltage or torque (JointState.effort) beside the positions"
+        "nothing in the bag drives the motors: no effort on a command topic nor with the joint positions that varies "
+        f"for {', '.join(moving)}; record the duty cycle, voltage or torque (JointState.effort) beside the positions"
     )
 
 
-def _torque(signal: Signal | None, names: tuple[str, ...]) -> Chosen | None:
-    if signal is None or not signal.moving(names):
-        return None
-    return Chosen(signal, names, "efforts beside the positions of the links", sure=False)
+def _driving(
+    signal: Signal, motors: _Named, urdf_joints: tuple[str, ...], moving: tuple[str, ...], wish: Wish
+) -> _Named:
+    """What a command calls the joints; one without names has as many columns as the encoder, or as joints move."""
+    if signal.names:
+        return _named(signal, urdf_joints, wish)
+    shown = tuple(joint for joint in urdf_joints if joint in motors.names)
+    chosen = tuple(joint for joint in urdf_joints if joint in wish.joints)
+    fits = next((c for c in (chosen, shown, moving, urdf_joints) if len(c) == signal.values.shape[1]), ())
+    if signal.topic == motors.signal.topic and not motors.signal.names:
+        return _Named(signal, motors.names)  # of the same message, in the same order
+    return _Named(signal, {joint: str(place) for place, joint in enumerate(fits)})
+
+
+def _torque(
+    signals: list[Signal], link_side: list[_Named], urdf_joints: tuple[str, ...], wish: Wish, joints: tuple[str, ...]
+) -> Chosen | None:
+    """Torques that are measured behind the motors."""
+    topics = [n.signal.topic for n in link_side]
+    for signal in signals:
+        if signal.quantity == "effort" and signal.topic in topics:
+            named = _named(signal, urdf_joints, wish)
+            if all(named.varies(joint) for joint in joints):
+                return named.chosen(joints, "efforts beside the positions of the links", False)
+    return None

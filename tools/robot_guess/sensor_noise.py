@@ -1,24 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Noise of a sensor from its own samples: the step of a counter, or how badly neighbours predict a sample.
+"""Noise of a sensor from its own samples: the step of a counter, or what no smooth motion explains.
 
-A smooth motion lies near the cubic through two samples on either side; what remains is noise. The cubic is that of the
-true times, so irregular sampling does not look like noise.
+Divided differences of order m at the true times of the samples leave nothing of a polynomial of lower order, so
+irregular sampling does not look like noise, and white noise gives each of them the variance sigma^2 sum w_i^2. The
+higher the order, the less of a fast motion remains at a low rate; of white noise, all orders leave the same. So the
+lowest order counts that leaves hardly more than the best one, in the quieter stretches.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import comb
+from scipy.stats import chi2
 
 Array = NDArray[np.float64]
 
 WHOLE = 0.02  # [step] how near to whole numbers of steps the samples of a counter are
 MOST_WHOLE = 0.98  # share of the samples that must be
-WINDOW = 100  # samples of one stretch
-QUIET = 0.25  # share of the stretches that are quieter than the one that counts
 FEWEST_LEVELS = 20  # a counter that was never at more values than these says nothing about its step
+WINDOW, STRETCHES = (20, 100), 12  # samples of one stretch, least and most; how many stretches there should be
+QUIET = 0.25  # share of the stretches that are quieter than the one that counts
+ORDERS = (2, 4, 6, 8, 10, 12)
+ALIKE = 1.15  # ratio up to which two orders show the same noise
+REPEATS = 0.35  # share of samples that repeat the one before, from which a driver is faster than its device
+ROUNDING = 1.3  # times a step over sqrt(12) that differences may show of rounding alone
+FINEST = 1e-6  # of the range; no sensor is known to be better
+SINGLE = 2.0**-24  # relative rounding error of single precision
 
 
 @dataclass(frozen=True)
@@ -38,10 +50,26 @@ def guess_noise(times: Array, values: Array, unit: str) -> NoiseGuess:
         unit: for the reason.
     """
     step = max((_step(column) for column in values.T), default=0.0)
-    rough = max((_roughness(times, column) for column in values.T), default=0.0)
-    if step / np.sqrt(12.0) >= rough and step > 0.0:
+    rough = max(column_noise(times, values), default=0.0)
+    # rounding is not quite white, so it looks somewhat rougher than it is
+    if step > 0.0 and rough < ROUNDING * step / np.sqrt(12.0):
         return NoiseGuess(float(step / np.sqrt(12.0)), f"steps of {step:.3g} {unit} over sqrt(12)")
-    return NoiseGuess(rough, "what remains beside the cubic through neighbouring samples in quiet stretches")
+    floor, reason = _floor(values)
+    if rough < floor:
+        return NoiseGuess(floor, f"no noise to be seen: {reason}")
+    return NoiseGuess(rough, "what no smooth motion explains, in quiet stretches")
+
+
+def _floor(values: Array) -> tuple[float, str]:
+    """The least noise that makes sense, and why."""
+    good = values[np.isfinite(values)]
+    if not len(good) or not np.ptp(good):
+        return 0.0, ""
+    least = FINEST * float(np.ptp(values, axis=0).max())
+    rounding = SINGLE * float(np.abs(good).max()) if np.array_equal(good, good.astype(np.float32)) else 0.0
+    if rounding > least:
+        return rounding, "rounding of single precision"
+    return least, "one millionth of the range"
 
 
 def _step(values: Array) -> float:
@@ -62,13 +90,59 @@ def _step(values: Array) -> float:
     return step if len(alike) > 3 and whole.mean() > MOST_WHOLE else 0.0
 
 
-def _roughness(times: Array, values: Array) -> float:
+def column_noise(times: Array, values: Array) -> list[float]:
+    """Standard deviation of the white noise of each column, 0 where none is seen.
+
+    Args:
+        times: strictly increasing, shape (n,) [s].
+        values: finite samples, shape (n, m).
+    """
+    weights = {order: _weights(times, order) for order in ORDERS if len(times) > 2 * order}
+    return [_roughness(times, column, weights) for column in values.T]
+
+
+def _roughness(times: Array, values: Array, weights: Mapping[int, Array]) -> float:
     """Standard deviation of white noise, from the quieter stretches."""
-    rest = beside_cubics(times, values)
-    count = max(len(rest) // WINDOW, 1)
-    by_window = np.array([np.sqrt(part.mean()) for part in np.array_split(rest, count) if len(part)])
-    alive = by_window[by_window > 0.0]
-    return float(np.quantile(alive, QUIET)) if len(alive) else 0.0
+    fresh = np.concatenate([[True], np.diff(values) != 0.0]) if len(values) else np.zeros(0, bool)
+    if 1.0 - fresh.mean() > REPEATS and np.count_nonzero(fresh) > 2 * FEWEST_LEVELS and not _step(values):
+        times, values = times[fresh], values[fresh]
+        weights = {order: _weights(times, order) for order in ORDERS if len(times) > 2 * order}
+    found = [_from_order(values, order, weight) for order, weight in weights.items()]
+    alive = [sigma for sigma in found if sigma > 0.0]
+    return next((sigma for sigma in alive if sigma < ALIKE * min(alive)), 0.0)
+
+
+def _from_order(values: Array, order: int, weight: Array) -> float:
+    """Noise by differences of one order: a low quantile of the stretches, as if it were one of white noise."""
+    around = np.stack([values[i : i + len(weight)] for i in range(order + 1)], axis=1)
+    rest = np.sum(weight * (around - around[:, :1]), axis=1) ** 2
+    width = int(np.clip(len(rest) // STRETCHES, *WINDOW))
+    parts = np.array([part.mean() for part in np.array_split(rest, max(len(rest) // width, 1))])
+    parts = parts[parts > 0.0]
+    if not len(parts):
+        return 0.0
+    freedom = max(len(rest) / len(parts) / _correlated(order), 1.0)
+    share = QUIET if len(parts) > 1 else 0.5
+    return float(np.sqrt(np.quantile(parts, share) * freedom / chi2.ppf(share, freedom)))
+
+
+def _weights(times: Array, order: int) -> Array:
+    """Weights of samples in divided differences that have the variance of one sample, shape (n - order, order + 1)."""
+    count = len(times) - order
+    around = np.stack([times[i : i + count] for i in range(order + 1)], axis=1) / float(np.median(np.diff(times)))
+    weight = np.ones_like(around)
+    for i in range(order + 1):
+        for j in range(order + 1):
+            if i != j:
+                weight[:, i] /= around[:, i] - around[:, j]
+    return np.asarray(weight / np.linalg.norm(weight, axis=1, keepdims=True))
+
+
+@cache
+def _correlated(order: int) -> float:
+    """Number of differences of white noise that count as one."""
+    k = np.arange(-order, order + 1)
+    return float(np.sum((comb(2 * order, order + k) / comb(2 * order, order)) ** 2))
 
 
 def beside_cubics(times: Array, values: Array) -> Array:

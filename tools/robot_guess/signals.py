@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,17 +17,12 @@ from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.stream_notices import Timing, timing
 from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+from jointscope.tools.robot_guess.known_fields import KnownField, known_fields
 
 Array = NDArray[np.float64]
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
-FIELDS = {
-    JOINT_STATE: ("position", "effort"),
-    "sensor_msgs/msg/Imu": ("angular_velocity",),
-    "std_msgs/msg/Float64MultiArray": ("data",),
-    "std_msgs/msg/Float32MultiArray": ("data",),
-}
-"""Message types that are understood, and what of them a robot file can use."""
+COMMANDED = re.compile(r"command|cmd|desired|target|setpoint|reference|goal|(^|\.)output\.|points\.|_d$|_des$")
+"""Words in topics and fields with what a controller wants, in contrast to what is measured."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +35,7 @@ class Signal:
         times: stamps, strictly increasing, shape (n,) [s]; zero is the same for all signals of a bag.
         values: shape (n, m), in the unit of the bag.
         stamped: whether the messages carry a stamp.
+        quantity: what its field says it is: "position", "effort", "rate" or "numbers".
     """
 
     topic: str
@@ -48,30 +45,30 @@ class Signal:
     times: Array
     values: Array
     stamped: bool
+    quantity: str = ""
 
     @property
     def timing(self) -> Timing:
         """How regular it is."""
         return timing(self.times)
 
+    @property
+    def commanded(self) -> bool:
+        """Whether it says what a controller wants."""
+        return bool(COMMANDED.search(self.topic.lower()) or COMMANDED.search(self.field.lower()))
+
     def columns(self, names: tuple[str, ...]) -> Array:
-        """Values of some joints, shape (n, k); by place where the messages name none."""
-        index = [self.names.index(name) for name in names] if self.names else list(range(len(names)))
-        return self.values[:, index]
+        """Values of some joints, shape (n, k); by place, counted from 0, where the messages name none."""
+        if self.names:
+            return self.values[:, [self.names.index(name) for name in names]]
+        places = [int(name) for name in names] if all(name.isdecimal() for name in names) else list(range(len(names)))
+        return self.values[:, places]
 
     def stream(self, names: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)
         return Stream(self.topic, self.times[good], values[good], names, "")
-
-    def moving(self, names: tuple[str, ...]) -> bool:
-        """Whether every one of some joints has finite samples of which some differ."""
-        if not set(names) <= set(self.names or names) or self.values.shape[1] < len(names):
-            return False
-        values = self.columns(names)
-        good = np.isfinite(values).all(axis=1)
-        return bool(good.mean() > 0.5 and np.any(np.ptp(values[good], axis=0) > 0))
 
 
 def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
@@ -81,32 +78,48 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
         RecordingError: the bag cannot be read, or holds nothing that a robot file could use.
     """
     with open_bag(path) as bag:
-        types = {topic: bag.message_type(topic) for topic in bag.topics if _is_known(bag, topic)}
+        types = {topic: kind for topic in bag.topics if (kind := _useful_type(bag, topic)) is not None}
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
-    found = [_signal(raw[topic], kind, field, start) for topic, kind in filled.items() for field in FIELDS[kind.name]]
+    found = [
+        _signal(raw[topic], kind, known, start)
+        for topic, kind in filled.items()
+        for known in known_fields(kind, raw[topic].data[0])
+    ]
     signals = [signal for signal in found if signal is not None]
     if not signals:
-        kinds = ", ".join(FIELDS)
-        raise RecordingError(f"{path} holds no messages of {kinds}; jointscope info {path} shows what is there")
+        raise RecordingError(
+            f"{path} holds no messages with positions or efforts of joints (sensor_msgs/msg/JointState, states of "
+            f"controllers, arrays of motors); jointscope info {path} shows what is there"
+        )
     return signals
 
 
-def _is_known(bag: Bag, topic: str) -> bool:
-    return len(bag.type_names(topic)) == 1 and bag.type_names(topic)[0] in FIELDS
-
-
-def _signal(raw: RawTopic, kind: MessageType, field: str, start_ns: int) -> Signal | None:
-    """One field; None where it is empty in some messages or changes its length."""
+def _useful_type(bag: Bag, topic: str) -> MessageType | None:
+    """The type of a topic that could tell something about joints; one that cannot be understood does not."""
+    if len(bag.type_names(topic)) != 1:
+        return None
     try:
-        columns = read_columns(raw, kind, field)
+        kind = bag.message_type(topic)
     except RecordingError:
         return None
-    if columns.values.shape[1] == 0:
+    interfaces = any(name == "interface_values" for name, _ in kind.fields)
+    return kind if interfaces or known_fields(kind, None) else None
+
+
+def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) -> Signal | None:
+    """One field; None where it is empty in some messages or changes its length."""
+    try:
+        columns = read_columns(raw, kind, known.path)
+    except RecordingError:
+        return None
+    width = columns.values.shape[1]
+    names = columns.names or ()
+    if width == 0 or (names and len(names) != width) or len(set(names)) != len(names):
         return None
     stamps = raw.received_ns if columns.stamps is None else columns.stamps
     samples, _ = in_time_order(raw.name, TimedSamples(stamps, raw.received_ns, columns.values))
-    names = columns.names or ()
     times = (samples.stamps - start_ns) / 1e9
-    return Signal(raw.name, kind.name, field, names, times, samples.values, columns.stamps is not None)
+    stamped = columns.stamps is not None
+    return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity)

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.whole_file import check_outputs, whole_file, write_json
+
+if TYPE_CHECKING:
+    from jointscope.tools.robot_guess.roles import Wish
 
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
@@ -33,7 +36,15 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="ROBOT", type=Path, required=True, help="robot file to write")
     parser.add_argument("--name", default="", help="name of the robot; that of the URDF's file by default")
-    parser.add_argument("--joints", default="", metavar="A,B,...", help="joints to use, if not all that the bag shows")
+    parser.add_argument(
+        "--joints",
+        default="",
+        metavar="A,B,...",
+        help="joints to use, if not all that move and are driven; A=NAME says what the messages call joint A",
+    )
+    parser.add_argument(
+        "--lock", default="", metavar="A,B,...", help="joints to hold at their mean although they move in the bag"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
     parser.set_defaults(run=run)
 
@@ -44,28 +55,48 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
     from jointscope.tools.robot_guess.drive_table import drive_content, drive_table
+    from jointscope.tools.robot_guess.other_joints import Typed
     from jointscope.tools.robot_guess.robot_guess import guess_robot
-    from jointscope.tools.robot_guess.robot_text import guesses, robot_text
+    from jointscope.tools.robot_guess.robot_text import guesses, locked_line, robot_text
 
-    joints = [joint.strip() for joint in args.joints.split(",") if joint.strip()]
+    typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name)
     with progress_bar() as progress:
-        guess = guess_robot(args.urdf, args.bag, joints, args.name, reading(args.bag, progress))
+        guess = guess_robot(typed, reading(args.bag, progress))
         text = robot_text(guess, urdf_reference(args.urdf, args.output.parent))
         with whole_file(args.output) as unfinished:
             unfinished.write_text(text, encoding="utf-8")
             robot = load_robot(unfinished)
         description = describe_bag(args.bag, robot)
     if args.json is not None:
-        content = {"robot": str(args.output), "joints": list(guess.roles.joints), "guesses": guesses(text)}
+        content: dict[str, Any] = {
+            "robot": str(args.output),
+            "joints": list(guess.roles.joints),
+            "guesses": guesses(text),
+        }
         content["drives"] = drive_content(guess)
+        content["locked"] = {h.joint: h.position for h in guess.held}
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
-    print("\n".join(f"  {line}" for line in guesses(text)))
+    held = {h.joint for h in guess.held}
+    print("\n".join(f"  {line}" for line in guesses(text) if line.partition(":")[0].strip("'") not in held))
     print("\n".join(drive_table(guess)))
-    for line in (*(f"  not used: {text}" for text in guess.left_out), *(f"note: {n}" for n in description.notices)):
-        print(line)
+    lines = [*([locked_line(guess)] if held else []), *guess.following]
+    lines += [f"not used: {text}" for text in guess.left_out]
+    print("\n".join([*(f"  {line}" for line in lines), *(f"note: {n}" for n in description.notices)]))
     verdict = "can" if description.usable else "cannot"
     reason = "" if description.usable else f": {description.problem}"
     print(f"\nWrote {args.output}; the recording {verdict} be used with it{reason}")
     print(f"Check the lines marked GUESS, then: jointscope discover {args.output} {args.bag} --holdout-share 0.33")
     return 0
+
+
+def _wish(joints: str, locked: str) -> Wish:
+    """What the options say about joints."""
+    from jointscope.tools.robot_guess.roles import Wish
+
+    given = [part.strip().partition("=") for part in joints.split(",") if part.strip()]
+    return Wish(
+        joints=tuple(joint.strip() for joint, _, _ in given),
+        names={joint.strip(): name.strip() for joint, mark, name in given if mark},
+        locked=tuple(joint.strip() for joint in locked.split(",") if joint.strip()),
+    )

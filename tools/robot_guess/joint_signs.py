@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which way the joints' encoders count: the signs with which the gyroscopes agree, fewest turned joints first.
+
+Few joints: all patterns. Many: joint after joint, the one whose turn explains most, then pairs. Gyroscopes that stand
+still say nothing, and without any there is nothing to try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.rigid_tree import RigidTree
+from jointscope.tools.robot_guess.gyro_mount import ALIKE, SeenRate, find_mount, least_left
+
+Array = NDArray[np.float64]
+Signs = tuple[float, ...]
+
+HALF, WORTH_TURNING = 0.5, 0.1  # turned joints must leave less than this part, and that much less of the power
+ALL_PATTERNS, PAIRS = 4, 12  # joints up to which all patterns, and pairs of joints, are tried
+MOVING = 0.02  # [rad/s] rms of a joint that a gyroscope could see
+
+
+@dataclass(frozen=True)
+class SignGuess:
+    """Which way the encoders count.
+
+    Attributes:
+        signs: of the joints, 1 where nothing speaks against it, shape (n,).
+        others: other signs with which the gyroscopes agree as well, with as few turned joints.
+        mirrored: whether a gyroscope that no rotation explains shall be taken for left-handed.
+    """
+
+    signs: Signs
+    others: tuple[Signs, ...] = ()
+    mirrored: bool = True
+
+
+def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Sequence[float]) -> SignGuess:
+    """Signs of the joints by gyroscopes and drives.
+
+    A joint that counts backwards also seems to move against its command; a gyroscope whose frame is left-handed looks
+    as if an odd number of joints counted backwards, while all move with their commands.
+
+    Args:
+        tree: the robot.
+        gyros: what they and the encoders saw.
+        drives: -1 for each joint that moves against its command, as the encoders count, shape (n,).
+    """
+    found = joint_signs(tree, gyros)
+    if all(sign > 0 for sign in found.signs):
+        return found
+    by_command = tuple(float(sign) for sign in drives)
+    if by_command in (found.signs, *found.others):
+        return SignGuess(by_command, (), mirrored=False)
+    mounts = [find_mount(tree, gyro, mirrored=True) for gyro in gyros]
+    left = float(np.mean([1.0 if mount is None else mount.left for mount in mounts]))
+    if min(by_command) > 0 and left < joint_left(tree, gyros, found.signs) + ALIKE:
+        return SignGuess((1.0,) * tree.n, (found.signs, *found.others), mirrored=True)
+    return replace(found, mirrored=False)
+
+
+def joint_left(tree: RigidTree, gyros: Sequence[SeenRate], signs: Signs) -> float:
+    """Mean share of the gyroscopes' power that remains with some signs."""
+    return _Left(tree, gyros).of(signs)
+
+
+def joint_signs(tree: RigidTree, gyros: Sequence[SeenRate]) -> SignGuess:
+    """Signs of the joints that let the gyroscopes agree with the encoders."""
+    straight: Signs = (1.0,) * tree.n
+    if not gyros:
+        return SignGuess(straight)
+    left = _Left(tree, gyros)
+    as_is = left.of(straight)
+    if as_is < WORTH_TURNING:
+        return SignGuess(straight)
+    seen = _turning(tree, gyros)
+    best = _all_patterns(left, seen, straight) if len(seen) <= ALL_PATTERNS else _one_by_one(left, seen, straight)
+    least = left.of(best[0])
+    if least > HALF * as_is or as_is - least < WORTH_TURNING:
+        return SignGuess(straight)
+    return SignGuess(best[0], tuple(signs for signs in best[1:] if sum(signs) == sum(best[0])))
+
+
+class _Left:
+    """Mean share of the gyroscopes' power that remains, by pattern."""
+
+    def __init__(self, tree: RigidTree, gyros: Sequence[SeenRate]):
+        self._tree, self._gyros = tree, gyros
+        self._known: dict[Signs, float] = {}
+
+    def of(self, signs: Signs) -> float:
+        if signs not in self._known:
+            s = np.array(signs)
+            turned = (replace(gyro, q=gyro.q * s, v=gyro.v * s) for gyro in self._gyros)
+            self._known[signs] = float(np.mean([least_left(self._tree, gyro) for gyro in turned]))
+        return self._known[signs]
+
+
+def _turning(tree: RigidTree, gyros: Sequence[SeenRate]) -> tuple[int, ...]:
+    """Joints that turn, fast enough for a gyroscope to see."""
+    speed = np.sqrt(np.mean(np.vstack([gyro.v for gyro in gyros]) ** 2, axis=0))
+    return tuple(j for j in range(tree.n) if speed[j] > MOVING and tree.joints[j] not in tree.slides)
+
+
+def _all_patterns(left: _Left, joints: Sequence[int], straight: Signs) -> list[Signs]:
+    """The best patterns, fewest turned joints first."""
+    chosen = (np.flatnonzero(turned) for turned in product((False, True), repeat=len(joints)))
+    patterns = sorted((_turned(straight, [joints[int(i)] for i in which]) for which in chosen), key=lambda s: -sum(s))
+    least = min(left.of(signs) for signs in patterns)
+    return [signs for signs in patterns if left.of(signs) < least + ALIKE]
+
+
+def _one_by_one(left: _Left, joints: Sequence[int], straight: Signs) -> list[Signs]:
+    """A pattern that no further turn betters, and its equals on the last step."""
+    found = [straight]
+    while True:
+        steps = sorted(_steps(found[0], joints), key=lambda signs: -sum(signs))
+        least = min(left.of(signs) for signs in steps)
+        if least > left.of(found[0]) - ALIKE:
+            return found
+        found = [signs for signs in steps if left.of(signs) < least + ALIKE]
+
+
+def _steps(signs: Signs, joints: Sequence[int]) -> Iterator[Signs]:
+    """One joint turned; of few joints two, as well."""
+    for j in joints:
+        yield _turned(signs, (j,))
+    if len(joints) <= PAIRS:
+        for pair in combinations(joints, 2):
+            yield _turned(signs, pair)
+
+
+def _turned(signs: Signs, joints: Sequence[int]) -> Signs:
+    return tuple(-sign if j in joints else sign for j, sign in enumerate(signs))
