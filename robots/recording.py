@@ -7,7 +7,7 @@ absolute start in nanoseconds is kept so that a sample can be found again in its
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -57,7 +57,8 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "duplicate", "out_of_order", "gap", "jitter", "clipping", "dropped", "unit", "axes", "info".
+        kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "clipping",
+            "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """
@@ -81,6 +82,7 @@ class Recording:
         goal: goal positions of a position-controlled robot [rad], NaN where a drive was off; None without.
         left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
             motion do not hold there, and no model is judged by them.
+        posture: where joints stood that the robot does not model, by name [rad or m]; empty where the bag does not say.
     """
 
     path: str
@@ -90,6 +92,7 @@ class Recording:
     notices: list[Notice] = field(default_factory=list)
     goal: Stream | None = None
     left_out: tuple[tuple[float, float], ...] = ()
+    posture: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def command(self) -> Stream:
