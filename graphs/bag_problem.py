@@ -69,8 +69,9 @@ class BagProblem:
 
     @staticmethod
     def of(robot: Robot, recording: Recording) -> BagProblem:
-        """Builds the factors of a recording."""
+        """Builds the factors of a recording; its robot is in the posture of the recording."""
         robot.need_link_dynamics()
+        robot = robot.in_posture(recording.posture)
         timeline = Timeline.of(recording)
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)

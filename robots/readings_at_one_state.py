@@ -33,7 +33,7 @@ class ReadingsAtOneState:
     def __init__(self, robot: Robot):
         self._layout, tree = robot.layout, robot.kinematic_tree
         self._model, self._data = tree.model, tree.model.createData()
-        self._zeros = np.zeros(robot.layout.n_link)
+        self._zeros, self._coupling = np.zeros(tree.model.nv), tree.coupling
         self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
         encoder = robot.motor_encoder
         self._encoder = np.zeros((robot.n, robot.layout.size))
@@ -69,9 +69,11 @@ class ReadingsAtOneState:
         return reading + offset, J
 
     def _rate(self, name: str, x: Array) -> tuple[Array, Array]:
-        layout = self._layout
+        layout, coupling = self._layout, self._coupling
         if self._at is not x:  # all gyros at one state share the kinematics
             q, v = x[layout.q_link], x[layout.v_link]
+            if coupling is not None:
+                q, v = coupling.positions(q), coupling.rates(v)
             pin.computeForwardKinematicsDerivatives(self._model, self._data, q, v, self._zeros)
             self._at = x
         frame, R = self._gyros[name]
@@ -79,7 +81,10 @@ class ReadingsAtOneState:
         by_q, by_v = pin.getFrameVelocityDerivatives(self._model, self._data, frame, local)
         omega_body = pin.getFrameVelocity(self._model, self._data, frame, local).angular
         J = np.zeros((3, layout.size))
-        J[:, layout.q_link], J[:, layout.v_link] = R @ by_q[3:], R @ by_v[3:]
+        by_q, by_v = R @ by_q[3:], R @ by_v[3:]
+        if coupling is not None:
+            by_q, by_v = by_q @ coupling.G, by_v @ coupling.G
+        J[:, layout.q_link], J[:, layout.v_link] = by_q, by_v
         return R @ omega_body, J
 
 

@@ -82,7 +82,7 @@ class Recording:
         goal: goal positions of a position-controlled robot [rad], NaN where a drive was off; None without.
         left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
             motion do not hold there, and no model is judged by them.
-        posture: where joints stood that the robot does not model, by name [rad or m]; empty where the bag does not say.
+        posture: positions [rad] or [m] of joints that are not the robot's and stand still, by name.
     """
 
     path: str

@@ -6,60 +6,120 @@ All functions take many samples at once; where pinocchio has no call for many, i
 
 from __future__ import annotations
 
-import contextlib
 import copy
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.body_rates import BodyRates
+from jointscope.robots.coupling import Coupling, with_new_joints
+from jointscope.robots.equations_of_motion import Equations, equations_of
 from jointscope.robots.errors import RobotError
+from jointscope.robots.possible_inertias import check_inertias
+from jointscope.robots.urdf_bodies import UrdfBodies
+from jointscope.robots.usable_joints import check_locked, check_moving
 
 Array = NDArray[np.float64]
+NOWHERE: Mapping[str, float] = MappingProxyType({})
 
 
 class RigidTree:
     """A tree of rigid bodies with one-axis joints, M(q) a + s c(q, v) + g(q) = tau.
 
+    Joints that are not named stay locked; mimic joints of the URDF follow theirs, with what they carry.
+
     Args:
         urdf: path of the URDF.
-        joints: names of the moving joints in the order of the state; all others stay locked.
+        joints: names of the moving joints in the order of the state.
         gravity: acceleration of gravity in the base frame, shape (3,) [m/s^2].
         coriolis: factor s on the Coriolis and centrifugal terms, 0 or 1.
         inertias: whether the bodies need inertias; without, only the kinematics can be used.
+        locked: positions of other joints [rad] or [m]; zero where none is given.
+
+    Attributes:
+        model: pinocchio model of what moves, one coordinate for each moving joint of the URDF.
+        coupling: coordinates of the model from those of `joints`; None where they are the same.
+        locked: as given.
+        remarks: what is odd about the inertias without making the equations impossible, sentences.
+
+    Raises:
+        RobotError: no such joint, one that cannot move or be locked, or inertias without equations of motion.
     """
 
-    def __init__(self, urdf: Path, joints: Sequence[str], gravity: Array, coriolis: bool = True, inertias: bool = True):
+    def __init__(
+        self,
+        urdf: Path,
+        joints: Sequence[str],
+        gravity: Array,
+        coriolis: bool = True,
+        inertias: bool = True,
+        locked: Mapping[str, float] = NOWHERE,
+    ):
         self.urdf = urdf
         self.joints = tuple(joints)
         self.coriolis = coriolis
-        full = _read_urdf(urdf)
-        self.model = _reduce(full, self.joints, urdf)
-        self.model.gravity = pin.Motion(np.asarray(gravity, float), np.zeros(3))
-        self.data = self.model.createData()
-        self._pool = pin.ModelPool(self.model, 1)
-        self._rates = BodyRates(self.model)
         self.gravity = np.asarray(gravity, float)
-        if inertias:
-            self._check_inertias()
+        self._bodies = UrdfBodies.read(urdf)
+        check_moving(self._bodies, self.joints)
+        check_locked(self._bodies, self.joints, locked)
+        self.remarks: tuple[str, ...] = ()
+        self._need_inertias = inertias
+        self._relatives: dict[tuple[tuple[str, float], ...], RigidTree] = {}  # the same tree in other postures
+        self._lock(locked)
+        self._relatives[_key(self.locked)] = self
+
+    def locked_at(self, positions: Mapping[str, float]) -> RigidTree:
+        """The same tree with other joints locked, all at these positions [rad] or [m], zero where none is given.
+
+        Raises:
+            RobotError: as when it is made.
+        """
+        key = _key(positions)
+        if key not in self._relatives:
+            check_locked(self._bodies, self.joints, positions)
+            tree = copy.copy(self)
+            tree._lock(positions)
+            self._relatives[key] = tree
+        return self._relatives[key]
+
+    def posture(self, positions: Mapping[str, float]) -> dict[str, float]:
+        """Of some positions, those that tell where other joints are which matter, in the order of the URDF.
+
+        A mimic joint tells where the joint is that it follows, if that is not given itself.
+        """
+        given = self._bodies.leading(positions)
+        return {name: float(given[name]) for name in self.other_joints if name in given}
 
     def with_model(self, model: pin.Model) -> RigidTree:
         """The same tree with other bodies or more joints; its inertias are not checked."""
         tree = copy.copy(self)
-        tree.joints = tuple(list(model.names)[1:])
-        tree.model, tree.data = model, model.createData()
-        tree._pool = pin.ModelPool(model, 1)
-        tree._rates = BodyRates(model)
+        tree._relatives = {}
+        tree.joints = with_new_joints(self.joints, tuple(model.names)[1:], tuple(self.model.names)[1:])
+        tree._use(model)
         return tree
+
+    def _lock(self, locked: Mapping[str, float]) -> None:
+        self.locked = {name: float(position) for name, position in locked.items()}
+        model = self._bodies.reduced(self.joints, self.locked)
+        model.gravity = pin.Motion(self.gravity, np.zeros(3))
+        self._use(model)
+        if self._need_inertias:
+            self.remarks = check_inertias(self.urdf.name, model, self.joints, self.mass_matrix, self.limits)
+
+    def _use(self, model: pin.Model) -> None:
+        self.model, self.data = model, model.createData()
+        self.coupling = Coupling.of(tuple(model.names)[1:], self.joints, self._bodies.followers)
+        self.equations: Equations = equations_of(model, self.coupling)
+        self._rates = BodyRates(model)
 
     def with_coriolis(self, coriolis: bool) -> RigidTree:
         """The same tree with or without Coriolis and centrifugal terms."""
         tree = copy.copy(self)
-        tree.coriolis = coriolis
+        tree.coriolis, tree._relatives = coriolis, {}
         return tree
 
     @property
@@ -79,17 +139,36 @@ class RigidTree:
         return tuple(joint for joint in self.joints if kinds[joint].startswith("JointModelP"))
 
     @property
+    def other_joints(self) -> tuple[str, ...]:
+        """Names of the joints of the URDF beside `joints` whose position matters for the equations of `joints`."""
+        return self._bodies.that_matter(self.joints)
+
+    @property
     def limits(self) -> Array:
-        """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none."""
+        """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none.
+
+        What follows a joint limits it, too.
+        """
         lower, upper = np.array(self.model.lowerPositionLimit), np.array(self.model.upperPositionLimit)
         given = upper > lower
-        return np.column_stack([np.where(given, lower, -np.inf), np.where(given, upper, np.inf)])
+        limits = np.column_stack([np.where(given, lower, -np.inf), np.where(given, upper, np.inf)])
+        return limits if self.coupling is None else self.coupling.limits(limits)
 
     @property
     def velocity_limits(self) -> Array:
         """Velocity limit of each joint, shape (n,) [rad/s]; infinite where the URDF gives none."""
         limit = np.array(self.model.velocityLimit, dtype=float)
-        return np.where(limit > 0, limit, np.inf)
+        limits = np.where(limit > 0, limit, np.inf)
+        return limits if self.coupling is None else self.coupling.velocity_limits(limits)
+
+    @property
+    def effort_limits(self) -> Array:
+        """Effort limit of each joint as the URDF has it, shape (n,) [N m]."""
+        return np.array(self.model.effortLimit, dtype=float)[[self.coordinate(joint) for joint in self.joints]]
+
+    def coordinate(self, joint: str) -> int:
+        """Index of a moving joint among the coordinates of `model`."""
+        return int(self.model.joints[self.model.getJointId(joint)].idx_v)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Joint accelerations M^-1 (tau - s c - g).
@@ -102,13 +181,7 @@ class RigidTree:
         Returns:
             Accelerations, shape (m, n) [rad/s^2].
         """
-        v = v if self.coriolis else np.zeros_like(v)
-        if len(q) == 1:
-            return np.asarray(pin.aba(self.model, self.data, q[0], v[0], tau[0]))[None]
-        a = np.empty(q.shape[::-1], order="F")
-        columns = (np.asfortranarray(part.T) for part in (q, v, tau))
-        pin.abaInParallel(1, self._pool, *columns, a)
-        return np.ascontiguousarray(a.T)
+        return self.equations.acceleration(q, v if self.coriolis else np.zeros_like(v), tau)
 
     def acceleration_derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
         """Joint accelerations and their derivatives.
@@ -121,37 +194,22 @@ class RigidTree:
         Returns:
             a, shape (m, n); da/dq, da/dv and M^-1 = da/dtau, each of shape (m, n, n).
         """
-        m, n = q.shape
-        a, da_dq, da_dv, M_inverse = np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, n)), np.empty((m, n, n))
-        v_used = v if self.coriolis else np.zeros_like(v)
-        model, data, derivatives = self.model, self.data, pin.computeABADerivatives
-        for k in range(m):
-            da_dq[k], da_dv[k], M_inverse[k] = derivatives(model, data, q[k], v_used[k], tau[k])
-            a[k] = data.ddq
+        found = self.equations.derivatives(q, v if self.coriolis else np.zeros_like(v), tau)
         if not self.coriolis:
-            da_dv[:] = 0.0
-        return a, da_dq, da_dv, M_inverse
+            found[2][:] = 0.0
+        return found
 
     def torque(self, q: Array, v: Array, a: Array) -> Array:
         """Joint torques M a + c + g of given motion, shape (m, n) [N m]; arguments of shape (m, n)."""
-        tau = np.empty(q.shape[::-1], order="F")
-        columns = (np.asfortranarray(part.T) for part in (q, v, a))
-        pin.rneaInParallel(1, self._pool, *columns, tau)
-        return np.ascontiguousarray(tau.T)
+        return self.equations.torque(q, v, a)
 
     def gravity_derivatives(self, q: Array) -> Array:
         """Derivative of the torques of gravity g(q) by q, shape (m, n, n) [N m/rad], for q of shape (m, n) [rad]."""
-        by_q = np.empty((len(q), self.n, self.n))
-        for k in range(len(q)):
-            by_q[k] = pin.computeGeneralizedGravityDerivatives(self.model, self.data, q[k])
-        return by_q
+        return self.equations.gravity_derivatives(q)
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q), shape (m, n, n) [kg m^2], for positions q of shape (m, n) [rad]."""
-        M = np.empty((len(q), self.n, self.n))
-        for k in range(len(q)):
-            M[k] = pin.crba(self.model, self.data, q[k])
-        return M
+        return self.equations.mass_matrix(q)
 
     def free_inertias(self) -> Array:
         """Inertia of each coordinate at zero while all others are free to move, shape (n,) [kg m^2]."""
@@ -169,11 +227,16 @@ class RigidTree:
         Returns:
             omega_body, shape (m, 3) [rad/s]; its derivatives by q and by v, each of shape (m, 3, n).
         """
-        return self._rates.rate(self.frame_id(body), q, v)
+        frame, coupling = self.frame_id(body), self.coupling
+        if coupling is None:
+            return self._rates.rate(frame, q, v)
+        omega, by_q, by_v = self._rates.rate(frame, coupling.positions(q), coupling.rates(v))
+        return omega, by_q @ coupling.G, by_v @ coupling.G
 
     def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:
         """Pose of a body in the base frame: R_base_body, shape (m, 3, 3), and p_base_body, shape (m, 3) [m]."""
         frame = self.frame_id(body)
+        q = q if self.coupling is None else self.coupling.positions(q)
         R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
         for k in range(len(q)):
             pin.forwardKinematics(self.model, self.data, q[k])
@@ -188,7 +251,10 @@ class RigidTree:
         while joint > 0:
             found.append(int(joint) - 1)
             joint = self.model.parents[joint]
-        return tuple(found[::-1])
+        if self.coupling is None:
+            return tuple(found[::-1])
+        columns = [int(i) for row in found[::-1] for i in np.flatnonzero(self.coupling.G[row])]
+        return tuple(dict.fromkeys(columns))
 
     def frame_id(self, body: str) -> int:
         """Index of a link in pinocchio's frames."""
@@ -196,73 +262,31 @@ class RigidTree:
             raise RobotError(f"{self.urdf.name} has no link {body!r}; it has {', '.join(self.bodies)}")
         return self.model.getFrameId(body, pin.FrameType.BODY)
 
-    def _check_inertias(self) -> None:
-        for joint, inertia in zip(self.model.names, self.model.inertias, strict=True):
-            if joint == "universe":
-                continue
-            moments = np.linalg.eigvalsh(inertia.inertia)
-            if inertia.mass < 0 or moments[0] <= 0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
-                raise RobotError(
-                    f"{self.urdf.name}: the body moved by {joint} has an impossible inertia: principal moments "
-                    f"{', '.join(f'{x:.4g}' for x in moments)} kg m2, mass {inertia.mass:g} kg; expected positive "
-                    "moments of which none is larger than the sum of the other two"
-                )
-
 
 def moving_joints(urdf: Path) -> tuple[str, ...]:
-    """Names of the joints with one axis and limits, base to tip.
+    """Names of the joints that can be a robot's: revolute, continuous, prismatic; no mimic ones. Base to tip.
 
     Raises:
         RobotError: no such file, no URDF, or none of its joints is of that kind.
     """
-    model = _read_urdf(urdf)
-    moving = list(zip(model.names, model.joints, strict=True))[1:]  # the first one is the universe
-    names = [name for name, joint in moving if joint.nq == 1 and joint.nv == 1]
+    names = UrdfBodies.read(urdf).free
     if not names:
         raise RobotError(
-            f"{urdf.name} has no moving joint that can be used: expected revolute or prismatic joints with limits "
-            "(continuous ones: make them revolute, with limits of many turns)"
+            f"{urdf.name} has no moving joint that can be used: expected revolute, continuous or prismatic ones"
         )
-    return tuple(names)
+    return names
 
 
-def _read_urdf(urdf: Path) -> pin.Model:
-    if not urdf.is_file():
-        raise RobotError(f"the URDF {urdf} does not exist; set `urdf` in the robot file, relative to that file")
-    try:
-        with _quiet_stderr():
-            return pin.buildModelFromUrdf(str(urdf))
-    except Exception as err:
-        raise RobotError(f"{urdf} is not a URDF that pinocchio can read: {str(err).splitlines()[0]}") from err
+def joints_that_matter(urdf: Path, joints: Sequence[str]) -> tuple[str, ...]:
+    """`RigidTree.other_joints` before there is a tree.
+
+    Raises:
+        RobotError: no such file, no URDF, or one of the joints cannot move.
+    """
+    bodies = UrdfBodies.read(urdf)
+    check_moving(bodies, joints)
+    return bodies.that_matter(joints)
 
 
-@contextlib.contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Keeps the parser's own lines, written from C++, off the screen; its exception says the same."""
-    try:
-        saved = os.dup(2)
-    except OSError:
-        yield  # there is no stderr to keep quiet
-        return
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-
-
-def _reduce(model: pin.Model, joints: tuple[str, ...], urdf: Path) -> pin.Model:
-    """The model with only `joints` moving, all others locked at zero."""
-    known = list(model.names)[1:]
-    unknown = [joint for joint in joints if joint not in known]
-    if unknown:
-        raise RobotError(f"{urdf.name} has no moving joint {unknown[0]!r}; it has {', '.join(known)}")
-    locked = [model.getJointId(name) for name in known if name not in joints]
-    reduced = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
-    if tuple(list(reduced.names)[1:]) != joints:
-        raise RobotError(f"joints must be listed as in {urdf.name}: {', '.join(list(reduced.names)[1:])}")
-    if reduced.nq != len(joints) or reduced.nv != len(joints):
-        raise RobotError(f"{urdf.name}: continuous and floating joints are not supported; use revolute or prismatic")
-    return reduced
+def _key(positions: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted((name, float(position)) for name, position in positions.items()))

@@ -99,6 +99,7 @@ class Robot:
         controller: that of drives which are commanded by a position; None for others, or where it is not known.
         path: the file it was read from.
         document: the file's content with comments, for writing it again.
+        as_filed: the rigid bodies as the file has them, where `tree` is in another posture.
     """
 
     name: str
@@ -115,6 +116,7 @@ class Robot:
     document: Any
     effects: tuple[EffectAt, ...] = ()
     controller: PositionController | None = None
+    as_filed: RigidTree | None = None
 
     @property
     def n(self) -> int:
@@ -237,6 +239,24 @@ class Robot:
         for name, value in values.items():
             parameters[name] = replace(self.parameter(name), value=float(value))
         return replace(self, parameters=parameters)
+
+    def in_posture(self, positions: Mapping[str, float]) -> Robot:
+        """The same robot with other joints held as in a recording, beside or instead of where its file locks them.
+
+        Args:
+            positions: of joints of the URDF [rad] or [m]; others than those that matter are left out.
+        """
+        filed = self.as_filed or self.tree
+        held = filed.locked | filed.posture(positions)
+        if held == self.tree.locked:
+            return self
+        return replace(self, tree=filed.locked_at(held), as_filed=filed)
+
+    def locked_as_in(self, positions: Mapping[str, float]) -> Robot:
+        """The same robot whose file locks joints it does not name yet as in a recording."""
+        filed = self.as_filed or self.tree
+        locked = filed.posture(positions) | filed.locked
+        return replace(self, tree=filed.locked_at(locked), as_filed=None)
 
     def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
         """The same robot with some sensors replaced."""

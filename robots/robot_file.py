@@ -65,9 +65,14 @@ def load_robot(name_or_path: str | Path) -> Robot:
         raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
     choices = top.section("model", {}).build(lambda s: _model_choices(s, joints))
     gravity = top.array("gravity", (3,))
-    tree = RigidTree(
-        _urdf_path(top.text("urdf"), path), joints, gravity, choices.coriolis, choices.link_dynamics == "model"
-    )
+    urdf, masses = _urdf_path(top.text("urdf"), path), choices.link_dynamics == "model"
+    locked = top.section("locked", {}).build(_locked)
+    try:
+        tree = RigidTree(urdf, joints, gravity, choices.coriolis, masses, locked)
+    except RobotError as err:
+        if str(err).startswith("locked"):
+            raise RobotError(f"{path.name}: {err}") from err
+        raise
     constants = top.section("constants", {}).build(_constants)
     command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS, scaled=True))
     sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
@@ -200,6 +205,10 @@ def _rigid_joints(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
     if unknown:
         raise RobotError(f"{section.place}.rigid_joints: no joint {unknown[0]!r}{did_you_mean(unknown[0], joints)}")
     return rigid
+
+
+def _locked(section: Section) -> dict[str, float]:
+    return {joint: section.number(joint) for joint in section.keys()}
 
 
 def _controller(section: Section, joints: tuple[str, ...]) -> PositionController:

@@ -28,6 +28,7 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     """
     document = copy.deepcopy(robot.document)
     document["urdf"] = urdf_reference(robot.tree.urdf, folder)
+    _write_locked(document, (robot.as_filed or robot.tree).locked)
     for name, parameter in robot.parameters.items():
         if parameter.fixed:
             continue
@@ -55,6 +56,20 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     if provenance is not None:
         document["calibration"] = _plain(provenance)
     return dump_document(document)
+
+
+def _write_locked(document: Any, locked: Mapping[str, float]) -> None:
+    """Where other joints are locked; entries that are there already stay as they are."""
+    new = {joint: _rounded(position) for joint, position in locked.items()}
+    if "locked" in document:
+        for joint, position in new.items():
+            if document["locked"].get(joint) != position:
+                document["locked"][joint] = position
+    elif new:
+        keys = list(document)
+        # behind the joints, unless a comment hangs there that belongs to what follows
+        place = keys.index("joints") + 1 if "joints" not in document.ca.items else len(keys)
+        document.insert(place, "locked", _flow(new))
 
 
 def _write_noise(section: Any, robot: Robot) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bearing_springs import BearingSprings
@@ -46,11 +45,9 @@ class StateRates:
         parameters, tree = JointParameters(robot), StructuredTree(robot)
         motors = MotorTorques(robot, parameters)
         bodies = tree.bodies(named)
-        self._model, self._data = bodies.model, bodies.model.createData()
-        # share of the Coriolis terms that the model has
-        scale = named[tree.coriolis_scale] if tree.coriolis_scale else float(bodies.coriolis)
-        self._still, self._moving = scale < 1.0, scale > 0.0
-        self._scale = scale
+        self._equations = bodies.equations
+        # share of the Coriolis terms that the model has; accelerations are linear in it, beyond 0 and 1, too
+        self._scale = named[tree.coriolis_scale] if tree.coriolis_scale else float(bodies.coriolis)
         springs = JointSprings(layout, parameters)
         self._linear = _linear_torques(robot, parameters, springs, motors, named)
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
@@ -102,10 +99,11 @@ class StateRates:
             law.add(x, tau, None)
         layout = self.layout
         q, v, torque = x[layout.q_link], x[layout.v_link], tau[: self._n]
-        a = np.array(pin.aba(self._model, self._data, q, v if self._moving else self._no_velocity, torque))
-        if self._still and self._moving:
-            still = pin.aba(self._model, self._data, q, self._no_velocity, torque)
-            a = still + self._scale * (a - still)
+        s, acceleration = self._scale, self._equations.acceleration_at
+        a = acceleration(q, v if s != 0.0 else self._no_velocity, torque)
+        if s not in (0.0, 1.0):
+            still = acceleration(q, self._no_velocity, torque)
+            a = still + s * (a - still)
         return self._rate(x, tau, a)
 
     def with_jacobian(self, x: Array, command_torque: Array) -> tuple[Array, Array, Array]:
@@ -141,19 +139,16 @@ class StateRates:
 
     def _rigid(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
         """Accelerations of the links and their derivatives by q, v and tau."""
-        found = [self._derivatives(q, v, tau)] if self._moving else []
-        if not self._still:
-            return found[0]
-        still = self._derivatives(q, self._no_velocity, tau)
-        if not found:
-            return still[0], still[1], np.zeros_like(still[2]), still[3]
-        s, moving = self._scale, found[0]
+        s, derivatives = self._scale, self._equations.derivatives_at
+        if s == 0.0:
+            a, by_q, by_v, M_inverse = derivatives(q, self._no_velocity, tau)
+            return a, by_q, np.zeros_like(by_v), M_inverse
+        moving = derivatives(q, v, tau)
+        if s == 1.0:
+            return moving
+        still = derivatives(q, self._no_velocity, tau)
         a, by_q = (still[i] + s * (moving[i] - still[i]) for i in (0, 1))
         return a, by_q, s * moving[2], moving[3]
-
-    def _derivatives(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
-        by_q, by_v, M_inverse = pin.computeABADerivatives(self._model, self._data, q, v, tau)
-        return self._data.ddq.copy(), by_q, by_v, M_inverse
 
     def _rate(self, x: Array, tau: Array, a_link: Array) -> Array:
         layout, rate = self.layout, np.empty_like(x)

@@ -58,8 +58,13 @@ class StructuredTree:
     def __init__(self, robot: Robot):
         self.kinematics: RigidTree = robot.kinematic_tree
         self._changes = inertia_changes(robot, self.kinematics.model)
+        # name of the rotor's inertia, its row among the links, its coordinate in the model
         self._armature = [
-            (robot.drive_parameter(joint, "inertia").name, int(robot.layout.joint_link[i]))
+            (
+                robot.drive_parameter(joint, "inertia").name,
+                int(robot.layout.joint_link[i]),
+                self.kinematics.coordinate(joint),
+            )
             for i, joint in enumerate(robot.joints)
             if joint not in robot.layout.motors
         ]
@@ -104,7 +109,7 @@ class StructuredTree:
                 tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale]
             )
             found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
-        for name, link in self._armature:
+        for name, link, _ in self._armature:
             found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]
         if self.coriolis_scale is not None:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
@@ -114,14 +119,14 @@ class StructuredTree:
         """The bodies at these values."""
         if not (self._changes or self._armature):
             return self.kinematics
-        key = tuple([values[c.name] for c in self._changes] + [values[name] for name, _ in self._armature])
+        key = tuple([values[c.name] for c in self._changes] + [values[name] for name, *_ in self._armature])
         if self._cache is None or self._cache[0] != key:
             model = self.kinematics.model.copy()
             for change in self._changes:
                 _change(model, change, values[change.name] - change.offset)
             armature = np.array(model.armature)
-            for name, link in self._armature:
-                armature[link] = values[name]
+            for name, _, coordinate in self._armature:
+                armature[coordinate] = values[name]
             model.armature = armature
             self._cache = (key, self.kinematics.with_model(model))
         return self._cache[1]
