@@ -143,6 +143,10 @@ class RigidTree:
         """Names of the joints of the URDF beside `joints` whose position matters for the equations of `joints`."""
         return self._bodies.that_matter(self.joints)
 
+    def is_slide(self, joint: str) -> bool:
+        """Whether any joint of the URDF, in `joints` or not, is prismatic; False for what is no joint."""
+        return self._bodies.is_slide(joint)
+
     @property
     def limits(self) -> Array:
         """Lower and upper position limit of each joint, shape (n, 2) [rad]; infinite where the URDF gives none.

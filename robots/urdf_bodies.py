@@ -123,6 +123,10 @@ class UrdfBodies:
                 found.setdefault(follower.leader, (positions[name] - follower.offset) / follower.factor)
         return found
 
+    def is_slide(self, name: str) -> bool:
+        """Whether a joint is prismatic; False for what is no joint."""
+        return bool(self.model.existJointName(name)) and self._joint(name).shortname().startswith("JointModelP")
+
     def _joint(self, name: str) -> pin.JointModel:
         return self.model.joints[self.model.getJointId(name)]
 

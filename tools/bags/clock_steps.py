@@ -3,9 +3,9 @@
 
     latency = received - stamp     jumps by the size of the step and stays there
 
-The stamps on the shorter side are moved by the jump of the median latency, which is known to a fraction of the jitter of
-reception. Streams that were stamped by the same clock jump together and are moved by the same amount; the equations of
-motion are not asked to hold across the seam.
+The stamps on the shorter side are moved by the jump of the median latency, which is known to a fraction of the jitter
+of reception. Streams that were stamped by the same clock jump together and are moved by the same amount; no equation
+of motion is asked to hold across the seam.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ def on_one_clock(
             seams.append((min(int(stamps[step.row - 1]), at) - int(SEAM * 1e9), at + int(SEAM * 1e9)))
             text = (
                 f"{name}: its clock was set {'forward' if size > 0 else 'back'} by {duration(size)} at message "
-                f"{step.row}, while messages came in as before; the parts were brought together by the times of reception"
+                f"{step.row}, while messages came in as before; the parts were brought together by their times of "
+                "reception"
             )
             notices.append(Notice(name, "clock", 1, text))
     return moved, seams, notices

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wild samples: one to three in a row that leave where the channel was going and come back to it.
 
-A run of samples is a glitch if all of it lies far off the cubic through its neighbours: ten times farther than any other
-sample nearby, and farther than anything nearby moves from one sample to the next. Motion does not do that, a stop and a
-reversal do not either: they change the slope, not one sample. A counter that begins anew stays where it went.
+A run of samples is a glitch if all of it lies far off the cubic through its neighbours: ten times farther than any
+other sample nearby, and farther than anything nearby moves from one sample to the next. Motion does not do that, a stop
+and a reversal do not either: they change the slope, not one sample. A counter that begins anew stays where it went.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def without_glitches(
     where = ", ".join(f"{t:.3f}" for t in since[rows][:5]) + (", ..." if count > 5 else "") + " s"
     if count > max(MOST, MOST_SHARE * len(samples)):
         raise RecordingError(
-            f"{channel}: {count} of {len(samples)} samples of {name} jump away from their neighbours and back (at {where} "
-            f"after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes publish on this "
-            "topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot file); find the node "
-            "with `ros2 topic info -v TOPIC`, and record again"
+            f"{channel}: {count} of {len(samples)} samples of {name} jump away from their neighbours and back (at "
+            f"{where} after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes publish "
+            "on this topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot file); find "
+            "the node with `ros2 topic info -v TOPIC`, and record again"
         )
     j = channels.index(channel)
     text = (

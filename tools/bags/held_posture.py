@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice
@@ -35,44 +34,59 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     Raises:
         RecordingError: one of them moves.
     """
-    others = tuple(getattr(robot.tree, "other_joints", ()))
-    seen = {joint: values for joint in others if len(values := _positions(found, joint)) >= FEWEST}
-    if not seen:
+    names = _other_names(found, robot)
+    ranges = {name: (_unit_of(robot, joint), _range(found, name)) for name, joint in names.items()}
+    ends = [
+        robot.tree.posture({names[name]: spans[k] * si_factor(unit) for name, (unit, spans) in ranges.items() if spans})
+        for k in range(3)
+    ]
+    low, middle, high = ends
+    if not middle:
         return {}, []
     source = robot.motor_encoder.source
     if any(abs(abs(scale) - 1.0) > 1e-9 for scale in source.scale):
         text = (
-            f"motor_encoder: {', '.join(seen)} stand in the messages, too, but the scale of their values is not known "
-            "(`scale` in the robot file is another for each joint); they are held where `locked` of the robot file says"
+            f"motor_encoder: {', '.join(middle)} stand in the messages, too, but how their values become angles is not "
+            "known (`scale` in the robot file is that of other joints); they are held where `locked` of the robot file "
+            "says"
         )
-        return {}, [Notice("motor_encoder", "posture", len(seen), text)]
-    posture, moving = dict[str, float](), dict[str, tuple[float, str]]()
-    for joint, values in seen.items():
-        unit = _unit_of(robot, joint)
-        low, middle, high = np.quantile(values, [OUTLYING, 0.5, 1.0 - OUTLYING]) * si_factor(unit)
-        if high - low > STILL[si_unit(unit)]:
-            moving[joint] = (float(high - low), si_unit(unit))
-        posture[joint] = float(middle)
+        return {}, [Notice("motor_encoder", "posture", len(middle), text)]
+    units = {joint: "m" if robot.tree.is_slide(joint) else "rad" for joint in middle}
+    spans = {joint: abs(high[joint] - low[joint]) for joint in middle}
+    moving = {joint: (spans[joint], units[joint]) for joint in middle if spans[joint] > STILL[units[joint]]}
     if moving:
         _refuse(moving, robot, bag)
-    return posture, [_notice(posture, robot)]
+    return middle, [_notice(middle, units, robot)]
 
 
-def _positions(found: Sequence[MessageParts], joint: str) -> NDArray[np.float64]:
-    """All finite values of a joint, shape (n,)."""
+def _other_names(found: Sequence[MessageParts], robot: Robot) -> dict[str, str]:
+    """Names in the messages that are not the robot's, and the joint of the URDF that each stands for."""
+    own = robot.motor_encoder.source.names
+    prefixes = {name.removesuffix(joint) for name, joint in zip(own, robot.joints, strict=False)}
+    prefix = prefixes.pop() if len(prefixes) == 1 else ""
+    seen = dict.fromkeys(name for parts in found for part in parts.parts for name in part.names or ())
+    return {name: name.removeprefix(prefix) for name in seen if name not in own}
+
+
+def _range(found: Sequence[MessageParts], name: str) -> tuple[float, float, float] | None:
+    """Smallest, middle and largest value of a name, without outliers; None where there are too few."""
     values = [
-        part.values[:, part.names.index(joint)]
+        part.values[:, part.names.index(name)]
         for parts in found
         for part in parts.parts
-        if part.names and joint in part.names and len(part.names) == part.values.shape[1]
+        if part.names and name in part.names and len(part.names) == part.values.shape[1]
     ]
-    all_values = np.concatenate(values) if values else np.empty(0)
-    return all_values[np.isfinite(all_values)]
+    every = np.concatenate(values) if values else np.empty(0)
+    every = every[np.isfinite(every)]
+    if len(every) < FEWEST:
+        return None
+    low, middle, high = np.quantile(every, [OUTLYING, 0.5, 1.0 - OUTLYING])
+    return float(low), float(middle), float(high)
 
 
 def _unit_of(robot: Robot, joint: str) -> str:
     """Unit in the bag of a joint outside the robot: that of the robot's joints of its kind."""
-    wanted = "m" if joint in getattr(robot.tree, "other_slides", ()) else "rad"
+    wanted = "m" if robot.tree.is_slide(joint) else "rad"
     units = robot.motor_encoder.source.bag_units(robot.n)
     return next((unit for unit in units if si_unit(unit) == wanted), wanted)
 
@@ -81,18 +95,17 @@ def _refuse(moving: dict[str, tuple[float, str]], robot: Robot, bag: str) -> Non
     said = ", ".join(f"{joint} moves by {span:.2g} {unit}" for joint, (span, unit) in moving.items())
     joints = ",".join([*robot.joints, *moving])
     raise RecordingError(
-        f"{bag}: {said}, but the robot file has {'it' if len(moving) == 1 else 'them'} not in `joints`; expected joints "
-        f"outside the robot to stand still: jointscope init {robot.tree.urdf} {bag} --joints {joints} -o NEW.yaml, or "
-        "use a recording in which it is held"
+        f"{bag}: {said}, but the robot file has {'it' if len(moving) == 1 else 'them'} not in `joints`; expected the "
+        f"other joints to stand still: jointscope init {robot.tree.urdf} {bag} --joints {joints} -o NEW.yaml, or use a "
+        "recording in which they are held"
     )
 
 
-def _notice(posture: dict[str, float], robot: Robot) -> Notice:
-    locked = dict(getattr(robot.tree, "locked", {}))
+def _notice(posture: dict[str, float], units: dict[str, str], robot: Robot) -> Notice:
     parts = []
     for joint, value in posture.items():
-        unit = si_unit(_unit_of(robot, joint))
-        other = locked.get(joint)
-        differs = other is not None and abs(other - value) > NOTICEABLE[unit]
-        parts.append(f"{joint} at {value:.4g} {unit}" + (f" (the robot file says {other:.4g})" if differs else ""))
+        filed = robot.tree.locked.get(joint)
+        differs = filed is not None and abs(filed - value) > NOTICEABLE[units[joint]]
+        said = f"{joint} at {value:.4g} {units[joint]}"
+        parts.append(said + (f" (the robot file says {filed:.4g})" if differs else ""))
     return Notice("motor_encoder", "posture", len(posture), f"held where the bag has them: {', '.join(parts)}")

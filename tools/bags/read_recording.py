@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -90,7 +90,7 @@ def read_recording(
     posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
     notices += found
     columns = {need.name: fitting_messages(parts[need.name], *wanted_of(need)) for need in needed}
-    samples, found = _in_bag_order(needed, raw, types, columns)
+    samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
     notices += found
     samples, seams, found = _on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
     notices += found
@@ -127,13 +127,14 @@ def _in_bag_order(
     raw: Mapping[str, RawTopic],
     types: Mapping[str, MessageType],
     columns: Mapping[str, Columns],
+    known: Container[str],
 ) -> tuple[dict[str, TimedSamples], list[Notice]]:
     """The channels of every stream, in the order of the bag and the unit of the bag."""
     samples, notices = dict[str, TimedSamples](), list[Notice]()
     stamps = {name: found.stamps for name, found in columns.items()}
     for need in needed:
         topic, message_type = raw[need.source.topic], types[need.name]
-        samples[need.name], found = _samples(need, topic, message_type, columns[need.name], stamps)
+        samples[need.name], found = _samples(need, topic, message_type, columns[need.name], stamps, known=known)
         notices += found
     return samples, notices
 
@@ -273,9 +274,12 @@ def _samples(
     columns: Columns,
     others: Mapping[str, NDArray[np.int64] | None],
     nan: bool = False,
+    known: Container[str] = (),
 ) -> tuple[TimedSamples, list[Notice]]:
-    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay."""
-    order, notices = column_order(need, columns)
+    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay;
+    joints that are `known` are not said to be ignored.
+    """
+    order, notices = column_order(need, columns, known)
     notices += left_out_notices(need.name, columns)
     received, stamps = columns.of(topic.received_ns), columns.stamps
     values = columns.values[:, order]
@@ -302,8 +306,10 @@ def left_out_notices(name: str, columns: Columns) -> list[Notice]:
     return [Notice(name, "foreign", sum(part.count for part in columns.left_out), f"{name}: left out {said}")]
 
 
-def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp], list[Notice]]:
-    """Which column of the message belongs to which channel."""
+def column_order(
+    need: StreamSource, columns: Columns, known: Container[str] = ()
+) -> tuple[NDArray[np.intp], list[Notice]]:
+    """Which column of the message belongs to which channel; joints that are `known` otherwise are not ignored."""
     place = f"topic {need.source.topic}, field {need.source.field!r}"
     width, wanted = columns.values.shape[1], need.source.names
     names = columns.names or ()
@@ -323,7 +329,7 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
             f"set `names` of {need.name} in the robot file"
         )
     _refuse_repeated(names, place)
-    extra = [name for name in names if name not in wanted]
+    extra = [name for name in names if name not in wanted and name not in known]
     text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
     notices = [Notice(need.name, "info", len(extra), text)] if extra else []
     return np.array([names.index(name) for name in wanted]), notices

@@ -87,7 +87,7 @@ def _refuse_alternating(name: str, channels: tuple[str, ...], samples: TimedSamp
     for channel, one, two in zip(channels, far, usual, strict=True):
         if one > ALTERNATING * two:
             raise RecordingError(
-                f"{channel} jumps to and fro by {one:.4g} from each message of {name} to the next: two nodes publish on "
-                "this topic in turn, and nothing tells which is right; expected one node: find them with "
+                f"{channel} jumps to and fro by {one:.4g} from each message of {name} to the next: two nodes publish "
+                "on this topic in turn, and nothing tells which is right; expected one node: find them with "
                 "`ros2 topic info -v TOPIC`, stop one, and record again"
             )

@@ -104,5 +104,5 @@ def _notice(stretches: list[Stretch], commands: list[Stretch], sensors: list[Str
         )
         parts.append(f"{t0:.3f} to {t1:.3f} s ({what} for {duration(t1 - t0)})")
     more = f" and {len(stretches) - SAID} more" if len(stretches) > SAID else ""
-    text = f"left out, as too little is known there: {', '.join(parts)}{more}; the equations of motion are not asked to hold"
+    text = f"left out, as too little is known there: {', '.join(parts)}{more}; no equation of motion is asked to hold"
     return Notice("recording", "gap", len(stretches), text)

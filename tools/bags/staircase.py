@@ -33,7 +33,7 @@ def without_repetitions(name: str, samples: TimedSamples) -> tuple[TimedSamples,
     if len(runs) < FEWEST or float(np.mean(runs)) < 1.0 / (1.0 - SHARE):
         return samples, []
     per_sample = float(np.mean(runs))
-    every = max(int(round(float(np.median(runs)))), 1)
+    every = max(round(float(np.median(runs))), 1)
     keep = _kept(repeats, every, int(np.max(runs)))
     dropped = int(np.count_nonzero(~keep))
     text = (

@@ -14,8 +14,8 @@ from jointscope.tools.bags.timed_samples import TimedSamples as TimedSamples
 LATE_ALLOWED = 0.5  # [s] messages overtake each other by less than this; more is a clock that was set back
 FORWARD_ALLOWED = 3600.0  # [s] a longer pause inside one stream is a clock that was set
 CUT = (
-    "use the part before or after it, cut out with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`, or "
-    "record again"
+    "use the part before or after it, cut out with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`, "
+    "or record again"
 )
 RUN_OF_LATE_SAMPLES = 10  # this many in a row, between samples that were there already, is a clock, too
 
@@ -67,15 +67,15 @@ def _check_clock(name: str, stamps: NDArray[np.int64]) -> None:
     if len(ahead) and ahead.max() > FORWARD_ALLOWED * 1e9:
         k = int(np.argmax(np.diff(newest))) + 1
         raise RecordingError(
-            f"{name}: the stamps jump forward by {duration(ahead.max() / 1e9)} at message {k}, and the times of reception "
-            f"do not tell why; expected one clock without jumps: {CUT}"
+            f"{name}: the stamps jump forward by {duration(ahead.max() / 1e9)} at message {k}, and the times of "
+            f"reception do not tell why; expected one clock without jumps: {CUT}"
         )
     steps = np.diff(stamps)
     back = int(np.argmin(steps)) + 1 if len(steps) else 0
     if late.max() > LATE_ALLOWED * 1e9 or _runs_twice(stamps, late > 0):
         raise RecordingError(
-            f"{name}: the stamps go back by {duration(steps[back - 1] / 1e9)} at message {back} and do not recover, and "
-            f"the times of reception do not tell why; expected one clock without jumps: {CUT}"
+            f"{name}: the stamps go back by {duration(steps[back - 1] / 1e9)} at message {back} and do not recover, "
+            f"and the times of reception do not tell why; expected one clock without jumps: {CUT}"
         )
 
 

@@ -38,7 +38,7 @@ def brought_together(streams: Mapping[str, TimedSamples]) -> tuple[dict[str, Tim
         if abs(apart) <= APART:
             continue
         samples = streams[name]
-        moved[name] = samples.stamped(samples.stamps + int(round(1e9 * apart)))
+        moved[name] = samples.stamped(samples.stamps + round(1e9 * apart))
         text = (
             f"{name}: its stamps are {duration(apart)} {'behind' if apart > 0 else 'ahead of'} those of the other "
             "streams, whose messages came in at the same time: two clocks; they were brought together by the times of "
