@@ -57,7 +57,8 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "duplicate", "out_of_order", "gap", "jitter", "clipping", "dropped", "unit", "axes", "info".
+        kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "clipping",
+            "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

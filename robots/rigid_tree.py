@@ -144,14 +144,14 @@ class RigidTree:
         """Names of the prismatic joints, whose positions are lengths [m] and whose torques are forces [N]."""
         return tuple(joint for joint in self.joints if self.is_slide(joint))
 
-    def is_slide(self, joint: str) -> bool:
-        """Whether a joint of the URDF is prismatic."""
-        return self._bodies.is_slide(joint)
-
     @property
     def other_joints(self) -> tuple[str, ...]:
         """Names of the joints of the URDF beside `joints` whose position matters for the equations of `joints`."""
         return self._bodies.that_matter(self.joints)
+
+    def is_slide(self, joint: str) -> bool:
+        """Whether any joint of the URDF, in `joints` or not, is prismatic; False for what is no joint."""
+        return self._bodies.is_slide(joint)
 
     @property
     def followers(self) -> dict[str, Follower]:

@@ -30,7 +30,8 @@ from jointscope.tools.bags.read_recording import (
     read_recording,
 )
 from jointscope.tools.bags.stream_notices import clipping_notices, timing
-from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+from jointscope.tools.bags.time_order import in_time_order
+from jointscope.tools.bags.timed_samples import TimedSamples
 
 FLOATS = ("float32", "float64")
 NOT_SHOWN = "covariance"

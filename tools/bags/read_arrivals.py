@@ -27,6 +27,7 @@ from jointscope.tools.bags.read_recording import (
     in_si,
     needed_streams,
     read_columns,
+    wanted_of,
 )
 
 BLOCK = 20_000  # messages
@@ -129,7 +130,8 @@ def _columns(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stamps [ns] and samples in SI units of one stream, as they lie in the block; `before` is the last one's."""
     message_type = types[need.name]
-    columns = read_columns(topic, message_type, need.source.field, first=counts[topic.name])
+    wanted, width = wanted_of(need)
+    columns = read_columns(topic, message_type, need.source.field, first=counts[topic.name], wanted=wanted, width=width)
     order, _ = column_order(need, columns)
-    stamps = topic.received_ns if columns.stamps is None else columns.stamps
+    stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
     return stamps, in_si(need.source, columns.values[:, order], before)

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +13,30 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Topic
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder, Topic
 from jointscope.robots.units import joined
 from jointscope.robots.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
+from jointscope.tools.bags.clock_steps import on_one_clock
 from jointscope.tools.bags.columns import Columns
-from jointscope.tools.bags.fast_columns import fast_columns
+from jointscope.tools.bags.durations import counted
 from jointscope.tools.bags.field_path import field_path
+from jointscope.tools.bags.fitting_messages import fitting_messages
+from jointscope.tools.bags.glitches import without_glitches
+from jointscope.tools.bags.held_posture import held_posture
+from jointscope.tools.bags.message_parts import message_parts
 from jointscope.tools.bags.message_type import MessageType
+from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.own_stamps import at_message_stamps
-from jointscope.tools.bags.slow_columns import slow_columns
-from jointscope.tools.bags.stream_notices import clipping_notices, timing_notices
-from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+from jointscope.tools.bags.second_publisher import without_second_publisher
+from jointscope.tools.bags.silences import with_silences_left_out
+from jointscope.tools.bags.staircase import without_repetitions
+from jointscope.tools.bags.stream_notices import by_importance, clipping_notices, timing_notices
+from jointscope.tools.bags.time_order import in_time_order
+from jointscope.tools.bags.timed_samples import TimedSamples
+from jointscope.tools.bags.two_clocks import brought_together
+from jointscope.tools.bags.unfilled_stamps import without_unfilled
 
 
 @dataclass(frozen=True)
@@ -73,19 +84,19 @@ def read_recording(
         if robot.controller is not None and robot.controller.source.topic in bag.topics:
             wanted.add(robot.controller.source.topic)
         raw = bag.read(sorted(wanted), progress)
-        samples: dict[str, TimedSamples] = {}
-        notices: list[Notice] = []
-        columns = {
-            need.name: read_columns(raw[need.source.topic], types[need.name], need.source.field, decode_all)
-            for need in needed
-        }
-        stamps = {name: found.stamps for name, found in columns.items()}
-        for need in needed:
-            topic = raw[need.source.topic]
-            samples[need.name], found = _samples(need, topic, types[need.name], columns[need.name], stamps)
-            notices += found
-            notices += _surplus(need.name, topic, bag.count(topic.name))
+        notices = [notice for need in needed for notice in _surplus(need.name, raw[need.source.topic], bag)]
         goal, found = _goal(bag, robot, raw, decode_all)
+        notices += found
+    parts = {n.name: message_parts(raw[n.source.topic], types[n.name], n.source.field, decode_all) for n in needed}
+    posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
+    notices += found
+    columns = {need.name: fitting_messages(parts[need.name], *wanted_of(need)) for need in needed}
+    samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
+    notices += found
+    samples, seams, found = _on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
+    notices += found
+    for need in needed:
+        samples[need.name], found = _cleaned(need, samples[need.name])
         notices += found
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
@@ -93,7 +104,84 @@ def read_recording(
         notices += timing_notices(stream.name, stream.times)
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
-    return Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal)
+    recording = Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal, posture=posture)
+    if seams:
+        recording = recording.leaving_out([((a - start_ns) / 1e9, (b - start_ns) / 1e9) for a, b in seams])
+    recording = with_silences_left_out(recording, robot.motor_encoder.name)
+    return replace(recording, notices=by_importance(recording.notices))
+
+
+def _encoders(robot: Robot) -> list[str]:
+    """Sensors whose messages may name joints that the robot does not model."""
+    return [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder | LinkEncoder)]
+
+
+def wanted_of(need: StreamSource) -> tuple[tuple[str, ...], int | None]:
+    """Names that a message must have, and number of values of one without names."""
+    names = need.source.names
+    by_place = bool(names) and all(name.isdecimal() for name in names)
+    return ((), None) if by_place else (names, len(need.channels))
+
+
+def _in_bag_order(
+    needed: Sequence[StreamSource],
+    raw: Mapping[str, RawTopic],
+    types: Mapping[str, MessageType],
+    columns: Mapping[str, Columns],
+    known: Container[str],
+) -> tuple[dict[str, TimedSamples], list[Notice]]:
+    """The channels of every stream, in the order of the bag and the unit of the bag."""
+    samples, notices = dict[str, TimedSamples](), list[Notice]()
+    stamps = {name: found.stamps for name, found in columns.items()}
+    for need in needed:
+        topic, message_type = raw[need.source.topic], types[need.name]
+        samples[need.name], found = _samples(need, topic, message_type, columns[need.name], stamps, known=known)
+        notices += found
+    return samples, notices
+
+
+def _on_one_time_axis(
+    samples: dict[str, TimedSamples], stamped: Sequence[str]
+) -> tuple[dict[str, TimedSamples], list[tuple[int, int]], list[Notice]]:
+    """All streams with stamps of one clock that was never set, and where it was [ns]; still in the order of the bag."""
+    notices = list[Notice]()
+    for name in stamped:
+        samples[name], found = without_unfilled(name, samples[name])
+        notices += found
+    moved, seams, found = on_one_clock({name: samples[name] for name in stamped})
+    notices += found
+    moved, found = brought_together(moved)
+    return {**samples, **moved}, seams, notices + found
+
+
+def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
+    """The samples of one stream in the order of their stamps and in SI units, without those that are none."""
+    samples, notices = in_time_order(need.name, samples)
+    if need.name != "command":  # commands jump and repeat themselves as they like
+        samples, found = cleaned_sensor(need.name, need.channels, samples, need.source.wraps)
+        notices += found
+    return replace(samples, values=in_si(need.source, samples.values)), notices
+
+
+def cleaned_sensor(
+    name: str, channels: tuple[str, ...], samples: TimedSamples, wraps: float = 0.0
+) -> tuple[TimedSamples, list[Notice]]:
+    """Samples of a sensor without those of a second publisher, glitches and repetitions, and what was left out.
+
+    Args:
+        name: of the stream.
+        channels: name of each column.
+        samples: in the order of their stamps, finite, in the unit of the bag.
+        wraps: period of the counter behind them, 0 for none.
+
+    Raises:
+        RecordingError: so much would be left out that something else is wrong.
+    """
+    samples, notices = without_second_publisher(name, channels, samples)
+    samples, found = without_glitches(name, channels, samples, wraps)
+    notices += found
+    samples, found = without_repetitions(name, samples)
+    return samples, notices + found
 
 
 def _goal(
@@ -106,11 +194,13 @@ def _goal(
     try:
         message_type = check_topic(bag, need.source)
         topic = raw[need.source.topic]
-        columns = read_columns(topic, message_type, need.source.field, decode_all)
-        samples, notices = _samples(need, topic, message_type, columns, {})
+        parts = message_parts(topic, message_type, need.source.field, decode_all)
+        samples, notices = _samples(need, topic, message_type, fitting_messages(parts, *wanted_of(need)), {}, nan=True)
+        samples, found = in_time_order(need.name, samples)
+        samples = replace(samples, values=in_si(need.source, samples.values))
     except RecordingError as err:
         return None, [Notice("goal", "info", 0, f"goal: {err}; the controller cannot be simulated")]
-    return (need, samples), notices
+    return (need, samples), notices + found
 
 
 def check_topic(bag: Bag, source: Topic) -> MessageType:
@@ -156,14 +246,26 @@ def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64
 
 
 def read_columns(
-    topic: RawTopic, message_type: MessageType, field: str, decode_all: bool = False, first: int = 0
+    topic: RawTopic,
+    message_type: MessageType,
+    field: str,
+    decode_all: bool = False,
+    first: int = 0,
+    wanted: Sequence[str] = (),
+    width: int | None = None,
 ) -> Columns:
-    """One field of a topic: on the fast path where all messages are laid out alike, else by full decoding.
+    """One field of the messages of a topic that belong together.
 
-    `first` is the number of the first message in its topic.
+    Args:
+        topic: the messages.
+        message_type: their type.
+        field: dotted path of the numbers.
+        decode_all: decode every message in full, as a reference for the fast path.
+        first: number of the first message in its topic.
+        wanted: names that a message must have; empty for those that most messages share.
+        width: number of values of messages without names; None for what most have.
     """
-    columns = None if decode_all else fast_columns(topic.data, message_type, field)
-    return columns or slow_columns(topic.data, message_type, field, topic.name, first)
+    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
 
 
 def _samples(
@@ -172,24 +274,43 @@ def _samples(
     message_type: MessageType,
     columns: Columns,
     others: Mapping[str, NDArray[np.int64] | None],
+    nan: bool = False,
+    known: Container[str] = (),
 ) -> tuple[TimedSamples, list[Notice]]:
-    """The samples of one stream in SI units and in the order of their stamps; `others` has those of all sensors."""
-    order, notices = column_order(need, columns)
-    stamps = columns.stamps
+    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay;
+    joints that are `known` are not said to be ignored.
+    """
+    order, notices = column_order(need, columns, known)
+    notices += left_out_notices(need.name, columns)
+    received, stamps = columns.of(topic.received_ns), columns.stamps
+    values = columns.values[:, order]
     if stamps is None:
-        stamps = topic.received_ns
+        stamps = received
         text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
         notices.append(Notice(need.name, "info", len(stamps), text))
-    values = in_si(need.source, columns.values[:, order])
     if need.source.stamped_by:
-        values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, values, others)
+        whole = continued(values, need.source.wraps) if need.source.wraps else values
+        values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)
         notices += found
-    samples, found = in_time_order(need.name, TimedSamples(stamps, topic.received_ns, values))
+    samples = TimedSamples(stamps, received, values)
+    if nan:
+        return samples, notices
+    samples, found = without_gibberish(need.name, need.channels, samples)
     return samples, notices + found
 
 
-def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp], list[Notice]]:
-    """Which column of the message belongs to which channel."""
+def left_out_notices(name: str, columns: Columns) -> list[Notice]:
+    """What was left out because it does not fit the other messages."""
+    if not columns.left_out:
+        return []
+    said = ", ".join(f"{counted(part.count, 'message')} {part.what}" for part in columns.left_out)
+    return [Notice(name, "foreign", sum(part.count for part in columns.left_out), f"{name}: left out {said}")]
+
+
+def column_order(
+    need: StreamSource, columns: Columns, known: Container[str] = ()
+) -> tuple[NDArray[np.intp], list[Notice]]:
+    """Which column of the message belongs to which channel; joints that are `known` otherwise are not ignored."""
     place = f"topic {need.source.topic}, field {need.source.field!r}"
     width, wanted = columns.values.shape[1], need.source.names
     names = columns.names or ()
@@ -212,7 +333,7 @@ def column_order(need: StreamSource, columns: Columns) -> tuple[NDArray[np.intp]
             f"set `names` of {need.name} in the robot file"
         )
     _refuse_repeated(names, place)
-    extra = [name for name in names if name not in wanted]
+    extra = [name for name in names if name not in wanted and name not in known]
     text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
     notices = [Notice(need.name, "info", len(extra), text)] if extra else []
     return np.array([names.index(name) for name in wanted]), notices
@@ -235,8 +356,8 @@ def _refuse_repeated(names: Sequence[str], place: str) -> None:
         raise RecordingError(f"{place}: the joint name {repeated[0]!r} stands {names.count(repeated[0])} times")
 
 
-def _surplus(name: str, topic: RawTopic, promised: int) -> list[Notice]:
-    more = len(topic.data) - promised
+def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:
+    more = len(topic.data) - bag.count(topic.name)
     text = f"{name}: {more} messages more than the bag's index promises; all are used"
     return [Notice(name, "info", more, text)] if more > 0 else []
 

@@ -3,18 +3,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recording import Notice
+from jointscope.tools.bags.durations import counted, duration
 
 Array = NDArray[np.float64]
 
 GAP_PERIODS = 1.5  # a step longer than this many median periods, plus six times their spread, misses samples
 JITTER_SHARE = 0.02  # of the median period
+LONG_GAP = 3.5  # periods; shorter ones are a lost sample or two
+MISSING_SHARE = 0.02  # of the samples
+WORTH_SAYING = 0.2  # of the period: jitter that makes samples uneven
+IMPORTANCE = (
+    "unit", "axes", "clock", "foreign", "glitch", "gap", "dropped", "posture", "staircase", "clipping", "out_of_order",
+    "duplicate", "info", "jitter",
+)  # fmt: skip
 CLIPPED_RUN = 3  # equal extreme samples in a row
+LIMIT_SHARE = 0.2  # of a channel's largest value: below it an extreme is no limit
 CLIPPED_COUNT = 20  # samples on the plateaus of one channel
 
 
@@ -66,21 +76,26 @@ def timing(times: Array) -> Timing:
 
 
 def timing_notices(name: str, times: Array) -> list[Notice]:
-    """Notices about gaps and jitter of a stream with these times, shape (n,) [s]."""
+    """Notices about gaps and jitter of a stream with these times, shape (n,) [s]; trifles are not worth a word."""
     seen, notices = timing(times), []
-    if seen.gaps:
+    if seen.longest_gap > LONG_GAP * seen.period or seen.missing > MISSING_SHARE * len(times):
         text = (
-            f"{name}: {seen.gaps} gap{'s' * (seen.gaps > 1)}, about {seen.missing} samples missing; "
-            f"the longest is {seen.longest_gap:.4g} s at {seen.longest_gap_at:.3f} s"
+            f"{name}: {counted(seen.gaps, 'gap')}, about {counted(seen.missing, 'sample')} missing; the longest is "
+            f"{duration(seen.longest_gap)} at {seen.longest_gap_at:.3f} s"
         )
         notices.append(Notice(name, "gap", seen.gaps, text))
-    if seen.jitter > JITTER_SHARE * seen.period:
+    if seen.jitter > WORTH_SAYING * seen.period:
         text = (
-            f"{name}: the period is {1e3 * seen.period:.4g} ms with a jitter of {1e3 * seen.jitter:.3g} ms "
-            f"({seen.irregular} steps differ by more than 2 %)"
+            f"{name}: samples come every {duration(seen.period)}, give or take {duration(seen.jitter)}; each counts at "
+            "its own stamp"
         )
         notices.append(Notice(name, "jitter", seen.irregular, text))
     return notices
+
+
+def by_importance(notices: Sequence[Notice]) -> list[Notice]:
+    """The same notices, what matters most first."""
+    return sorted(notices, key=lambda notice: IMPORTANCE.index(notice.kind) if notice.kind in IMPORTANCE else 0)
 
 
 def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: str) -> list[Notice]:
@@ -94,14 +109,18 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
     """
     parts, total = [], 0
     for column, channel in zip(values.T, channels, strict=True):
-        for extreme in (column.min(), column.max()) if np.isfinite(column).all() else ():
-            count = _clipped(column, extreme) if extreme else 0  # a command of zero is rest
+        low, high = (column.min(), column.max()) if np.isfinite(column).all() and len(column) else (0.0, 0.0)
+        for extreme in (low, high):
+            # the smaller end of a range that lies on one side is where a signal rests, not a limit
+            is_limit = abs(extreme) > LIMIT_SHARE * max(-low, high)
+            count = _clipped(column, extreme) if is_limit else 0
             if count >= CLIPPED_COUNT:
                 parts.append(f"{channel} at {extreme:.6g}{'' if unit == '1' else ' ' + unit} in {count} samples")
                 total += count
-    return [Notice(name, "clipping", total, f"{name} stays at a limit while it moves: {'; '.join(parts)}")] * bool(
-        parts
-    )
+    if not parts:
+        return []
+    meaning = "what acted may be less than was asked for" if name == "command" else "it was beyond what can be measured"
+    return [Notice(name, "clipping", total, f"{name} stays at a limit while it moves ({meaning}): {'; '.join(parts)}")]
 
 
 def _clipped(column: Array, extreme: float) -> int:

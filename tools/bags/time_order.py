@@ -3,36 +3,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice
+from jointscope.tools.bags.durations import counted, duration
+from jointscope.tools.bags.timed_samples import TimedSamples as TimedSamples
 
 LATE_ALLOWED = 0.5  # [s] messages overtake each other by less than this; more is a clock that was set back
 FORWARD_ALLOWED = 3600.0  # [s] a longer pause inside one stream is a clock that was set
+CUT = (
+    "use the part before or after it, cut out with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`, "
+    "or record again"
+)
 RUN_OF_LATE_SAMPLES = 10  # this many in a row, between samples that were there already, is a clock, too
-
-
-@dataclass(frozen=True)
-class TimedSamples:
-    """Samples with their two times.
-
-    Attributes:
-        stamps: time of measurement, shape (n,) [ns].
-        received: time of writing to the bag, shape (n,) [ns].
-        values: shape (n, m).
-    """
-
-    stamps: NDArray[np.int64]
-    received: NDArray[np.int64]
-    values: NDArray[np.float64]
-
-    def take(self, index: NDArray[np.intp]) -> TimedSamples:
-        """Some of the samples."""
-        return TimedSamples(self.stamps[index], self.received[index], self.values[index])
 
 
 def in_time_order(name: str, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
@@ -61,13 +46,15 @@ def in_time_order(name: str, samples: TimedSamples) -> tuple[TimedSamples, list[
     late = int(np.count_nonzero(stamps < np.maximum.accumulate(stamps)))
     if late:
         samples = samples.take(np.argsort(stamps, kind="stable"))
-        worst = float((np.maximum.accumulate(stamps) - stamps).max()) / 1e9
-        text = f"{name}: {late} samples came out of order, at most {worst:.4g} s late; sorted by stamp"
+        worst = duration(float((np.maximum.accumulate(stamps) - stamps).max()) / 1e9)
+        text = f"{name}: {counted(late, 'sample')} came out of order, at most {worst} late; sorted by stamp"
         notices.append(Notice(name, "out_of_order", late, text))
     keep = np.flatnonzero(np.diff(samples.stamps, prepend=samples.stamps[0] - 1))
     dropped = len(samples.stamps) - len(keep)
     if dropped:
-        text = f"{name}: {dropped} samples repeat the stamp of the one before; dropped, the first of each stays"
+        text = (
+            f"{name}: left out {counted(dropped, 'sample')} with the stamp of the one before; the first of each stays"
+        )
         notices.append(Notice(name, "duplicate", dropped, text))
         samples = samples.take(keep)
     return samples, notices
@@ -80,15 +67,15 @@ def _check_clock(name: str, stamps: NDArray[np.int64]) -> None:
     if len(ahead) and ahead.max() > FORWARD_ALLOWED * 1e9:
         k = int(np.argmax(np.diff(newest))) + 1
         raise RecordingError(
-            f"{name}: the stamps jump forward by {ahead.max() / 1e9:.4g} s at message {k}; expected one clock without "
-            "jumps: cut the recording there"
+            f"{name}: the stamps jump forward by {duration(ahead.max() / 1e9)} at message {k}, and the times of "
+            f"reception do not tell why; expected one clock without jumps: {CUT}"
         )
     steps = np.diff(stamps)
     back = int(np.argmin(steps)) + 1 if len(steps) else 0
     if late.max() > LATE_ALLOWED * 1e9 or _runs_twice(stamps, late > 0):
         raise RecordingError(
-            f"{name}: the stamps go back by {-steps[back - 1] / 1e9:.4g} s at message {back} and do not recover; "
-            "expected one clock without jumps: cut the recording there"
+            f"{name}: the stamps go back by {duration(steps[back - 1] / 1e9)} at message {back} and do not recover, "
+            f"and the times of reception do not tell why; expected one clock without jumps: {CUT}"
         )
 
 

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which messages of a topic belong together, by the names in them: several nodes may publish on one topic.
+
+Of messages that name joints, those are used that name all that are wanted, in whatever order and whatever else they
+name. Of messages without names, those with the right number of values. All others are left out and counted by what they
+are.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from jointscope.robots.errors import RecordingError
+from jointscope.tools.bags.columns import Columns, LeftOut
+from jointscope.tools.bags.message_parts import MessageParts
+
+NAMES_SAID = 6
+
+
+def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int | None = None) -> Columns:
+    """The messages that fit.
+
+    Args:
+        found: the messages in parts.
+        wanted: names that a message must have; empty for those that most messages share.
+        width: number of values that a message without names must have; None for what most messages have.
+
+    Returns:
+        Their columns: the wanted names first, then others that all of them have. Where no message fits, the largest
+        part as it is.
+
+    Raises:
+        RecordingError: the wanted joints never stand together in one message.
+    """
+    parts = found.parts
+    if len(parts) == 1:
+        return _with_broken(parts[0], found.broken)
+    named = [part for part in parts if _is_sound(part)]
+    core = tuple(wanted) or _most_shared(named)
+    if core:
+        chosen = [part for part in named if set(core) <= set(part.names or ())]
+        if not chosen and wanted:
+            _refuse_scattered(found, named, core)
+    else:
+        chosen = []
+    if not chosen:
+        return _with_broken(_unnamed(parts, width), found.broken)
+    first = chosen[0].names or ()
+    common = [name for name in first if name not in core and all(name in (part.names or ()) for part in chosen)]
+    names = (*core, *common) if wanted else tuple(name for name in first if name in {*core, *common})
+    used = {id(part) for part in chosen}
+    return _together(chosen, names, [part for part in parts if id(part) not in used], found.broken)
+
+
+def remaining(found: MessageParts, used: Columns) -> MessageParts:
+    """The messages that were left out, for whom they may concern."""
+    rows = set(() if used.rows is None else used.rows.tolist())
+    parts = [part for part in found.parts if part.rows is not None and not rows & set(part.rows.tolist())]
+    return MessageParts(found.topic, found.field, tuple(parts), 0)
+
+
+def _is_sound(part: Columns) -> bool:
+    """Whether the messages have one name for every value."""
+    names = part.names or ()
+    return bool(names) and len(names) == part.values.shape[1] and len(set(names)) == len(names)
+
+
+def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:
+    """Names of the part that brings the most values, over all messages that have them."""
+
+    def values(part: Columns) -> int:
+        own = set(part.names or ())
+        return len(own) * sum(len(other.values) for other in named if own <= set(other.names or ()))
+
+    return max(named, key=values).names or () if named else ()
+
+
+def _refuse_scattered(found: MessageParts, named: Sequence[Columns], wanted: Sequence[str]) -> None:
+    """Joints of one robot that different nodes publish never stand in one message."""
+    counts = Counter({name: sum(len(p.values) for p in named if name in (p.names or ())) for name in wanted})
+    if named and all(counts.values()):
+        said = ", ".join(f"{name} in {counts[name]}" for name in wanted)
+        raise RecordingError(
+            f"topic {found.topic}, field {found.field!r}: no message names all of {', '.join(wanted)}: {said}; "
+            "expected them in one message: let one node publish them together, or calibrate the joints of one node at a time "
+            "(`jointscope init URDF BAG --joints ...`)"
+        )
+
+
+def _unnamed(parts: Sequence[Columns], width: int | None) -> Columns:
+    """The messages without names that have the right number of values; without any the largest part."""
+    plain = [part for part in parts if not part.names and part.values.shape[1]]
+    if width is not None:
+        plain = [part for part in plain if part.values.shape[1] == width]
+    if not plain:
+        return parts[0]
+    best = plain[0]
+    return _together([best], None, [part for part in parts if part is not best], 0)
+
+
+def _together(
+    chosen: Sequence[Columns], names: tuple[str, ...] | None, others: Sequence[Columns], broken: int
+) -> Columns:
+    rows = np.concatenate([part.rows for part in chosen if part.rows is not None])
+    order = np.argsort(rows, kind="stable")
+    values = []
+    for part in chosen:
+        at = {name: k for k, name in enumerate(part.names or ())}
+        values.append(part.values if names is None else part.values[:, [at[name] for name in names]])
+    stamps = [part.stamps for part in chosen if part.stamps is not None]
+    return Columns(
+        np.concatenate(stamps)[order] if stamps else None,
+        np.concatenate(values)[order],
+        chosen[0].names if names is None else names,
+        rows[order],
+        tuple([*_kinds(others, {*(names or ())}), *_broken(broken)]),
+    )
+
+
+def _with_broken(part: Columns, broken: int) -> Columns:
+    return Columns(part.stamps, part.values, part.names, part.rows, (*part.left_out, *_broken(broken)))
+
+
+def _broken(count: int) -> list[LeftOut]:
+    return [LeftOut(count, "that cannot be decoded")] if count else []
+
+
+def _kinds(others: Sequence[Columns], used: set[str]) -> list[LeftOut]:
+    """What the messages are that do not fit."""
+    kinds: Counter[str] = Counter()
+    foreign: dict[str, None] = {}
+    for part in others:
+        names, width = part.names or (), part.values.shape[1]
+        if not width:
+            kind = "without values"
+        elif names and len(names) != width:
+            kind = f"with {width} value{'s' * (width != 1)} for {len(names)} names"
+        elif len(set(names)) < len(names):
+            kind = "in which a joint stands twice"
+        elif not names:
+            kind = f"without names, of {width} value{'s' * (width != 1)}" if used else f"of {width} values"
+        elif used & set(names):
+            kind = "that lack some of the joints"
+        else:
+            kind = "of other joints"
+            foreign |= dict.fromkeys(names)
+        kinds[kind] += len(part.values)
+    listed = ", ".join([*list(foreign)[:NAMES_SAID], *["..."] * (len(foreign) > NAMES_SAID)])
+    return [LeftOut(n, f"{kind} ({listed})" if kind == "of other joints" else kind) for kind, n in kinds.most_common()]
