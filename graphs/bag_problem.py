@@ -97,6 +97,10 @@ class BagProblem:
         """The same problem with another process noise."""
         return replace(self, dynamics=self.dynamics.with_noise(noise))
 
+    def of_robot(self, robot: Robot) -> BagProblem:
+        """The same recording, the same piece, of a robot with other choices, constants or sensors."""
+        return replace(BagProblem.of(robot, self.recording), owner=self.owner)
+
     @staticmethod
     def owners(problems: Sequence[BagProblem]) -> tuple[int, ...]:
         """Recording of each problem: all of them whole, or all of them pieces."""

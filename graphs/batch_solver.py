@@ -21,6 +21,7 @@ from jointscope.graphs.banded_solver import Elimination, eliminate
 from jointscope.graphs.convergence import Iteration, has_converged, is_crawling, is_flat, measured_rows, short_step
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
+from jointscope.graphs.state_damping import StateDamping
 from jointscope.graphs.undetermined import undetermined
 from jointscope.robots.errors import SolveError
 
@@ -113,20 +114,23 @@ def solve(
     if not np.isfinite(solution.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
     damping, measured = LAMBDA_START, measured_rows(problems)
+    bends = StateDamping.of([problem.timeline.ticks for problem in problems])
     for i in range(max_iterations):
         if progress:
             progress(f"iteration {i + 1}, cost {solution.cost:.6g}", i / max_iterations)
-        step = _try(problems, solution, hold, damping)
+        step = _try(problems, solution, hold, damping, bends)
         while not step.accepted:
-            near = 0.0 < step.in_sigmas < short_step(solution.cost, step_tolerance, measured)
-            if near and damping <= LAMBDA_START:
-                # there already: only states at a kink of the friction keep the cost from falling
-                solution.converged = True
-                return solution
-            damping *= LAMBDA_FACTOR
+            if not bends.raised([s.costs for s in solution.systems], [s.costs for s in step.systems]):
+                if damping <= LAMBDA_START and 0.0 < step.in_sigmas < short_step(
+                    solution.cost, step_tolerance, measured
+                ):
+                    # there already: only states at a kink of the friction keep the cost from falling
+                    solution.converged = True
+                    return solution
+                damping *= LAMBDA_FACTOR
             if damping > LAMBDA_LARGEST:
                 return _stuck(solution, step, step_tolerance)
-            step = _try(problems, solution, hold, damping)
+            step = _try(problems, solution, hold, damping, bends)
         solution.iterations.append(Iteration(solution.cost, step.cost, damping, step.in_sigmas))
         solution.estimate, solution.cost, solution.systems = step.estimate, step.cost, step.systems
         solution.converged = has_converged(solution.iterations, step_tolerance, measured, damping <= LAMBDA_START)
@@ -134,6 +138,7 @@ def solve(
         if solution.converged or solution.flat:
             break
         damping = max(damping / LAMBDA_FACTOR, 1e-12)
+        bends.relaxed()
     else:
         solution.flat = bool(solution.iterations) and is_crawling(solution.iterations, measured)
     return solution
@@ -166,7 +171,11 @@ class _Trial(NewtonStep):
 
 
 def newton_step(
-    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
+    problems: Sequence[BagProblem],
+    solution: Solution,
+    hold: Sequence[str] = (),
+    damping: float = 0.0,
+    bends: StateDamping | None = None,
 ) -> NewtonStep:
     """One step from the solution's normal equations, not checked against the cost.
 
@@ -175,10 +184,13 @@ def newton_step(
         solution: estimate with its normal equations; receives the Hessian.
         hold: blocks that stay.
         damping: Levenberg-Marquardt lambda, relative to the diagonal.
+        bends: further damping of some states.
     """
     shared = solution.shared
     free = free_indices(shared, hold)
-    eliminations = [eliminate(system, _of_states(damping)) for system in solution.systems]
+    of_states = _of_states(damping)
+    local = bends.values if bends else [np.zeros(1) for _ in problems]
+    eliminations = [eliminate(s, np.maximum(of_states, own)) for s, own in zip(solution.systems, local, strict=True)]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
     try:
         dp, in_sigmas = _solve_shared(H, g, free, damping)
@@ -204,9 +216,11 @@ def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequenc
     return newton_step(problems, here, hold, LAMBDA_START).estimate
 
 
-def _try(problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str], damping: float) -> _Trial:
+def _try(
+    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str], damping: float, bends: StateDamping
+) -> _Trial:
     """One damped step. The trial point is linearised at once: nearly every step is accepted."""
-    step = newton_step(problems, solution, hold, damping)
+    step = newton_step(problems, solution, hold, damping, bends)
     systems = _build(problems, step.estimate)
     cost_there = _cost(problems[0], systems, step.estimate)
     accepted = bool(np.isfinite(cost_there) and cost_there <= solution.cost * (1.0 + 1e-12))

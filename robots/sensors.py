@@ -69,6 +69,7 @@ class MotorEncoder:
         zero: reading at q_motor = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
         zero_known: False for an incremental encoder, whose zero is another one in each recording.
+        estimate_sigma: whether a calibration may find other sigmas.
     """
 
     name: str
@@ -77,6 +78,7 @@ class MotorEncoder:
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
     zero_known: bool = True
+    estimate_sigma: bool = True
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -99,6 +101,7 @@ class LinkEncoder:
         sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
         zero: reading at q_link = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
+        estimate_sigma: whether a calibration may find other sigmas.
     """
 
     name: str
@@ -106,6 +109,7 @@ class LinkEncoder:
     sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
+    estimate_sigma: bool = True
 
     @property
     def channels(self) -> tuple[str, ...]:
