@@ -71,7 +71,7 @@ class BagProblem:
     def of(robot: Robot, recording: Recording) -> BagProblem:
         """Builds the factors of a recording."""
         robot.need_link_dynamics()
-        timeline = Timeline.of(recording)
+        timeline = Timeline.of(recording, robot.command_held)
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))

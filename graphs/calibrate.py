@@ -29,11 +29,16 @@ from jointscope.graphs.whole_stage import LOOSE, History, WholeStage, anchored, 
 from jointscope.graphs.windows import windows_of
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording
+from jointscope.robots.resting_joints import must_move
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.screening import joints_without_motion, screen
+from jointscope.robots.screening import screen
 
 Array = NDArray[np.float64]
 
+MEASURED = (
+    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
+    "`held: true` in the section command makes it a command that acts until the next one"
+)
 WINDOW_ITERATIONS = 12
 
 
@@ -114,16 +119,10 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
                 "or its samples count twice"
             )
     notices = [notice for recording in recordings for notice in screen(recording, robot)]
-    resting = set(robot.joints)
-    for recording in recordings:
-        resting &= set(joints_without_motion(recording, robot))
-    if resting and every_joint:
-        joints = [joint for joint in robot.joints if joint in resting]
-        names = [f"{joint}.{law}" for joint in joints for law in ("coulomb_torque", "stiffness", "damping")]
-        raise RecordingError(
-            f"{recordings[0].path}: {', '.join(joints)} never moves, so {', '.join(names)} cannot be found; "
-            "add a recording in which it moves"
-        )
+    if every_joint:
+        must_move(robot, recordings)
+    if robot.command.held is None and not robot.command_held:
+        notices.append(Notice("command", "info", 0, MEASURED.format(robot.command.topic)))
     return notices
 
 

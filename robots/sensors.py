@@ -31,6 +31,8 @@ class Topic:
         stamped_by: sensor whose i-th stamp is the time at which each joint's i-th sample was taken, or BY_MESSAGE for
             the stamp of the message; empty where that holds for all joints.
         wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
+        held: of a drive signal: whether each value acts until the next one, as a command does, or was measured and runs
+            on between samples; None where the robot file does not say.
     """
 
     topic: str
@@ -42,6 +44,7 @@ class Topic:
     wraps: float = 0.0
     units: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
+    held: bool | None = None
 
     @property
     def factor(self) -> NDArray[np.float64]:

@@ -146,11 +146,19 @@ def _command(guess: RobotGuess) -> list[str]:
         _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),
+        *_measured(guess),
     ]
     weak = [joint for joint, drive in zip(joints, guess.drives, strict=True) if drive.confidence < 10.0]
     if weak:
         lines.append(f"  # {GUESS}: the sign of {', '.join(weak)} cannot be seen in this recording; taken as positive")
     return lines
+
+
+def _measured(guess: RobotGuess) -> list[str]:
+    """A drive signal beside the positions was measured with them."""
+    if guess.roles.command.signal.topic != guess.roles.motor_encoder.signal.topic:
+        return []
+    return [_line("held: false", "measured beside the positions; true: a command that acts until the next", False, 2)]
 
 
 def _sigma(noise: NoiseGuess, unit: str) -> str:
