@@ -19,6 +19,7 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Estimate, Progress, solve
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.graphs.calibration_summary import summarize
+from jointscope.graphs.encoder_noise import with_visible_noise
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.solver_context import in_solver_context
@@ -88,11 +89,12 @@ def _calibrated(
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
-    problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
+    seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
+    problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
     history = History()
     if near is None:
-        blunt = blunt_sharpness(robot, recordings)[:1]
+        blunt = blunt_sharpness(seen, recordings)[:1]
         first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
     else:

@@ -143,9 +143,11 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
     process = np.concatenate([r for r, _ in collector.process])
     process_sigma = np.concatenate([s for _, s in collector.process])
     u, states = problem.timeline.u, solution.estimate.states[i]
+    calibration = solution.estimate.calibrations[i]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     return BagFit(
         recording=problem.recording,
-        calibration=solution.estimate.calibrations[i],
+        calibration=calibration,
         ticks=problem.timeline.ticks,
         commands=np.vstack([u, u[-1:]]),
         states=states,
@@ -153,7 +155,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,
-        isolated=isolated_torques_of(problem, states, process),
+        isolated=isolated_torques_of(problem, states, process, values),
     )
 
 

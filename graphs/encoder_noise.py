@@ -11,14 +11,16 @@ see noise_estimation.py.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.calibration_result import ResidualSeries
 from jointscope.graphs.coarse_encoder import COARSE, encoder_steps
-from jointscope.robots.recording import Stream
+from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.robot import Robot
 from jointscope.robots.sensors import LinkEncoder, MotorEncoder
 
 Array = NDArray[np.float64]
@@ -28,6 +30,10 @@ COLOUR = 0.25  # largest autocorrelation of white residuals; a quantized encoder
 LAGS = 100  # samples
 BY_CHANCE = 4.0  # [1/sqrt(samples)] autocorrelation that white noise may show
 FOURTH_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
+SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
+ALIKE = 0.15  # relative difference of what both say about white noise
+TOO_SMALL = 1.5  # times the sigma, noise that the samples show by themselves
+TYPICAL = 1.4826  # standard deviation of normal numbers over the median of their sizes
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,34 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
             # a bound may lie beyond what is there already
             sigmas[j] = min(bounded, sigmas[j]) if wanted < sigmas[j] else max(bounded, sigmas[j])
     return sigmas
+
+
+def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
+    """The robot with sigmas that are not far below what every look at the samples shows.
+
+    With a sigma that is too small the states follow the noise, which process noise then seems to explain. Differences
+    of fourth and of sixth order see the same noise where it is white, and different parts of a motion.
+    """
+    changed = {}
+    for encoder in (robot.motor_encoder, robot.link_encoder):
+        if encoder is None or not encoder.estimate_sigma:
+            continue
+        seen = np.min([_visible_noise(r.streams[encoder.name].values) for r in recordings], axis=0)
+        sigmas = np.where(seen > TOO_SMALL * encoder.sigmas, seen, encoder.sigmas)
+        changed[encoder.name] = replace(encoder, sigmas=sigmas)
+    return robot.with_sensors(changed)
+
+
+def _visible_noise(values: Array) -> Array:
+    """White noise of each channel, shape (n,); zero where it cannot be told from motion."""
+    if len(values) < 4 * len(SIXTH_DIFFERENCE):
+        return np.zeros(values.shape[1])
+    found = []
+    for column in values.T:
+        parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
+        fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
+        found.append(sixth if abs(fourth - sixth) < ALIKE * sixth else 0.0)
+    return np.array(found)
 
 
 def _rounding(stream: Stream, sigmas: Array) -> Array:

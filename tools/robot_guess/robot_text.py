@@ -18,6 +18,7 @@ from jointscope.tools.robot_guess.signals import Signal
 GUESS = "GUESS"
 COLUMN = 48  # where comments begin
 RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
+FINEST = 1e-8  # [SI unit] sigma below which the noise is that of rounding in the computer
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -163,7 +164,7 @@ def _measured(guess: RobotGuess) -> list[str]:
 
 def _sigma(noise: NoiseGuess, unit: str) -> str:
     """The line with a sensor's noise, which was found in a unit of the bag."""
-    sigma = si_factor(unit) * noise.sigma if noise.sigma > 0 else 1e-4
+    sigma = max(si_factor(unit) * noise.sigma, FINEST) if noise.sigma > 0 else 1e-4
     reason = noise.reason if noise.sigma > 0 else "nothing to see in the recording; see the data sheet"
     return _line(f"sigma: {_number(sigma)}", f"[{si_unit(unit)}] {reason}", False, 4)
 
@@ -172,7 +173,9 @@ def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
     """The line with the noise of encoders, a list where they measure in different units."""
     if len(set(units)) == 1:
         return _sigma(noises[0], units[0])
-    values = [f"{_number(si_factor(unit) * (n.sigma or 1e-4))}" for n, unit in zip(noises, units, strict=True)]
+    values = [
+        f"{_number(max(si_factor(unit) * (n.sigma or 1e-4), FINEST))}" for n, unit in zip(noises, units, strict=True)
+    ]
     reasons = "; ".join(dict.fromkeys(n.reason for n in noises))
     return _line(f"sigma: [{', '.join(values)}]", f"[{joined([si_unit(u) for u in units])}] {reasons}", False, 4)
 
