@@ -72,7 +72,7 @@ class BagProblem:
         """Builds the factors of a recording; its robot is in the posture of the recording."""
         robot.need_link_dynamics()
         robot = robot.in_posture(recording.posture)
-        timeline = Timeline.of(recording)
+        timeline = Timeline.of(recording, robot.command_held)
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
@@ -97,6 +97,10 @@ class BagProblem:
     def with_noise(self, noise: ProcessNoise) -> BagProblem:
         """The same problem with another process noise."""
         return replace(self, dynamics=self.dynamics.with_noise(noise))
+
+    def of_robot(self, robot: Robot) -> BagProblem:
+        """The same recording, the same piece, of a robot with other choices, constants or sensors."""
+        return replace(BagProblem.of(robot, self.recording), owner=self.owner)
 
     @staticmethod
     def owners(problems: Sequence[BagProblem]) -> tuple[int, ...]:

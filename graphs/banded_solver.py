@@ -65,12 +65,12 @@ class Elimination:
         return x
 
 
-def eliminate(system: NormalEquations, damping: float = 0.0, first_tick: int = 0) -> Elimination:
+def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick: int = 0) -> Elimination:
     """Factorises the chain and forms the Schur complement.
 
     Args:
         system: normal equations.
-        damping: Levenberg-Marquardt lambda, relative to the diagonal.
+        damping: Levenberg-Marquardt lambda, relative to the diagonal; of all ticks, or of each, shape (m,).
         first_tick: tick of the first state, for messages.
 
     Raises:
@@ -95,15 +95,15 @@ def eliminate(system: NormalEquations, damping: float = 0.0, first_tick: int = 0
     return Elimination(L, W, w, system.C - W.T @ W, system.g_p - W.T @ w, d)
 
 
-def _banded(system: NormalEquations, damping: float) -> Array:
+def _banded(system: NormalEquations, damping: float | Array) -> Array:
     """Lower band of A, column by column, shape (2d, m d)."""
     m, d = system.g_x.shape
     columns = np.zeros((m, d, 2 * d))
     for b in range(d):
         columns[:, b, : d - b] = system.D[:, b:, b]
         columns[:-1, b, d - b : 2 * d - b] = system.E[:, :, b]
-    if damping:
-        columns[:, :, 0] *= 1.0 + damping
+    if np.any(damping):
+        columns[:, :, 0] *= 1.0 + np.reshape(damping, (-1, 1))
     return columns.reshape(m * d, 2 * d).T
 
 

@@ -25,6 +25,7 @@ from jointscope.graphs.convergence import Iteration, has_converged, is_crawling,
 from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.shared_layout import SharedLayout
+from jointscope.graphs.state_damping import StateDamping
 from jointscope.graphs.undetermined import undetermined
 from jointscope.robots.errors import SolveError
 
@@ -82,7 +83,8 @@ def solve(
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
     graph, values = CondensedGraph.of(problems, start, hold)
-    descent = _Descent(graph, values, graph.cost(values))
+    cost, bends = graph.cost(values), StateDamping.of([problem.timeline.ticks for problem in problems])
+    descent = _Descent(graph, values, cost, graph.costs, bends)
     if not np.isfinite(descent.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
     descent.run(max_iterations, step_tolerance, measured_rows(problems), progress)
@@ -101,11 +103,13 @@ def solve(
 
 @dataclass
 class _Descent:
-    """The iterations of one solve; attributes as in `Solution`."""
+    """The iterations of one solve; attributes as in `Solution`, `costs` by tick and the damping that they ask for."""
 
     graph: CondensedGraph
     values: gtsam.Values
     cost: float
+    costs: list[Array]
+    bends: StateDamping
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
@@ -124,17 +128,20 @@ class _Descent:
             if self.converged or self.flat:
                 return
             damping = max(accepted / LAMBDA_FACTOR, 1e-12)
+            self.bends.relaxed()
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
 
     def _lowered(self, damping: float, tolerance: float, measured: int) -> float | None:
         """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
         while True:
-            step = damped_step(self.graph, self.values, damping)
-            cost = self.graph.cost(step.values)
+            step = damped_step(self.graph, self.values, damping, self.bends.values)
+            cost, costs = self.graph.cost(step.values), self.graph.costs
             if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
                 self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
-                self.values, self.cost = step.values, cost
+                self.values, self.cost, self.costs = step.values, cost, costs
                 return damping
+            if self.bends.raised(self.costs, costs):
+                continue
             if 0.0 < step.in_sigmas < short_step(self.cost, tolerance, measured) and damping <= LAMBDA_START:
                 # there already: only states at a kink of the friction keep the cost from falling
                 self.converged = True

@@ -9,50 +9,39 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Progress, Solution, first_step, solve, total_cost
-from jointscope.graphs.calibration_result import CalibrationResult, IterationRecord
-from jointscope.graphs.calibration_summary import Solved, summarize
+from jointscope.graphs.batch_solver import Progress, solve
+from jointscope.graphs.calibration_result import CalibrationResult
+from jointscope.graphs.calibration_summary import summarize
+from jointscope.graphs.encoder_noise import with_visible_noise
 from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
-from jointscope.graphs.memory_start import with_filled_memories
-from jointscope.graphs.noise_estimation import densities, estimate_noise, not_below, scaled
+from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.suspicions import names_suspicions
-from jointscope.graphs.time_shift_start import placed, with_best_shifts
+from jointscope.graphs.time_shift_start import with_best_shifts
 from jointscope.graphs.turned_mounting import held, released, turned_without_reason
+from jointscope.graphs.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.windows import windows_of
-from jointscope.robots.effect_kinds.time_shift import TimeShift
-from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording
+from jointscope.robots.resting_joints import must_move
 from jointscope.robots.robot import ProcessNoise, Robot
-from jointscope.robots.screening import joints_without_motion, screen
+from jointscope.robots.screening import screen
 
 Array = NDArray[np.float64]
 
-LOOSE = 0.3  # [rad/s/sqrt(s)] densities at which every calibration begins; the paper's are 0.35 and 0.26
-APPROACH = 1.0 / 6.0  # [LOOSE] noise with which the whole recording is approached
-NOISE_AGREES = 0.25  # relative difference of windows and whole recording that asks for no second pass
-NOISE_PASSES = 10  # at the most; where the noise of the windows was right, one does
-MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
+MEASURED = (
+    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
+    "`held: true` in the section command makes it a command that acts until the next one"
+)
 WINDOW_ITERATIONS = 12
-NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
-
-
-@dataclass
-class _History:
-    """Iterations of all stages."""
-
-    records: list[IterationRecord]
-
-    def add(self, stage: str, solution: Solution) -> None:
-        self.records += [IterationRecord(stage, i.cost_after, i.damping, i.step_in_sigmas) for i in solution.iterations]
 
 
 @in_solver_context
@@ -101,27 +90,22 @@ def _calibrated(
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
-    problems = [BagProblem.of(replace(robot, noise=noise), recording) for recording in recordings]
+    seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
+    problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in recordings]
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
-    history = _History([])
+    history = History()
     if near is None:
-        noise, calibrations = _windows_stage(recordings, problems, hold, history, _part(report, 0.0, 0.4))
+        blunt = blunt_sharpness(seen, recordings)[:1]
+        first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
+        noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
     else:
         calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
-    problems = _anchored(problems, calibrations)
-    solved = _whole_stage(problems, noise, calibrations, hold, history, _part(report, 0.4, 1.0))
+    problems = anchored(problems, calibrations)
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), sigmas=near is None and not biases_only)
+    solved = stage.solve(problems, noise, calibrations)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     return summarize(robot, solved, tuple(history.records), notices, hold)
-
-
-def _anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:
-    """The problems with samples placed where present values say, if stamps may be late."""
-    robot = problems[0].robot
-    if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
-        return list(problems)
-    values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
-    return placed(problems, values)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
@@ -140,16 +124,10 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
                 "or its samples count twice"
             )
     notices = [notice for recording in recordings for notice in screen(recording, robot)]
-    resting = set(robot.joints)
-    for recording in recordings:
-        resting &= set(joints_without_motion(recording, robot))
-    if resting and every_joint:
-        joints = [joint for joint in robot.joints if joint in resting]
-        names = [f"{joint}.{law}" for joint in joints for law in ("coulomb_torque", "stiffness", "damping")]
-        raise RecordingError(
-            f"{recordings[0].path}: {', '.join(joints)} never moves, so {', '.join(names)} cannot be found; "
-            "add a recording in which it moves"
-        )
+    if every_joint:
+        must_move(robot, recordings)
+    if robot.command.held is None and not robot.command_held:
+        notices.append(Notice("command", "info", 0, MEASURED.format(robot.command.topic)))
     return notices
 
 
@@ -157,7 +135,7 @@ def _windows_stage(
     recordings: Sequence[Recording],
     problems: Sequence[BagProblem],
     hold: tuple[str, ...],
-    history: _History,
+    history: History,
     progress: Progress,
 ) -> tuple[ProcessNoise, list[Calibration]]:
     """Parameters and noise from windows; returns the noise and a calibration for each recording."""
@@ -188,65 +166,9 @@ def _windows_stage(
     return noise, [replace(bag, dynamics=found.dynamics, rotations=found.rotations) for bag in bags]
 
 
-def _whole_stage(
-    problems: Sequence[BagProblem],
-    noise: ProcessNoise,
-    calibrations: Sequence[Calibration],
-    hold: tuple[str, ...],
-    history: _History,
-    progress: Progress,
-) -> Solved:
-    """All samples: first with looser noise, then with the estimated one, checked against the whole."""
-    estimate = approach(problems, noise, calibrations, hold)
-    for _ in range(NOISE_PASSES):
-        now = [p.with_noise(noise) for p in problems]
-        solution = solve(now, estimate, max_iterations=MOST_ITERATIONS, hold=hold, progress=progress)
-        history.add("all samples", solution)
-        _must_converge(solution, NUISANCE if hold else 0.0)
-        progress("residuals and uncertainties", 0.9)
-        solved = Solved.of(now, solution, hold)
-        if not noise.estimate:
-            break
-        better = scaled(noise, solved.evidence.factors)
-        if np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
-            break
-        noise, estimate = better, solution.estimate
-    return solved
-
-
-def approach(
-    problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration], hold: tuple[str, ...]
-) -> Estimate:
-    """One step over all samples with noise that is loose enough for states straight from the measurements.
-
-    Where that one step leads away, as it may under a model that lacks much, several checked ones are taken.
-    """
-    states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
-    loose = not_below(noise, APPROACH * LOOSE)
-    now = [p.with_noise(loose) for p in problems]
-    start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
-    estimate = first_step(now, start, hold)
-    if total_cost(now, estimate) < total_cost(now, start):
-        return estimate
-    return solve(now, start, max_iterations=WINDOW_ITERATIONS, hold=hold).estimate
-
-
 def _loose(noise: ProcessNoise) -> ProcessNoise:
     """Noise with which any start value can be approached; the estimation goes down from there."""
     return not_below(noise, LOOSE)
-
-
-def _must_converge(solution: Solution, enough: float) -> None:
-    """Raises unless the solver converged, gained nothing more, or made a last step shorter than `enough` sigmas."""
-    if solution.converged or solution.flat:
-        return
-    last = solution.iterations[-1]
-    if last.step_in_sigmas >= enough:
-        raise SolveError(
-            f"no convergence after {len(solution.iterations)} iterations: the last step was still "
-            f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
-            "start values may be far off, or the model may contradict the recording"
-        )
 
 
 def _part(progress: Callable[[str, float], None], start: float, stop: float) -> Progress:

@@ -158,6 +158,7 @@ class CalibrationResult:
         wall_seconds: time the calibration took [s].
         findings: sentences for the user, most important first.
         converged: False where the model contradicts the recordings so much that the values never came to rest.
+        unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
     """
 
     robot: Robot
@@ -177,6 +178,7 @@ class CalibrationResult:
     wall_seconds: float
     findings: tuple[str, ...] = field(default_factory=tuple)
     converged: bool = True
+    unsettled: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""

@@ -20,6 +20,7 @@ from jointscope.graphs.calibration_result import (
     IterationRecord,
     ParameterEstimate,
 )
+from jointscope.graphs.encoder_noise import EncoderFit, estimated_sigmas
 from jointscope.graphs.findings import findings
 from jointscope.graphs.identifiability import weak_directions
 from jointscope.graphs.isolated_torque import isolated_torques_of
@@ -29,7 +30,7 @@ from jointscope.graphs.residual_collection import BagResiduals, collect, series_
 from jointscope.graphs.robust_sigma import inflation
 from jointscope.robots.recording import Notice
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import AXES, Gyro, Sensor
+from jointscope.robots.sensors import AXES, Gyro, LinkEncoder, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,17 @@ class Solved:
     covariance: Array
     residuals: list[BagResiduals]
     evidence: NoiseEvidence
+
+    @property
+    def robot(self) -> Robot:
+        """The robot before the calibration, with the noise of sensors and motion that was used."""
+        return self.problems[0].robot
+
+    def encoder_sigmas(self, encoder: MotorEncoder | LinkEncoder) -> Array:
+        """Sigmas that the residuals of an encoder ask for, shape (n,)."""
+        bags = [(p, c.series[encoder.name]) for p, c in zip(self.problems, self.residuals, strict=True)]
+        fits = [(p.recording.streams[encoder.name], series_of(p, encoder, parts)) for p, parts in bags if parts]
+        return estimated_sigmas(encoder, [EncoderFit(*fit) for fit in fits])
 
     @staticmethod
     def of(problems: list[BagProblem], solution: Solution, hold: Sequence[str]) -> Solved:
@@ -105,7 +117,7 @@ def summarize(
         names=names,
         correlation=correlation,
         weak_directions=weak,
-        channels=_channels(robot, bags),
+        channels=_channels(solved.robot, bags),
         noise=noise,
         sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
         iterations=iterations,
@@ -114,6 +126,7 @@ def summarize(
         recording_seconds=sum(problem.recording.duration for problem in solved.problems),
         wall_seconds=0.0,
         converged=not solution.flat,
+        unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
     )
     return replace(result, findings=findings(result, notices))
 
@@ -130,9 +143,11 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
     process = np.concatenate([r for r, _ in collector.process])
     process_sigma = np.concatenate([s for _, s in collector.process])
     u, states = problem.timeline.u, solution.estimate.states[i]
+    calibration = solution.estimate.calibrations[i]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     return BagFit(
         recording=problem.recording,
-        calibration=solution.estimate.calibrations[i],
+        calibration=calibration,
         ticks=problem.timeline.ticks,
         commands=np.vstack([u, u[-1:]]),
         states=states,
@@ -140,7 +155,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,
-        isolated=isolated_torques_of(problem, states, process),
+        isolated=isolated_torques_of(problem, states, process, values),
     )
 
 
@@ -218,6 +233,9 @@ def _calibrated(
     for name, sensor in robot.sensors.items():
         if isinstance(sensor, Gyro):
             sensors[name] = _calibrated_gyro(sensor, calibration, table)
+        elif isinstance(sensor, MotorEncoder | LinkEncoder):
+            used = solved.robot.sensors[name]
+            sensors[name] = replace(sensor, sigmas=used.sigmas)
     noise = solved.problems[0].dynamics.steps.noise
     return replace(robot, parameters=new, noise=noise).with_sensors(sensors)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Progress, solve
-from jointscope.graphs.calibrate import approach, calibrate, check_recordings
+from jointscope.graphs.calibrate import calibrate, check_recordings
 from jointscope.graphs.causal_filter import filter_states
 from jointscope.graphs.comparison_result import (
     OPEN_LOOP,
@@ -34,6 +34,7 @@ from jointscope.graphs.noise_floor import SETTLING, channel_floors
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.whole_stage import approach
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.robot import Robot

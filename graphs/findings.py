@@ -9,9 +9,11 @@ import numpy as np
 
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.robots.recording import Notice
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder
 
 CHI2_LOW, CHI2_HIGH = 0.6, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
 COLOURED = 1.5  # block-robust over plain sigma from which a value counts as widened
+SAID = 0.2  # relative change of a sigma that is told
 SEVERAL = 0.25  # share of widened values from which residuals are called coloured; a few widen by chance
 
 
@@ -23,7 +25,7 @@ def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple
         notices: what the screening saw.
     """
     said = [*_not_at_rest(result), *_isolated(result), _verdict(result)]
-    said += [*_sensor_noise(result), *_process_noise(result)]
+    said += [*_unsettled(result), *_sensor_noise(result), *_other_sigmas(result), *_process_noise(result)]
     said += _coloured(result)
     said += [direction.text for direction in result.weak_directions]
     said += [f"{p.name}: {p.note}" for p in result.parameters if p.note and "prior" not in p.note]
@@ -40,6 +42,35 @@ def _not_at_rest(result: CalibrationResult) -> list[str]:
         "gained any more although values still moved; believe no value and no sigma before the missing effect is in "
         "the model: jointscope diagnose"
     ]
+
+
+def _unsettled(result: CalibrationResult) -> list[str]:
+    if not result.unsettled:
+        return []
+    return [
+        f"the iterations ended with a last step of {result.unsettled:.1g} sigma: states where joints turn over still "
+        "moved, the values did not"
+    ]
+
+
+def _other_sigmas(result: CalibrationResult) -> list[str]:
+    """Encoders whose sigma the calibration found to be another one."""
+    said = []
+    for name, before in result.start.sensors.items():
+        if not isinstance(before, MotorEncoder | LinkEncoder):
+            continue
+        now = result.robot.sensors[name].sigmas
+        changed = [
+            f"{channel} {new:.3g} {unit} (was {old:.3g})"
+            for channel, unit, old, new in zip(before.channels, before.units, before.sigmas, now, strict=True)
+            if abs(np.log(new / old)) > np.log(1.0 + SAID)
+        ]
+        if changed:
+            said.append(
+                f"the residuals are white and of another size than stated, so these sigmas were found anew: "
+                f"{', '.join(changed)}; `estimate_sigma: false` in sensors.{name} keeps yours"
+            )
+    return said
 
 
 def _isolated(result: CalibrationResult) -> list[str]:

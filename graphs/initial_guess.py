@@ -19,10 +19,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.encoder_motion import encoder_motion
 from jointscope.graphs.starts.drive_starts import with_drive_starts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.joint_parameters import JointParameters
@@ -30,7 +31,6 @@ from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-SMOOTHING = 0.008  # [s] window over which encoders are differentiated
 LEAK = 0.2  # [s] time after which a deflection from integrated gyro rates is forgotten
 SIGNAL_OF = {  # what each law of a motor multiplies
     "k_pwm": "drive",
@@ -50,16 +50,11 @@ def initial_states(problem: BagProblem, calibration: Calibration) -> Array:
 
 def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:
     """(q_link, v_link, q_motor, v_motor) of the joints, shape (m + 1, 4n)."""
-    ticks = problem.timeline.ticks
-    encoder = problem.recording.streams[problem.robot.motor_encoder.name]
-    angles = encoder.values - problem.robot.motor_encoder.zero
-    q_motor = _at(ticks, encoder.times, angles)
-    v_motor = _smooth_derivative(q_motor, ticks)
-    links = problem.robot.link_encoder
+    ticks, robot = problem.timeline.ticks, problem.robot
+    q_motor, v_motor = encoder_motion(problem.recording.streams[robot.motor_encoder.name], robot.motor_encoder, ticks)
+    links = robot.link_encoder
     if links is not None:
-        seen = problem.recording.streams[links.name]
-        q_link = _at(ticks, seen.times, seen.values - links.zero)
-        return np.hstack([q_link, _smooth_derivative(q_link, ticks), q_motor, v_motor])
+        return np.hstack([*encoder_motion(problem.recording.streams[links.name], links, ticks), q_motor, v_motor])
     v_link = _link_rates(problem, calibration, q_motor, v_motor)
     h = np.diff(ticks, prepend=ticks[0])
     keep = float(np.exp(-np.median(h) / LEAK))
@@ -204,15 +199,6 @@ def _link_rates(problem: BagProblem, calibration: Calibration, q: Array, fallbac
         left += jacobian.transpose(0, 2, 1) @ jacobian
         right = right + np.einsum("kij,ki->kj", jacobian, omega_body)
     return np.asarray(np.linalg.solve(left, right[:, :, None])[:, :, 0], dtype=np.float64)
-
-
-def _smooth_derivative(values: Array, ticks: Array) -> Array:
-    """Slope of a local parabola; polynomial at the ends, so that nothing jumps there."""
-    h = float(np.median(np.diff(ticks)))
-    width = min(2 * max(round(0.5 * SMOOTHING / h), 1) + 1, len(ticks) - 1 + len(ticks) % 2)
-    if width < 3:
-        return np.asarray(np.gradient(values, ticks, axis=0), dtype=np.float64)
-    return np.asarray(savgol_filter(values, width, 2, deriv=1, delta=h, axis=0, mode="interp"), dtype=np.float64)
 
 
 def _at(ticks: Array, times: Array, values: Array) -> Array:

@@ -10,7 +10,7 @@ Motors are not looked at: nobody reaches them, and dry friction holds a resting 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from jointscope.graphs.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.joint_states import JointStates
 from jointscope.graphs.motion_regimes import slowest_visible_speed
+from jointscope.robots.elastic_joints import ElasticJoints
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
@@ -38,6 +39,7 @@ MUCH = 0.3  # share of all that an equation lacks which its moments must hold
 ONE = 0.1  # share that a single moment must hold
 RARE = 0.1  # share of the time in which they may lie
 FEWEST = 80  # bins below which nothing is said
+PRACTICAL = 0.02  # of what the motor gives (rms): a smaller torque matters to nobody, however clearly it stands out
 
 
 @dataclass(frozen=True)
@@ -81,9 +83,12 @@ class IsolatedTorque:
         }
 
 
-def isolated_torques_of(problem: BagProblem, x: Array, defects: Array) -> tuple[IsolatedTorque, ...]:
-    """As `isolated_torques`, for a recording with its model."""
-    return isolated_torques(problem.robot, problem.recording, problem.timeline.ticks, x, defects)
+def isolated_torques_of(
+    problem: BagProblem, x: Array, defects: Array, values: Mapping[str, float] | None = None
+) -> tuple[IsolatedTorque, ...]:
+    """As `isolated_torques`, for a recording with its model, and with parameters other than the robot's own."""
+    robot = problem.robot.with_values(values or {})
+    return isolated_torques(robot, problem.recording, problem.timeline.ticks, x, defects)
 
 
 def isolated_torques(
@@ -110,7 +115,19 @@ def isolated_torques(
     centres = (0.5 * (edges[:-1] + edges[1:]))[whole]
     motion = JointStates.of(robot, ticks, x).at(centres)
     torque = np.where(_hold_still(robot, motion), 0.0, torque)
-    return _moments(robot, centres, torque, _rare(torque, motion))
+    rare = _rare(torque, motion)
+    large = np.max(np.abs(np.where(rare, torque, 0.0)), axis=0) > PRACTICAL * _given(robot, recording)
+    return _moments(robot, centres, torque, rare & large)
+
+
+def _given(robot: Robot, recording: Recording) -> Array:
+    """Root mean square torque of the motor behind each link, of the strongest one where there is none [N m]."""
+    model = ElasticJoints(robot)
+    gain = np.abs(model.drive_gain(np.array([robot.parameters[name].value for name in model.names])))
+    rms = gain * np.sqrt(np.mean(recording.command.values**2, axis=0))
+    given = np.full(robot.layout.n_link, np.max(rms))
+    given[robot.layout.joint_link] = rms
+    return given
 
 
 def _impulses(robot: Robot, defects: Array) -> Array:

@@ -22,7 +22,7 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import NewtonStep, Progress, Solution, newton_step, solve
+from jointscope.graphs.batch_solver import NewtonStep, Progress, Solution, newton_step, solve, total_cost
 from jointscope.graphs.convergence import measured_rows, short_step
 from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.normal_equations import accumulate, linearize_all
@@ -180,7 +180,8 @@ def _cycle(
     here = Solution(estimate, float("nan"), shared, systems)
     step = newton_step(problems, here, hold)
     cost = sum(system.cost for system in systems)
-    if step.in_sigmas > short_step(cost, FAR, measured_rows(problems)):
+    far = step.in_sigmas > short_step(cost, FAR, measured_rows(problems))
+    if far or total_cost(problems, step.estimate) > total_cost(problems, estimate):
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
             return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)

@@ -39,6 +39,7 @@ class NormalEquations:
         g_x: gradient by the states, shape (m, d).
         g_p: gradient by the shared values, shape (p,).
         cost: half the sum of squared whitened residuals.
+        costs: the share of each tick in it, shape (m,).
         D_next, g_next: the part of D and g_x that comes from factors reaching on to the next state; only where asked.
     """
 
@@ -48,7 +49,8 @@ class NormalEquations:
     C: Array
     g_x: Array
     g_p: Array
-    cost: float = 0.0
+    cost: float
+    costs: Array
     D_next: Array | None = None
     g_next: Array | None = None
 
@@ -64,6 +66,7 @@ class NormalEquations:
             np.zeros((m, d)),
             np.zeros(p),
             0.0,
+            np.zeros(m),
             *parts,
         )
 
@@ -160,7 +163,10 @@ def _accumulate(
     columns: dict[str, slice],
 ) -> None:
     r, J, by_block = whitened(factor, linear)
-    system.cost += 0.5 * float(np.sum(r**2))
+    squares = 0.5 * np.einsum("kr,kr->k", r, r)
+    system.cost += float(np.sum(squares))
+    if J:
+        add_at(system.costs, ticks, squares)
     _accumulate_shared(system, r, by_block, columns)
     for i, J_i in enumerate(J):
         transposed = J_i.transpose(0, 2, 1)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ticks at which states are estimated: the command stamps, so that the command is constant over every step.
 
-Steps longer than wanted (a slow or interrupted command stream) are divided; the command then acts on.
+Steps longer than wanted (a slow or interrupted command stream) are divided; the command then acts on. A drive signal
+that was measured, as a current beside the positions, runs on between its samples instead: each step gets its mean.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Recording
+from jointscope.robots.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 
@@ -38,8 +39,12 @@ class Timeline:
         return np.diff(self.ticks)
 
     @staticmethod
-    def of(recording: Recording) -> Timeline:
+    def of(recording: Recording, held: bool = True) -> Timeline:
         """Ticks from the first command to the last sample of any sensor.
+
+        Args:
+            recording: with its drive signal.
+            held: whether each value of it acts until the next one; otherwise it is linear between samples.
 
         Raises:
             RecordingError: commands and sensors do not overlap in time.
@@ -60,12 +65,25 @@ class Timeline:
         wanted = min(period, LONGEST_STEP)
         parts = np.maximum(np.round(np.diff(edges) / wanted - 0.3), 1).astype(int)
         if np.all(parts == 1):
-            return Timeline(edges, u)
+            return Timeline(edges, u if held else _means(command, edges))
         fraction = np.concatenate([np.arange(p) / p for p in parts])
         ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
-        return Timeline(ticks, np.repeat(u, parts, axis=0))
+        return Timeline(ticks, np.repeat(u, parts, axis=0) if held else _means(command, ticks))
 
     def locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """Step that holds each time, and the fraction of the step that has passed, shape (k,) each."""
         step = np.clip(np.searchsorted(self.ticks, times, side="right") - 1, 0, len(self.ticks) - 2)
         return step, (times - self.ticks[step]) / self.h[step]
+
+
+def _means(command: Stream, ticks: Array) -> Array:
+    """Mean of a signal that is linear between samples over each step, shape (m, n); the last value goes on."""
+    times = np.append(command.times, max(float(ticks[-1]), float(command.times[-1])) + 1.0)
+    values = np.vstack([command.values, command.values[-1:]])
+    pieces = 0.5 * np.diff(times)[:, None] * (values[:-1] + values[1:])
+    reached = np.vstack([np.zeros(values.shape[1]), np.cumsum(pieces, axis=0)])
+    k = np.clip(np.searchsorted(times, ticks, side="right") - 1, 0, len(times) - 2)
+    passed = (ticks - times[k])[:, None]
+    slope = (values[k + 1] - values[k]) / np.diff(times)[k, None]
+    at_ticks = reached[k] + passed * values[k] + 0.5 * slope * passed**2
+    return np.asarray(np.diff(at_ticks, axis=0) / np.diff(ticks)[:, None], dtype=np.float64)

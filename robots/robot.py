@@ -218,6 +218,16 @@ class Robot:
         return self.parameters[name]
 
     @property
+    def command_held(self) -> bool:
+        """Whether a value of the drive signal acts until the next one; a measured one runs on between its samples.
+
+        One that comes with the positions, in the same message, was measured, unless the robot file says otherwise.
+        """
+        if self.command.held is not None:
+            return self.command.held
+        return self.command.topic not in (sensor.source.topic for sensor in self.sensors.values())
+
+    @property
     def drive_gain(self) -> str | None:
         """Law that turns commands into torques: of a voltage, of a current; None where the command is a torque."""
         return {"N m": None, "A": "torque_constant"}.get(self.command.unit, "k_pwm")

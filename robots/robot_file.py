@@ -26,6 +26,7 @@ from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import ModelChoices, ProcessNoise, Robot
 from jointscope.robots.robot_consistency import check_robot
 from jointscope.robots.sensor_sections import sensor, topic
+from jointscope.robots.sensors import Topic
 from jointscope.robots.yaml_section import Section, did_you_mean
 
 FORMAT = 1
@@ -74,7 +75,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
             raise RobotError(f"{path.name}: {err}") from err
         raise
     constants = top.section("constants", {}).build(_constants)
-    command = top.section("command").build(lambda s: topic(s, joints, COMMAND_UNITS, scaled=True))
+    command = top.section("command").build(lambda s: _command(s, joints))
     sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
     controller = top.section("controller").build(lambda s: _controller(s, joints)) if "controller" in top else None
@@ -100,6 +101,11 @@ def load_robot(name_or_path: str | Path) -> Robot:
     top.finish()
     check_robot(robot)
     return robot
+
+
+def _command(section: Section, joints: tuple[str, ...]) -> Topic:
+    held = section.flag("held", True) if "held" in section else None
+    return replace(topic(section, joints, COMMAND_UNITS, scaled=True), held=held)
 
 
 def with_effects(robot: Robot, labels: Sequence[str]) -> Robot:

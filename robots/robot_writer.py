@@ -38,6 +38,9 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
             entry["sigma"] = _rounded(parameter.sigma, 3)
         entry.setdefault("prior", _rounded(parameter.prior))
         entry.setdefault("prior_sigma", _rounded(parameter.prior_sigma))
+    for encoder in (robot.motor_encoder, robot.link_encoder):
+        if encoder is not None:
+            _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)
     for gyro in robot.gyros:
         entry = document["sensors"][gyro.name]
         bias = entry.setdefault("bias", _flow({}))
@@ -70,6 +73,13 @@ def _write_locked(document: Any, locked: Mapping[str, float]) -> None:
         # behind the joints, unless a comment hangs there that belongs to what follows
         place = keys.index("joints") + 1 if "joints" not in document.ca.items else len(keys)
         document.insert(place, "locked", _flow(new))
+
+
+def _write_sigmas(entry: Any, sigmas: np.ndarray) -> None:
+    """Sigmas of an encoder, as they stand in the document where they have not changed; a list where they differ."""
+    if np.allclose(np.broadcast_to(np.asarray(entry["sigma"], float), sigmas.shape), sigmas, rtol=1e-6, atol=0.0):
+        return
+    entry["sigma"] = _rounded(sigmas[0], 3) if np.ptp(sigmas) == 0.0 else _row(sigmas, 3)
 
 
 def _write_noise(section: Any, robot: Robot) -> None:

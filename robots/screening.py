@@ -15,6 +15,7 @@ from jointscope.robots.held_joints import about_bodies
 from jointscope.robots.joint_motion import JointMotion, joint_motion
 from jointscope.robots.motor_zero import with_motor_zero
 from jointscope.robots.recording import Notice, Recording, Stream
+from jointscope.robots.resting_joints import MOVED_ANGLE, joints_without_motion, must_move, what_it_cannot_tell
 from jointscope.robots.robot import Robot
 from jointscope.robots.units import UNITS, si_factor, si_unit
 from jointscope.robots.wrapped_counter import wrapping_jump
@@ -24,14 +25,11 @@ Array = NDArray[np.float64]
 MIN_SECONDS = 0.3  # [s]
 FROZEN_SAMPLES, FROZEN_SECONDS = 20, 0.1  # [1], [s] a gyro does not repeat itself that often by chance
 MIN_SAMPLES = 100  # of each sensor
-MOVED_SIGMAS = 20.0  # an encoder that spans less than this many sigmas shows noise, not motion
-MOVED_ANGLE = 1e-3  # [rad]
 BEYOND_LIMIT = 1.2  # times the robot's limit: odd
 IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
 DUTY_LIMIT = 1.0 + 1e-6
 PERCENT = 100.0
 OVER_VOLTAGE = 1.2  # times the supply
-JOINT_PARAMETERS = ("coulomb_torque", "stiffness", "damping")
 
 
 def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
@@ -68,14 +66,6 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     notices += _check_motion(recording, robot, every_joint)
     odd = check_gyros(recording, robot, motion)
     return notices + odd + check_scales(recording, robot, suspected={notice.stream for notice in odd})
-
-
-def joints_without_motion(recording: Recording, robot: Robot) -> tuple[str, ...]:
-    """Joints whose motor encoder shows nothing but noise."""
-    encoder = robot.motor_encoder
-    span = np.ptp(recording.streams[encoder.name].values, axis=0)
-    moved = span > np.maximum(MOVED_ANGLE, MOVED_SIGMAS * encoder.sigmas)
-    return tuple(joint for joint, yes in zip(robot.joints, moved, strict=True) if not yes)
 
 
 def _check_samples(stream: Stream) -> None:
@@ -212,9 +202,7 @@ def _check_motion(recording: Recording, robot: Robot, every_joint: bool) -> list
         return []
     if len(resting) == robot.n:
         raise RecordingError("no joint moves in this recording; expected motion: nothing can be learned from rest")
-    lost = ", ".join(f"{joint}.{name}" for joint in resting for name in JOINT_PARAMETERS)
-    verb = "does" if len(resting) == 1 else "do"
-    text = f"{', '.join(resting)} {verb} not move in this recording, so it cannot tell {lost}"
     if every_joint:
-        raise RecordingError(f"{text}; record a motion of every joint")
+        must_move(robot, [recording])
+    text = what_it_cannot_tell(robot, resting)
     return [Notice(robot.motor_encoder.name, "info", len(resting), text)]

@@ -114,13 +114,13 @@ def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> Moto
     source, sigmas = _position(section, joints)
     zero_known = section.raw("zero") != UNKNOWN
     zero = section.array("zero", (len(joints),), np.zeros(len(joints))) if zero_known else np.zeros(len(joints))
-    return MotorEncoder(name, source, sigmas, zero, joints, zero_known)
+    return MotorEncoder(name, source, sigmas, zero, joints, zero_known, section.flag("estimate_sigma", True))
 
 
 def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:
     source, sigmas = _position(section, joints)
     zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
-    return LinkEncoder(name, source, sigmas, zero, joints)
+    return LinkEncoder(name, source, sigmas, zero, joints, section.flag("estimate_sigma", True))
 
 
 def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> TorqueSensor:

@@ -32,6 +32,8 @@ class Topic:
         stamped_by: sensor whose i-th stamp is the time at which each joint's i-th sample was taken, or BY_MESSAGE for
             the stamp of the message; empty where that holds for all joints.
         wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
+        held: of a drive signal: whether each value acts until the next one, as a command does, or was measured and runs
+            on between samples; None where the robot file does not say.
     """
 
     topic: str
@@ -43,6 +45,7 @@ class Topic:
     wraps: float = 0.0
     units: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
+    held: bool | None = None
 
     @property
     def factor(self) -> NDArray[np.float64]:
@@ -70,6 +73,7 @@ class MotorEncoder:
         zero: reading at q_motor = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
         zero_known: False for an incremental encoder, whose zero is another one in each recording.
+        estimate_sigma: whether a calibration may find other sigmas.
     """
 
     name: str
@@ -78,6 +82,7 @@ class MotorEncoder:
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
     zero_known: bool = True
+    estimate_sigma: bool = True
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -100,6 +105,7 @@ class LinkEncoder:
         sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
         zero: reading at q_link = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
+        estimate_sigma: whether a calibration may find other sigmas.
     """
 
     name: str
@@ -107,6 +113,7 @@ class LinkEncoder:
     sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
+    estimate_sigma: bool = True
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -99,10 +99,26 @@ class CondensedGraph:
         """Half the sum of squared whitened residuals, priors of held blocks included."""
         return float(self.graph.error(values)) + self.held_cost
 
-    def linearized(self, values: gtsam.Values, damping: float = 0.0) -> gtsam.GaussianFactorGraph:
-        """The Gaussian graph at some values; `damping` of the states, relative to the diagonal of their Hessian."""
-        for stretch in (stretch for cuts in self.stretches for stretch in cuts):
-            stretch.damping = damping
+    @property
+    def costs(self) -> list[Array]:
+        """Cost of each tick of each piece where it was evaluated last, shape (m,)."""
+        return [_overlapped([stretch.system.costs for stretch in cuts]) for cuts in self.stretches]
+
+    def linearized(
+        self, values: gtsam.Values, damping: float = 0.0, bends: Sequence[Array] = ()
+    ) -> gtsam.GaussianFactorGraph:
+        """The Gaussian graph at some values.
+
+        Args:
+            values: where it is linearised.
+            damping: of all states, relative to the diagonal of their Hessian.
+            bends: larger ones for some states of each piece, shape (m,).
+        """
+        for piece, cuts in enumerate(self.stretches):
+            for stretch in cuts:
+                first, last = stretch.ticks
+                own = bends[piece][first : last + 1] if len(bends) else np.zeros(last + 1 - first)
+                stretch.damping = np.maximum(own, damping)
         return self.graph.linearize(values)
 
     @property
@@ -198,10 +214,10 @@ def _joined(parts: Sequence[NormalEquations]) -> NormalEquations:
     """Systems of stretches side by side as one chain."""
     if len(parts) == 1:
         return replace(parts[0], C=parts[0].C.copy(), g_p=parts[0].g_p.copy())
-    D, B, g = (_overlapped([getattr(part, name) for part in parts]) for name in ("D", "B", "g_x"))
+    D, B, g, costs = (_overlapped([getattr(part, name) for part in parts]) for name in ("D", "B", "g_x", "costs"))
     E = np.concatenate([part.E for part in parts])
     C, g_p = sum(part.C for part in parts), sum(part.g_p for part in parts)
-    return NormalEquations(D, E, B, np.asarray(C), g, np.asarray(g_p), sum(part.cost for part in parts))
+    return NormalEquations(D, E, B, np.asarray(C), g, np.asarray(g_p), sum(part.cost for part in parts), costs)
 
 
 def _overlapped(parts: Sequence[Array]) -> Array:

@@ -8,6 +8,7 @@ free to follow the shared values, as long valleys are walked in tiny steps other
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import gtsam
@@ -33,18 +34,19 @@ class DampedStep:
     in_sigmas: float
 
 
-def damped_step(graph: CondensedGraph, values: gtsam.Values, damping: float) -> DampedStep:
+def damped_step(graph: CondensedGraph, values: gtsam.Values, damping: float, bends: Sequence[Array] = ()) -> DampedStep:
     """A step from some values, not checked against the cost.
 
     Args:
         graph: the recordings.
         values: where it begins.
         damping: of the shared values, relative to the diagonal of their Hessian.
+        bends: further damping of the states of each piece, shape (m,).
 
     Raises:
         SolveError: a state or a shared value that nothing determines, or a Hessian that is not finite.
     """
-    linear = graph.linearized(values, damping_of_states(damping))
+    linear = graph.linearized(values, damping_of_states(damping), bends)
     try:
         conditionals, rest = linear.eliminatePartialSequential(graph.states_ordering)
         given, in_sigmas = _shared_step(graph, rest, damping)

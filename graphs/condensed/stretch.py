@@ -57,12 +57,12 @@ class RecordingStretch:
         blocks: names of the blocks that may change.
 
     Attributes:
-        damping: Levenberg-Marquardt lambda of all states, relative to the diagonal.
+        damping: Levenberg-Marquardt lambda of each state, relative to the diagonal, shape (m,).
     """
 
     def __init__(self, problem: BagProblem, x: Array, calibration: Calibration, start: int, blocks: Sequence[str]):
         self.problem, self._start = problem, start
-        self.damping = 0.0
+        self.damping = np.zeros(len(x))
         self._d = x.shape[1]
         own = layout(calibration)
         self._kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
@@ -74,7 +74,7 @@ class RecordingStretch:
         self._size = n
         self._base = self._trial = self._evaluated(x.copy(), calibration)
         self._elimination: Elimination | None = None
-        self._eliminated_with = -1.0
+        self._eliminated_with = self.damping
 
     @property
     def ticks(self) -> tuple[int, int]:
@@ -110,7 +110,8 @@ class RecordingStretch:
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
-        if self._base is not self._trial or self._eliminated_with != self.damping:
+        same = self._elimination is not None and np.array_equal(self._eliminated_with, self.damping)
+        if self._base is not self._trial or not same:
             self._base = self._trial
             self._elimination, self._eliminated_with = self._eliminated(), self.damping
         found = self._elimination
@@ -126,7 +127,7 @@ class RecordingStretch:
     def _eliminated(self) -> Elimination | None:
         """The inner states eliminated; None where there are none."""
         system = self._base.system
-        return eliminate(self._rim(system), self.damping, self._start + 1) if len(system.D) > 2 else None
+        return eliminate(self._rim(system), self.damping[1:-1], self._start + 1) if len(system.D) > 2 else None
 
     def _rim(self, system: NormalEquations) -> NormalEquations:
         """The system with both ends counted among the shared values, held blocks left out."""
@@ -140,11 +141,13 @@ class RecordingStretch:
         else:
             C[last, first], C[first, last] = system.E[0], system.E[0].T
         for end, k in ((first, 0), (last, -1)):
-            C[end, end] = system.D[k] + self.damping * np.diag(np.diag(system.D[k]))
+            C[end, end] = system.D[k] + self.damping[k] * np.diag(np.diag(system.D[k]))
             C[end, blocks], C[blocks, end] = system.B[k][:, kept], system.B[k][:, kept].T
         C[blocks, blocks] = system.C[np.ix_(kept, kept)]
         g = np.concatenate([system.g_x[0], system.g_x[-1], system.g_p[kept]])
-        return NormalEquations(system.D[1:-1], system.E[1:-1], B, C, system.g_x[1:-1], g, system.cost)
+        return NormalEquations(
+            system.D[1:-1], system.E[1:-1], B, C, system.g_x[1:-1], g, system.cost, system.costs[1:-1]
+        )
 
     def _following(self, first: Array, last: Array, calibration: Calibration) -> Array:
         """All states, the inner ones where the last linearisation puts them for new ends and shared values."""

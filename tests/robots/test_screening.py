@@ -9,8 +9,9 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.resting_joints import joints_without_motion, must_move
 from jointscope.robots.robot_file import load_robot
-from jointscope.robots.screening import joints_without_motion, screen
+from jointscope.robots.screening import screen
 from jointscope.tools.bags.read_recording import read_recording
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
@@ -162,7 +163,34 @@ def test_a_joint_at_rest_is_noted_with_the_parameters_it_hides(doggy, good):
     )
     assert joints_without_motion(resting, doggy) == ("joint2",)
     assert expected in texts(resting, doggy)
-    assert error_of(resting, doggy, every_joint=True) == f"{expected}; record a motion of every joint"
+    said = error_of(resting, doggy, every_joint=True)
+    assert "joint2 never moves, so joint2.coulomb_torque, joint2.stiffness, joint2.damping cannot be found" in said
+    assert "add a recording that moves joint2 to this one, or lock it where it stands" in said
+    assert "--joints joint1,joint3 -o doggy.yaml" in said
+
+
+def test_no_parameter_is_asked_for_that_the_robot_does_not_have(doggy, good):
+    resting = changed(good, ENCODER, lambda values: np.where(np.arange(3) == 1, 0.4, values))
+    rigid = {name: p for name, p in doggy.parameters.items() if name not in ("joint2.stiffness", "joint2.damping")}
+    robot = dataclasses.replace(doggy, parameters=rigid)
+    with pytest.raises(RecordingError, match=r"so joint2.coulomb_torque cannot be found.*`locked: {joint2: 0.4}`"):
+        must_move(robot, [resting])
+
+
+def test_a_joint_that_rests_in_one_recording_may_move_in_another(doggy, good):
+    resting = changed(good, ENCODER, lambda values: np.where(np.arange(3) == 1, 0.4, values))
+    must_move(doggy, [resting, good])
+    with pytest.raises(RecordingError, match="joint2 never moves"):
+        must_move(doggy, [resting])
+
+
+def test_a_joint_whose_values_are_known_may_rest(doggy, good):
+    resting = changed(good, ENCODER, lambda values: np.where(np.arange(3) == 1, 0.4, values))
+    known = {
+        name: dataclasses.replace(p, fixed=p.fixed or name.startswith("joint2."))
+        for name, p in doggy.parameters.items()
+    }
+    must_move(dataclasses.replace(doggy, parameters=known), [resting])
 
 
 def test_a_recording_without_any_motion_is_refused(doggy, good):

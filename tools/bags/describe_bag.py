@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.resting_joints import must_move
 from jointscope.robots.robot import Robot
 from jointscope.robots.screening import screen
 from jointscope.robots.units import joined
@@ -212,6 +213,7 @@ def _judge(path: Path, robot: Robot, needs: tuple[NeedDescription, ...]) -> tupl
     try:
         notices = [*notices, *screen(recording, robot)]
         problem = None
+        must_move(robot, [recording])
     except RecordingError as err:
         problem = str(err)
     return problem, tuple(notice.text for notice in notices)

@@ -19,7 +19,7 @@ ANSWERS = {
     "bad": "No, do not rely on this calibration yet.",
 }
 CHI2 = (1.25, 2.0)  # mean square of a channel's residual in sigmas: fine up to the first, bad beyond the second
-TOO_SMALL = 0.4  # mean square of a channel's residual in sigmas below which the states follow the noise
+TOO_SMALL = 0.4  # mean square of a channel's residual in sigmas below which its sigma is too large
 CORRELATION = (0.25, 0.5)  # largest autocorrelation within LAGS; a quantized encoder at rest reaches 0.2
 UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open after DRIFT, in the worst window
 DRIFT = 0.1  # [s]
@@ -84,25 +84,23 @@ def _noise_as_stated(result: CalibrationResult) -> Check:
     name = "Residuals as large as the sensor noise"
     if not result.channels:
         return Check("info", name, "There are no channels to check.")
-    distance = {c: f.chi2 if f.chi2 > 1.0 else TOO_SMALL / max(f.chi2, 1e-9) for c, f in result.channels.items()}
-    worst = max(distance, key=lambda c: distance[c])
-    chi2 = result.channels[worst].chi2
-    # smaller than stated does no harm: a quantized encoder at rest looks like that
-    level = _level(distance[worst], CHI2) if chi2 > 1.0 or chi2 < TOO_SMALL else "info"
+    chi2s = {c: f.chi2 for c, f in result.channels.items()}
+    worst = max(chi2s, key=lambda c: chi2s[c])
+    smallest = min(chi2s, key=lambda c: chi2s[c])
+    level = _level(chi2s[worst], CHI2)
+    if level == "good" and chi2s[smallest] < TOO_SMALL:
+        # a sigma that was taken too large does no harm to the values
+        text = f"{smallest} has χ² per sample {significant(chi2s[smallest])}: its noise is smaller than its sigma."
+        return Check("info", name, text)
     if level == "good":
         low, high = min(f.chi2 for f in result.channels.values()), max(f.chi2 for f in result.channels.values())
         return Check(level, name, f"χ² per sample is {low:.2f} to {high:.2f} over all channels; 1 is expected.")
-    reason = (
-        "the model misses something there, or its noise is larger than stated"
-        if chi2 > 1
-        else ("its noise is smaller than stated, or the states follow the noise")
-    )
-    count = sum(d > CHI2[0] for d in distance.values())
+    count = sum(chi2 > CHI2[0] for chi2 in chi2s.values())
     return Check(
         level,
         name,
-        f"{worst} has χ² per sample {significant(chi2)} (1 is expected): {reason}. "
-        f"{count} of {len(distance)} channels are off.",
+        f"{worst} has χ² per sample {significant(chi2s[worst])} (1 is expected): the model misses something there, or "
+        f"its noise is larger than stated. {count} of {len(chi2s)} channels are off.",
     )
 
 
@@ -113,11 +111,18 @@ def _white(result: CalibrationResult) -> Check:
             found[channel] = max(found.get(channel, 0.0), value)
     if not found:
         return Check("info", "Residuals without memory", "There are no residuals to check.")
-    worst = max(found, key=lambda c: found[c])
-    level = _level(found[worst], CORRELATION)
+    levels = {c: _colour_level(value, result.channels[c].chi2) for c, value in found.items()}
+    worst = max(found, key=lambda c: (LEVELS.index(levels[c]), found[c]))
+    level = levels[worst]
     tail = "nothing systematic is left" if level == "good" else "something systematic is left in it"
     text = f"The largest autocorrelation over {LAGS} samples is {found[worst]:.2f}, in {worst}: {tail}."
     return Check(level, "Residuals without memory", text)
+
+
+def _colour_level(correlation: float, chi2: float) -> str:
+    """Residuals far below the noise of their sensor may have a memory without doing much harm."""
+    level = _level(correlation, CORRELATION)
+    return "warn" if level == "bad" and chi2 < TOO_SMALL else level
 
 
 def _even(result: CalibrationResult) -> Check:

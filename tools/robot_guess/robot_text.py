@@ -28,6 +28,7 @@ ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
 SPREAD, LOST_SPREAD = 2.0, 5.0  # [value] priors of logarithms: a factor 7, or 150, either way
 NO_PULL = 10.0  # times wider, about zero
 RESERVED = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
+FINEST = 1e-8  # [SI unit] sigma below which the noise is that of rounding in the computer
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -210,6 +211,7 @@ def _command(guess: RobotGuess) -> list[str]:
         _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),
+        *_measured(guess),
     ]
     weak = [joint for joint, drive in zip(joints, guess.drives, strict=True) if drive.confidence < 10.0]
     if weak:
@@ -217,9 +219,16 @@ def _command(guess: RobotGuess) -> list[str]:
     return lines
 
 
+def _measured(guess: RobotGuess) -> list[str]:
+    """A drive signal beside the positions was measured with them."""
+    if guess.roles.command.signal.topic != guess.roles.motor_encoder.signal.topic:
+        return []
+    return [_line("held: false", "measured beside the positions; true: a command that acts until the next", False, 2)]
+
+
 def _sigma(noise: NoiseGuess, unit: str) -> str:
     """The line with a sensor's noise, which was found in a unit of the bag."""
-    sigma = si_factor(unit) * noise.sigma if noise.sigma > 0 else 1e-4
+    sigma = max(si_factor(unit) * noise.sigma, FINEST) if noise.sigma > 0 else 1e-4
     reason = noise.reason if noise.sigma > 0 else "nothing to see in the recording; see the data sheet"
     return _line(f"sigma: {_number(sigma)}", f"[{si_unit(unit)}] {reason}", False, 4)
 
@@ -228,7 +237,9 @@ def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
     """The line with the noise of encoders, a list where they measure in different units."""
     if len(set(units)) == len(set(noises)) == 1:
         return _sigma(noises[0], units[0])
-    values = [f"{_number(si_factor(unit) * (n.sigma or 1e-4))}" for n, unit in zip(noises, units, strict=True)]
+    values = [
+        f"{_number(max(si_factor(unit) * (n.sigma or 1e-4), FINEST))}" for n, unit in zip(noises, units, strict=True)
+    ]
     reasons = "; ".join(dict.fromkeys(n.reason for n in noises))
     return _line(f"sigma: [{', '.join(values)}]", f"[{joined([si_unit(u) for u in units])}] {reasons}", False, 4)
 
