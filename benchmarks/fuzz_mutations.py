@@ -143,7 +143,8 @@ def coarse_numbers(rng: Rng, messages: Messages) -> Messages:
     grid = float(10.0 ** rng.uniform(-4, 1))
 
     def coarse(numbers: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple((grid * np.round(np.array(numbers) / grid)).tolist())
+        with np.errstate(all="ignore"):
+            return tuple((grid * np.round(np.array(numbers) / grid)).tolist())
 
     return _each(rng, messages, lambda m: replace(m, **{f: coarse(getattr(m, f)) for f in FIELDS}))
 

@@ -116,7 +116,8 @@ def test_a_simulated_arm_takes_the_torque_that_its_drives_had(odd, by_pinocchio)
         lacking.append((asked - tau)[np.abs(v[k]) > 0.02])
     lacking = np.concatenate(lacking)
     assert len(lacking) > 600
-    assert np.median(np.abs(lacking)) < 2e-3 and np.quantile(np.abs(lacking), 0.95) < 0.03
+    # the last tenth has a jump of the torque or a reversal between its samples
+    assert np.median(np.abs(lacking)) < 1e-5 and np.quantile(np.abs(lacking), 0.9) < 0.02
 
 
 def test_motions_stay_between_the_limits_and_below_the_speed(odd):

@@ -15,7 +15,7 @@ from fuzz_mutations import OF_BYTES, OF_MESSAGES
 from fuzz_trial import damaged_bag, run_trial, sound_robot_file
 
 TRIALS, DEEP, STRETCH = 200, 8, 25
-HANG = 60  # [s]
+HANG = 60  # [s] of computing
 
 
 @pytest.fixture(autouse=True)
@@ -23,16 +23,16 @@ def no_hang():
     def ring(*_):
         raise TimeoutError(f"a trial does not end within {HANG} s")
 
-    before = signal.signal(signal.SIGALRM, ring)
+    before = signal.signal(signal.SIGPROF, ring)
     yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+    signal.setitimer(signal.ITIMER_PROF, 0)
+    signal.signal(signal.SIGPROF, before)
 
 
 def findings(trials, deep=False):
     found = []
     for trial in trials:
-        signal.alarm(HANG)
+        signal.setitimer(signal.ITIMER_PROF, HANG)
         found += run_trial(trial, deep)
     return [f"trial {f.trial} ({f.damage}): {f.verb}: {f.what}: {f.where}" for f in found]
 
