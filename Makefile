@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | test | lint | bench | bench-discovery | bench-estimator | bench-real | clean
+# make demo | test | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
 # Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint style types bench bench-discovery bench-estimator bench-real clean
+.PHONY: demo test lint style types bench bench-arms bench-discovery bench-estimator bench-real fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -35,6 +35,10 @@ types: $(VENV)/dev
 bench: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench.py
 
+# About an hour; an interrupted run continues. Eight robots: .venv/bin/python benchmarks/bench_arms.py --quick
+bench-arms: $(VENV)/bench $(VENV)/code
+	$(BIN)/python benchmarks/bench_arms.py
+
 # A quarter of an hour on a machine that has nothing else to do; with --quick two minutes.
 bench-estimator: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench_estimator.py
@@ -46,6 +50,10 @@ bench-discovery: $(VENV)/bench $(VENV)/code
 # Needs the recordings in ../shared/data/real; says so and ends where they are missing.
 bench-real: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench_real.py
+
+# Below an hour; fails where something is found.
+fuzz: $(VENV)/sim $(VENV)/code
+	$(BIN)/python benchmarks/fuzz_bags.py
 
 clean:
 	rm -rf $(VENV) build demo *.egg-info .mypy_cache .pytest_cache .ruff_cache

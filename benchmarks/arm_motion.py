@@ -60,6 +60,7 @@ def make_motion(joints: Sequence[UrdfJoint], centre: Array, rng: np.random.Gener
         low, high = SLIDE if joint.kind == "prismatic" else TURN
         width = min(rng.uniform(low, high), SHARE * (joint.upper - joint.lower))
         sizes[k] = width / np.ptp(away[:, k])
+        # limits that would leave next to nothing of the motion are placeholders
         if speeds[k] * sizes[k] > SPEED_SHARE * joint.speed > 0.2 * speeds[k] * sizes[k]:
             sizes[k] = SPEED_SHARE * joint.speed / speeds[k]
         margin = 0.02 * (joint.upper - joint.lower) if np.isfinite(joint.upper) else 0.0

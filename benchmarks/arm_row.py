@@ -17,6 +17,8 @@ RIGHT, WRONG, BROKEN = "right", "wrong and called good", "broken"
 ADVISED, MISLED, STUCK = "refused, advice works", "refused, advice fails", "refused without advice"
 OUTCOMES = (RIGHT, ADVISED, MISLED, STUCK, WRONG, BROKEN)
 VERDICT = re.compile(r"^(Yes|Usable|No)\b", re.MULTILINE)
+# what findings say of pushes and mistakes; the recordings of the benchmark have none
+ACCUSING = re.compile(r"push|collision|leave-out|swapped|mirrored|left.handed|exchanged|glitch", re.IGNORECASE)
 SUPPLY = re.compile(r"motor\.supply_voltage:\s*([-+.\deE]+)")
 PLACES = {
     "inertia": ("inertia",),
@@ -67,6 +69,7 @@ class ArmRow:
         largest: largest error of a value that is not right [%], or of all [%].
         cpu: [s] of init, info and calibrate together, and of init alone.
         megabytes: the most that a verb held.
+        accused: pushes and mistakes that the calibration names; there are none.
         promised: whether both `init` and `info` said that the recording can be used.
     """
 
@@ -82,6 +85,7 @@ class ArmRow:
     init_cpu: float = 0.0
     megabytes: float = 0.0
     promised: bool = False
+    accused: list[str] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """For the file of results."""
@@ -109,6 +113,8 @@ def judge(name: str, truth: Mapping[str, Any], session: Session, folder: Path) -
         return row
     verdict = VERDICT.search(last.out)
     row.verdict = verdict.group(1) if verdict else ""
+    content = json.loads((folder / session.result).read_text(encoding="utf-8"))
+    row.accused = [str(text) for text in content.get("findings", ()) if ACCUSING.search(str(text))]
     values = found_values(truth, folder, session)
     worst = max(values, key=lambda value: (not value.right, value.percent))
     row.largest = worst.percent

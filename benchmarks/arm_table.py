@@ -38,6 +38,8 @@ def section(rows: Sequence[ArmRow]) -> Section:
     found.promise("ended in a traceback, a crash or not at all", "none", str(counted[BROKEN]), counted[BROKEN] == 0)
     failed = [row for row in rows if row.promised and not row.verdict]
     found.promise("failed after `init` and `info` had said that it can be used", "none", str(len(failed)), not failed)
+    accused = [(row.name, text) for row in rows for text in row.accused]
+    found.promise("pushes and mistakes named, of which there are none", "none", str(len(accused)), not accused)
     cpu, init = [row.cpu for row in rows], [row.init_cpu for row in rows]
     found.promise("CPU of the three commands: median", "", f"{median(cpu):.0f} s, most {max(cpu):.0f} s")
     found.promise("of it `init`: most", "below 5 s", f"{max(init):.1f} s", max(init) < 5.0)
@@ -48,6 +50,7 @@ def section(rows: Sequence[ArmRow]) -> Section:
         if row.outcome != RIGHT:
             found.notes.append(f"{row.name} ({row.outcome}): {row.message}")
             found.notes += [f"{row.name}: advised `jointscope {advice}`" for advice in row.advice]
+    found.notes += [f"{name}: named although it is not there: {text}" for name, text in accused]
     found.numbers["rows"] = [row.to_json() for row in rows]
     return found
 

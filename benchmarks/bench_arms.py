@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Brings robots as their makers ship them to `init`, `info` and `calibrate`, as a new user does, and prints the table.
 
-Usage: python benchmarks/bench_arms.py [--quick] [--only PATTERN] [--jobs N] [--folder DIR] [--results FILE] [--table]
+Usage: python benchmarks/bench_arms.py [--quick] [--only NAME] [--jobs N] [--folder DIR] [--results FILE] [--table]
+
+A second table says what is named on simulated recordings in which nothing is wrong.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache
 from pathlib import Path
 
+import perfect_recordings
 from arm_cases import QUICK, ArmCase, cases
 from arm_recording import record
 from arm_row import BROKEN, ArmRow, judge
@@ -49,6 +52,8 @@ def main() -> None:
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)})"
     print(f"# Arms{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{section(rows).markdown()}")
+    if not arguments.table and arguments.only == "*":
+        print(perfect_recordings.run(arguments.quick).markdown())
 
 
 def measure(missing: list[ArmCase], arguments: argparse.Namespace) -> Iterator[ArmRow]:

@@ -25,7 +25,8 @@ from typing import Any
 from patience import say
 
 TRIALS, DEEP = 2000, 200
-HANG = 60.0  # [s]
+HANG = 60.0  # [s] of computing
+PATIENCE = 10.0  # times that, on the wall
 LARGEST = 2048.0  # [MB]
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -61,7 +62,7 @@ def _watched(trials: range, deep: bool) -> Iterator[dict[str, Any]]:
         process = subprocess.Popen([*command, *["--deep-worker"] * deep], stdout=subprocess.PIPE)
         assert process.stdout is not None
         started = False
-        for line in _lines(process.stdout.fileno()):
+        for line in _lines(process.stdout.fileno(), process.pid):
             report = json.loads(line)
             if report["trial"] >= 0:
                 left = range(report["trial"] + 1, trials.stop)
@@ -82,18 +83,26 @@ def _watched(trials: range, deep: bool) -> Iterator[dict[str, Any]]:
             raise SystemExit("the process of the trials does not start")
 
 
-def _lines(source: int) -> Iterator[bytes]:
-    """Lines of a pipe, until it ends or is silent for too long; the first may take longer: modules are loaded."""
-    waiting, rest = 5 * HANG, b""
+def _lines(source: int, pid: int) -> Iterator[bytes]:
+    """Lines of a pipe, until it ends or its writer computes for too long, or does nothing for much longer."""
+    rest, last, last_cpu = b"", time.monotonic(), 0.0
     with selectors.DefaultSelector() as selector:
         selector.register(source, selectors.EVENT_READ)
-        while selector.select(waiting):
+        while _cpu(pid) - last_cpu < HANG and time.monotonic() - last < PATIENCE * HANG:
+            if not selector.select(1.0):
+                continue
             block = os.read(source, 65536)
             if not block:
                 return
             *whole, rest = (rest + block).split(b"\n")
-            waiting = HANG
+            last, last_cpu = time.monotonic(), _cpu(pid)
             yield from whole
+
+
+def _cpu(pid: int) -> float:
+    """What a process has computed [s]: on a busy machine a clock on the wall says little."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _work(trials: range, deep: bool) -> None:

@@ -141,9 +141,12 @@ def other_size(rng: Rng, messages: Messages) -> Messages:
 @_message
 def coarse_numbers(rng: Rng, messages: Messages) -> Messages:
     grid = float(10.0 ** rng.uniform(-4, 1))
-    return _each(
-        rng, messages, lambda m: replace(m, **{f: tuple(grid * round(x / grid) for x in getattr(m, f)) for f in FIELDS})
-    )
+
+    def coarse(numbers: tuple[float, ...]) -> tuple[float, ...]:
+        with np.errstate(all="ignore"):
+            return tuple((grid * np.round(np.array(numbers) / grid)).tolist())
+
+    return _each(rng, messages, lambda m: replace(m, **{f: coarse(getattr(m, f)) for f in FIELDS}))
 
 
 @_message
@@ -244,7 +247,7 @@ def flipped_bits(rng: Rng, data: bytes) -> bytes:
 def odd_length_field(rng: Rng, data: bytes) -> bytes:
     width = int(rng.choice([1, 2, 4, 8]))
     value = int(_pick(rng, FAMOUS)) % 256**width  # type: ignore[call-overload]
-    at = int(rng.integers(max(1, min(len(data), 4096) if rng.random() < 0.5 else len(data)) - 0))
+    at = int(rng.integers(max(1, min(len(data), 4096) if rng.random() < 0.5 else len(data))))
     return data[:at] + value.to_bytes(width, "little") + data[at + width :]
 
 
