@@ -143,7 +143,7 @@ class _LocalLaw:
         assert isinstance(here.effect, JointTorque)
         self.here, self.effect = here, here.effect
         j = self.joint = joints.index(here.owner)
-        self._weight = weight.on(here.owner)
+        self._weight = weight.on(here.owner, here.effect, {p.name: p.start for p in here.effect.parameters})
         self._q_link = layout.q_link
         self._columns = {
             **{"q_link": int(layout.joint_q[j]), "v_link": int(layout.joint_v[j])},

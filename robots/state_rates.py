@@ -52,7 +52,7 @@ class StateRates:
         self._still, self._moving = scale < 1.0, scale > 0.0
         self._scale = scale
         springs = JointSprings(layout, parameters)
-        self._linear = _linear_torques(robot, parameters, springs, motors, named)
+        self._linear = linear_torques(robot, parameters, springs, motors, named)
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
         self._coulomb = parameters.of(named, "coulomb_torque")
         self.sharpness = robot.choices.friction_sharpness
@@ -164,7 +164,7 @@ class StateRates:
         return rate
 
 
-def _linear_torques(
+def linear_torques(
     robot: Robot, parameters: JointParameters, springs: JointSprings, motors: MotorTorques, values: Mapping[str, float]
 ) -> Array:
     """Torques per state of springs, dampers, bearings and back-EMF, shape (r, d)."""
