@@ -16,10 +16,12 @@ from jointscope.factors.custom_factor import custom_factor, extract_calibration,
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Estimate, priors_of
 from jointscope.robots.errors import SolveError
+from jointscope.robots.outside_modules import need_module
 
 
 def nonlinear_graph(problems: Sequence[BagProblem], estimate: Estimate) -> gtsam.NonlinearFactorGraph:
     """All factors of all recordings, and the priors they share."""
+    need_module("gtsam")
     graph = gtsam.NonlinearFactorGraph()
     like = estimate.calibrations[0]
     for bag, problem in enumerate(problems):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.body_rates import BodyRates
 from jointscope.robots.errors import RobotError
+from jointscope.robots.outside_modules import need_module
 
 Array = NDArray[np.float64]
 
@@ -229,6 +230,7 @@ def moving_joints(urdf: Path) -> tuple[str, ...]:
 def _read_urdf(urdf: Path) -> pin.Model:
     if not urdf.is_file():
         raise RobotError(f"the URDF {urdf} does not exist; set `urdf` in the robot file, relative to that file")
+    need_module("pinocchio")
     try:
         with _quiet_stderr():
             return pin.buildModelFromUrdf(str(urdf))
