@@ -18,7 +18,6 @@ from jointscope.graphs.timeline import Timeline
 from jointscope.robots.command_path import CommandPath
 from jointscope.robots.rates_of_many import RatesOfMany
 from jointscope.robots.robot import Robot
-from jointscope.robots.state_rates import StateRates
 
 Array = NDArray[np.float64]
 Rate = Callable[[Array], Array]
@@ -35,12 +34,12 @@ class Predictor:
     """
 
     def __init__(self, robot: Robot, timeline: Timeline):
-        self._many, self._one = RatesOfMany(robot), StateRates(robot)
+        self._model = RatesOfMany(robot)
         self._euler = robot.choices.integrator == "euler"
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         self._h, u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
-        self._torque = self._many.torque_of(u)
-        self._cuts = StepCuts(robot, float(np.median(self._h)), self._one)
+        self._torque = self._model.torque_of(u)
+        self._cuts = StepCuts(robot, float(np.median(self._h)))
 
     def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States one tick later, shape (s, d).
@@ -51,16 +50,16 @@ class Predictor:
         """
         h, torque, cuts = self._h[step][:, None], self._torque[step], self._cuts
         with np.errstate(**SILENT):
-            first = self._many.rates(x, torque)
+            first = self._model.rates(x, torque)
             if self._euler:
                 return x + h * first
             if cuts.fine == cuts.coarse:
-                return _advanced(lambda at: self._many.rates(at, torque), x, first, h, cuts.coarse)
+                return _advanced(lambda at: self._model.rates(at, torque), x, first, h, cuts.coarse)
             fine, after = cuts.fine_ones(x, first, h), np.empty_like(x)
             for some, count in ((fine, cuts.fine), (~fine, cuts.coarse)):
                 if np.any(some):
                     acting = torque[some]
-                    rate = _with_torque(self._many.rates, acting)
+                    rate = _with_torque(self._model.rates, acting)
                     after[some] = _advanced(rate, x[some], first[some], h[some], count)
             return after
 
@@ -88,22 +87,11 @@ class Predictor:
         """
         path = np.full((len(self._h) + 1, len(x)), np.nan)
         path[0] = x
-        with np.errstate(**SILENT):
-            for k, h in enumerate(self._h.tolist()):
-                x = self._one_advanced(x, self._torque[k], h)
-                if not np.all(np.isfinite(x)):
-                    break
-                path[k + 1] = x
+        for step, _, after in self.paths(x[None], np.zeros(1, np.intp), len(self._h)):
+            if not np.all(np.isfinite(after)):
+                break
+            path[step[0] + 1] = after[0]
         return path
-
-    def _one_advanced(self, x: Array, torque: Array, h: float) -> Array:
-        """One state one tick later, shape (d,)."""
-        rate = _with_torque(self._one.rates, torque)
-        first = rate(x)
-        if self._euler:
-            return x + h * first
-        cuts = self._cuts
-        return _advanced(rate, x, first, h, cuts.fine if cuts.fine_ones(x, first, h) else cuts.coarse)
 
 
 def _with_torque(rates: Callable[[Array, Array], Array], torque: Array) -> Rate:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
+from jointscope.robots.effect_kinds.joint_torque import JointTorque, signals_used
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -69,12 +69,6 @@ class CarriedWeight:
 
 
 def _asks_for_load(effect: JointTorque, p: Mapping[str, Any]) -> bool:
-    """Whether a law, or the rate of its memory, uses the torque through the gear: no number there gives none then."""
-    some = np.full(1, 0.3)
-    signals = JointSignals(some, some, some, some, np.full(1, np.nan), 1.0, memory=some)
+    """Whether a law, or the rate of its memory, uses the torque through the gear."""
     laws = [effect.law] if effect.memory is None else [effect.law, effect.memory.rate]
-    try:
-        with np.errstate(invalid="ignore"):
-            return any(bool(np.any(np.isnan(law(signals, p)))) for law in laws)
-    except LookupError:  # its parameters depend on the robot
-        return True
+    return any("tau_spring" in signals_used(law, p) for law in laws)

@@ -83,8 +83,10 @@ def _another(name: str, module: ModuleType, lacking: Sequence[str]) -> str:
     place = getattr(module, "__file__", None) or "no file"
     version = getattr(module, "__version__", None)
     said = f", version {version}" if version else ""
-    needed = f"so it is not the {MODULES[name].package} that is needed"
-    return f"the Python module {name} ({place}{said}) has no {', '.join(lacking)}, {needed}; {_installed(name)}{_way(name)}"
+    return (
+        f"the Python module {name} ({place}{said}) has no {', '.join(lacking)}, "
+        f"so it is not the {MODULES[name].package} that is needed; {_installed(name)}{_way(name)}"
+    )
 
 
 def _installed(name: str) -> str:

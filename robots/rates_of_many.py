@@ -41,7 +41,8 @@ class RatesOfMany:
         robot.need_link_dynamics()
         self.layout = layout = robot.layout
         values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        parameters, self._tree, self._values = JointParameters(robot), StructuredTree(robot), values
+        parameters, tree = JointParameters(robot), StructuredTree(robot)
+        self._bodies, self._scale = tree.bodies(values), values.get(tree.coriolis_scale or "", 1.0)
         springs, motors = JointSprings(layout, parameters), MotorTorques(robot, parameters)
         self._linear = linear_torques(robot, parameters, springs, motors, values).T
         self._gain = motors.of_command(np.ones((1, robot.n)), values)[0]
@@ -52,7 +53,10 @@ class RatesOfMany:
         self._inertia, self._motors = parameters.of(values, "inertia")[own], slice(n, n + m)
         at_rest = springs.at(np.zeros((1, layout.size)), values)
         weight = CarriedWeight(robot)
-        self._laws = [_LawOfMany(h, robot, at_rest, values, weight) for h in robot.effects if _is_law(h)]
+        laws = [_LawOfMany(h, robot, at_rest, values, weight) for h in robot.effects if _is_law(h)]
+        for law in laws:
+            self._linear = self._linear + law.linear
+        self._laws = [law for law in laws if not law.is_linear]
         self._weight = weight if any(law.needs_weight for law in self._laws) else None
 
     def torque_of(self, u: Array) -> Array:
@@ -78,16 +82,28 @@ class RatesOfMany:
         n = layout.n_link
         rate = np.empty_like(x)
         rate[:, layout.positions] = x[:, layout.velocities]
-        rate[:, layout.v_link] = self._tree.acceleration(
-            x[:, layout.q_link], x[:, layout.v_link], tau[:, :n], self._values
-        )
+        rate[:, layout.v_link] = self._acceleration(x[:, layout.q_link], x[:, layout.v_link], tau[:, :n])
         rate[:, layout.v_motor] = tau[:, self._motors] / self._inertia
         rate[:, layout.memory] = tau[:, n + layout.n_motor :]
         return rate
 
+    def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Of the links, with the share of the Coriolis terms that the model has, shape (m, n_link)."""
+        moving = self._bodies.acceleration(q, v, tau)
+        if self._scale == 1.0:
+            return moving
+        still = self._bodies.acceleration(q, np.zeros_like(v), tau)
+        return still + self._scale * (moving - still)
+
 
 class _LawOfMany:
-    """The law of one effect with fixed parameters."""
+    """The law of one effect with fixed parameters.
+
+    Attributes:
+        needs_weight: whether it asks for the weight that a rigid joint carries.
+        is_linear: whether it is linear in the state, as viscous friction is.
+        linear: its torques per state if it is linear, else zero, shape (d, r).
+    """
 
     def __init__(
         self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float], weight: CarriedWeight
@@ -103,6 +119,8 @@ class _LawOfMany:
             self._rows = rows[effect.side]
             self._memory = layout.memories.index(here.label) if effect.memory is not None else -1
             self.needs_weight = weight.on(here.owner, effect, self._p) is not None
+        self.linear = self._slopes()
+        self.is_linear = bool(np.any(self.linear))
 
     def add(self, x: Array, tau: Array, load: Array | None) -> None:
         """Adds torques and rates of memories.
@@ -153,6 +171,19 @@ class _LawOfMany:
             owner=self._joint,
             sharpness=self._sharpness,
         )
+
+    def _slopes(self) -> Array:
+        """Torques per unit of each state; zero for a law that is not linear."""
+        layout = self._layout
+        found = np.zeros((layout.size, layout.n_rates))
+        if self.needs_weight:
+            return found
+        self.add(np.eye(layout.size), found, None)
+        x = np.random.default_rng(1).normal(size=(8, layout.size)) * 10.0 ** np.arange(-4.0, 4.0)[:, None]
+        torque = np.zeros((8, layout.n_rates))
+        self.add(x, torque, None)
+        exact = 1e-12 * (np.abs(x) @ np.abs(found)) + 1e-300
+        return found if np.all(np.abs(torque - x @ found) <= exact) else np.zeros_like(found)
 
 
 def _is_law(here: EffectAt) -> bool:
