@@ -151,7 +151,7 @@ def _sensor_prediction(
         sensor.sigmas,
         stream.times,
         stream.values,
-        open_loop[sensor.name],
+        np.where(np.isfinite(open_loop[sensor.name]), open_loop[sensor.name], np.nan),
         at_samples[HORIZON],
         at_samples[HORIZONS[0]],
     )
@@ -187,8 +187,10 @@ def _channels(
 
 
 def _rms(error: Array) -> float:
-    error = error[np.isfinite(error)]
-    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+    """Infinite where a prediction has run away; NaN says that there is none."""
+    error = error[~np.isnan(error)]
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
 def _worst_windows(sensors: dict[str, SensorPrediction]) -> tuple[WorstWindow, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.runge_kutta import runge_kutta, stable_substeps
+from jointscope.graphs.runge_kutta import StepCuts, runge_kutta
 from jointscope.robots.controller_gain import controller_of
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.errors import RecordingError, RobotError
@@ -123,12 +123,12 @@ class _Stepper:
 
     def __init__(self, robot: Robot):
         self._rates = StateRates(robot)
-        self._substeps = stable_substeps(robot, STEP)
+        self._cuts = StepCuts(robot, STEP, self._rates)
 
     def step(self, x: Array, u: Array) -> Array:
         """The state one step later, shape (d,)."""
-        h, torque = STEP / self._substeps, self._rates.command_torque(u)
-        for _ in range(self._substeps):
+        h, torque = STEP / self._cuts.fine, self._rates.command_torque(u)
+        for _ in range(self._cuts.fine):
             x = runge_kutta(lambda at: self._rates.rates(at, torque), x, h)
         return x
 

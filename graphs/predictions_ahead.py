@@ -141,12 +141,13 @@ def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration, 
 def predict_open_loop(
     problem: BagProblem, calibration: Calibration, predictor: Predictor, x0: Array
 ) -> dict[str, Array]:
-    """Predictions at all samples from the first state and the commands alone; NaN outside the ticks."""
+    """Predictions at all samples from the first state and the commands alone.
+
+    NaN outside the ticks, infinite where the model has run away.
+    """
     ticks = problem.timeline.ticks
-    path = np.empty((len(ticks), len(x0)))
-    path[0] = x0
-    for step, _, after in predictor.paths(x0[None], np.zeros(1, np.intp), len(ticks) - 1):
-        path[step[0] + 1] = after[0]
+    path = predictor.path(x0)
+    lost = ~np.all(np.isfinite(path), axis=1)
     streams = problem.recording.streams
     found = {name: np.full(streams[name].values.shape, np.nan) for name in problem.robot.sensors}
     for group in _groups(problem):
@@ -154,6 +155,8 @@ def predict_open_loop(
         step, _ = problem.timeline.locate(group.taken[inside])
         x = _between(problem, step, group.taken[inside], path[step], path[step + 1])
         stamps = streams[group.sensor].times[inside]
-        predicted = predict_sensor(problem.robot, group.sensor, x, calibration, stamps)
+        with np.errstate(invalid="ignore", over="ignore"):
+            predicted = predict_sensor(problem.robot, group.sensor, x, calibration, stamps)
+        predicted[lost[step + 1]] = np.inf
         found[group.sensor][np.ix_(inside, group.channels)] = predicted[:, group.channels]
     return found

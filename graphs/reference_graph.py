@@ -17,10 +17,12 @@ from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.estimate import Estimate
 from jointscope.robots.errors import SolveError
+from jointscope.robots.outside_modules import need_module
 
 
 def nonlinear_graph(problems: Sequence[BagProblem], estimate: Estimate) -> gtsam.NonlinearFactorGraph:
     """All factors of all recordings, and the priors they share."""
+    need_module("gtsam")
     graph = gtsam.NonlinearFactorGraph()
     like = estimate.calibrations[0]
     for bag, problem in enumerate(problems):

@@ -11,9 +11,13 @@ stands for the whole. Masses are those of the URDF.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_kinds.joint_torque import JointTorque, signals_used
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -37,9 +41,15 @@ class CarriedWeight:
         """Whether any rigid joint carries a weight."""
         return bool(self._joints) and bool(np.any(self._tree.gravity))
 
-    def on(self, joint: str) -> CarriedWeight | None:
-        """This, if it is the load of a joint: one that is rigid and carries a weight."""
-        return self if self.some and joint not in self._layout.motors else None
+    def on(self, joint: str, effect: JointTorque, p: Mapping[str, Any]) -> CarriedWeight | None:
+        """This, if it is the load that an effect asks for: its joint is rigid and carries a weight.
+
+        Args:
+            joint: owner of the effect.
+            effect: its law, which may have no use for a load; then none is computed.
+            p: some values of its parameters.
+        """
+        return self if self.some and joint not in self._layout.motors and _asks_for_load(effect, p) else None
 
     def torque(self, x: Array) -> Array:
         """tau_c of every joint, zero for elastic ones, at states of shape (m, d); shape (m, n) [N m]."""
@@ -56,3 +66,9 @@ class CarriedWeight:
             by_q = self._tree.gravity_derivatives(x[:, self._layout.q_link])
             found[:, self._joints] = -by_q[:, self._rows]
         return found
+
+
+def _asks_for_load(effect: JointTorque, p: Mapping[str, Any]) -> bool:
+    """Whether a law, or the rate of its memory, uses the torque through the gear."""
+    laws = [effect.law] if effect.memory is None else [effect.law, effect.memory.rate]
+    return any("tau_spring" in signals_used(law, p) for law in laws)

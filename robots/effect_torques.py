@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.carried_weight import CarriedWeight
 from jointscope.robots.effect_at import EffectAt
-from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law, signals_used
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
 from jointscope.robots.joint_springs import Springs
 from jointscope.robots.state_layout import StateLayout
@@ -24,7 +24,6 @@ from jointscope.robots.torque_terms import TorqueTerms
 
 Array = NDArray[np.float64]
 STEP = 1e-30
-SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "stiffness", "memory")
 
 
 class EffectTorques:
@@ -143,7 +142,10 @@ class _LocalLaw:
         assert isinstance(here.effect, JointTorque)
         self.here, self.effect = here, here.effect
         j = self.joint = joints.index(here.owner)
-        self._weight = weight.on(here.owner)
+        some = {p.name: p.start for p in here.effect.parameters}
+        self._weight = weight.on(here.owner, here.effect, some)
+        laws = [here.effect.law] if here.effect.memory is None else [here.effect.law, here.effect.memory.rate]
+        self._used = {law: signals_used(law, some) for law in laws}
         self._q_link = layout.q_link
         self._columns = {
             **{"q_link": int(layout.joint_q[j]), "v_link": int(layout.joint_v[j])},
@@ -190,7 +192,7 @@ class _LocalLaw:
         if terms.by_state is None or terms.by_parameter is None:
             return
         j = self.joint
-        for name in SIGNALS:
+        for name in self._used[law]:
             if name == "memory" and self._memory_row < 0:
                 continue
             slope = np.imag(law(replace(signals, **{name: getattr(signals, name) + 1j * STEP}), p)) / STEP

@@ -61,7 +61,7 @@ class JointLawAtOneState:
             self._laws.append((here.effect.memory.rate, ((layout.n_link + layout.n_motor + index, 1.0),)))
         self._columns = np.array(columns, dtype=np.intp)
         self._stiffness, self._damping = float(springs.stiffness[j]), float(springs.damping[j])
-        self._weight = CarriedWeight(robot).on(here.owner)
+        self._weight = CarriedWeight(robot).on(here.owner, here.effect, self._p)
         self._joint, self._q_link = j, layout.q_link
         # torque of the spring by (q_link, v_link, q_motor, v_motor); a set of signals for each and for the torque
         self._spring = np.array([self._stiffness, self._damping, -self._stiffness, -self._damping])

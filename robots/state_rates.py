@@ -49,7 +49,7 @@ class StateRates:
         # share of the Coriolis terms that the model has; accelerations are linear in it, beyond 0 and 1, too
         self._scale = named[tree.coriolis_scale] if tree.coriolis_scale else float(bodies.coriolis)
         springs = JointSprings(layout, parameters)
-        self._linear = _linear_torques(robot, parameters, springs, motors, named)
+        self._linear = linear_torques(robot, parameters, springs, motors, named)
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
         self._coulomb = parameters.of(named, "coulomb_torque")
         self.sharpness = robot.choices.friction_sharpness
@@ -159,7 +159,7 @@ class StateRates:
         return rate
 
 
-def _linear_torques(
+def linear_torques(
     robot: Robot, parameters: JointParameters, springs: JointSprings, motors: MotorTorques, values: Mapping[str, float]
 ) -> Array:
     """Torques per state of springs, dampers, bearings and back-EMF, shape (r, d)."""

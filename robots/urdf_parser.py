@@ -12,6 +12,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.outside_modules import need_module
 from jointscope.robots.urdf_text import UrdfText
 
 
@@ -28,6 +29,7 @@ def parse_urdf(path: Path, text: UrdfText) -> tuple[pin.Model, tuple[str, ...]]:
     Raises:
         RobotError: it is no URDF.
     """
+    need_module("pinocchio")
     completed, said = text.completed, list[str]()
     try:
         with _heard(said):

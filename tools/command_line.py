@@ -19,6 +19,7 @@ from typing import Any
 
 import jointscope
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.outside_modules import trouble_with_modules
 
 VERBS = Path(__file__).parent / "verbs"
 TRACEBACK = "JOINTSCOPE_TRACEBACK"
@@ -117,6 +118,11 @@ def _one_line(err: BaseException) -> str:
         return f"{place}{err.strerror or text}"
     if isinstance(err, MemoryError):
         return "out of memory; calibrate from a shorter recording"
+    if isinstance(err, ImportError | AttributeError | SyntaxError):
+        # it may be another project's module, missing or replaced
+        trouble = trouble_with_modules()
+        if trouble:
+            return trouble
     return f"this is a bug in jointscope: {type(err).__name__}: {text}; {TRACEBACK}=1 shows where"
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jointscope
+from jointscope.robots.outside_modules import need_module
 from jointscope.robots.recording import Recording
 from jointscope.tools.whole_file import whole_file, write_json
 
@@ -26,12 +27,19 @@ class ResultFiles:
         rrd: rerun recording.
         json: what the screen says, for machines.
         robot: robot file; only a calibration has one.
+
+    Raises:
+        JointscopeError: an rrd is asked for, and rerun is not there.
     """
 
     report: Path | None = None
     rrd: Path | None = None
     json: Path | None = None
     robot: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.rrd is not None:
+            need_module("rerun")  # now, not after an hour of work
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> ResultFiles:

@@ -20,6 +20,8 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.outside_modules import FIXED_LAG, need_module
+
 Array = NDArray[np.float64]
 
 
@@ -44,9 +46,13 @@ class SmootherWindow:
     Args:
         lag: length of the window [s].
         scale: size of one unit of each component's deviation, shape (d,).
+
+    Raises:
+        JointscopeError: the installed GTSAM has no fixed-lag smoothers.
     """
 
     def __init__(self, lag: float, scale: Array):
+        need_module("gtsam", FIXED_LAG)
         parameters = gtsam.ISAM2Params()
         parameters.setOptimizationParams(gtsam.ISAM2GaussNewtonParams(WILDFIRE))
         parameters.enableRelinearization = False  # factors are linear

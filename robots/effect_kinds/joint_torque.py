@@ -87,6 +87,25 @@ class JointTorque(Effect):
     memory: Memory | None = None
 
 
+SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "stiffness", "memory")
+
+
+def signals_used(law: Law, p: Mapping[str, Any]) -> tuple[str, ...]:
+    """Those of SIGNALS that a law depends on: what is no number there is none in the result.
+
+    Args:
+        law: torque, or rate of a memory.
+        p: some values of its parameters.
+    """
+    known = {signal: np.full(1, 0.3 + 0.1 * k) for k, signal in enumerate(SIGNALS)}
+    try:
+        with np.errstate(all="ignore"):
+            without = {signal: law(JointSignals(**{**known, signal: np.full(1, np.nan)}), p) for signal in SIGNALS}
+    except LookupError:  # its parameters depend on the robot
+        return SIGNALS
+    return tuple(signal for signal, found in without.items() if np.any(np.isnan(found)))
+
+
 def smooth_sign(x: Any, width: float) -> Any:
     """tanh(x / width)."""
     return np.tanh(x / width)

@@ -41,8 +41,10 @@ def with_sigma(value: float, sigma: float) -> tuple[str, str]:
 
 def significant(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, without needless powers of ten."""
-    if value is None or not math.isfinite(value):
+    if value is None or math.isnan(value):
         return "—"
+    if math.isinf(value):
+        return minus("∞" if value > 0 else "-∞")
     if value == 0.0:
         return "0"
     exponent = int(f"{value:.{digits - 1}e}".split("e")[1])

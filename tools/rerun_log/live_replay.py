@@ -17,6 +17,7 @@ from jointscope.graphs.fixed_lag.event import Event
 from jointscope.graphs.fixed_lag.tick import Tick
 from jointscope.graphs.fixed_lag.tick_log import TickLog
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.outside_modules import need_module
 from jointscope.robots.robot import Robot
 from jointscope.tools.rerun_log.correlation_over_time import send_correlations
 from jointscope.tools.rerun_log.estimate_lines import send_estimate_lines
@@ -63,6 +64,7 @@ def live_replay(
 
 
 def _stream_to_viewer(robot: Robot, adapted: tuple[str, ...]) -> rr.RecordingStream:
+    need_module("rerun")
     import rerun as rr
 
     if not _listens():

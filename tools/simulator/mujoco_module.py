@@ -3,19 +3,23 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
-from jointscope.robots.errors import SimulationError
+from jointscope.robots.errors import JointscopeError, SimulationError
+from jointscope.robots.outside_modules import need_module
 
 
 def load_mujoco() -> Any:
     """The module `mujoco`.
 
     Raises:
-        SimulationError: it is not installed.
+        SimulationError: it is not installed, or another thing under its name.
     """
     try:
-        return importlib.import_module("mujoco")
-    except ImportError as err:
-        raise SimulationError("simulating needs MuJoCo, which is not installed: pip install 'jointscope[sim]'") from err
+        return need_module("mujoco")
+    except JointscopeError as err:
+        if isinstance(err.__cause__, ModuleNotFoundError) and err.__cause__.name == "mujoco":
+            raise SimulationError(
+                "simulating needs MuJoCo, which is not installed: pip install 'jointscope[sim]'"
+            ) from err
+        raise SimulationError(str(err)) from err

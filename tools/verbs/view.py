@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RecordingError
+from jointscope.robots.outside_modules import need_module
 
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --rrd run.rrd
@@ -34,6 +35,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Starts the viewer and waits until it is closed."""
     check_file(args.file)
+    need_module("rerun")
     try:
         # as a module of this interpreter: the viewer's program need not be on the path
         finished = subprocess.run([sys.executable, "-m", "rerun", str(args.file)], check=False)
