@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from simulated_arm import Arm, moved, written
 
 from jointscope.robots.rigid_tree import RigidTree
