@@ -16,8 +16,8 @@ EXAMPLE = """example:
   jointscope discover arm.yaml moves.mcap --holdout-share 0.33 -o better.yaml
 
 The recording should move every joint, several at once. Guessed are joints, topics, units, signs, on which link a
-gyroscope sits and how it is turned, noise of the sensors and start values; every guess stands in the file with its
-reason."""
+gyroscope sits and how it is turned, noise of the sensors, and by regression gravity, the unit of the command and the
+drives, which are printed as a table with sigmas; every guess stands in the file with its reason."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -56,7 +56,11 @@ def run(args: argparse.Namespace) -> int:
             robot = load_robot(unfinished)
         description = describe_bag(args.bag, robot)
     if args.json is not None:
-        content = {"robot": str(args.output), "joints": list(guess.roles.joints), "guesses": guesses(text)}
+        content: dict[str, Any] = {
+            "robot": str(args.output),
+            "joints": list(guess.roles.joints),
+            "guesses": guesses(text),
+        }
         content["drives"] = drive_content(guess)
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
