@@ -79,7 +79,7 @@ def motion_cells(
     t0 = float(max(encoder.times[0], command.times[0]))
     t1 = float(min(encoder.times[-1], command.times[-1] + (period if held else 0.0)))
     h = max(period / CELLS_PER_SAMPLE, SHORTEST_CELL, (t1 - t0) / MOST_CELLS)
-    edges = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1)
+    edges: Array = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1, dtype=np.float64)
     path = CubicSpline(encoder.times, encoder.values)
     q, v = path(edges), path(edges, 1)
     v_smooth, v_sigma = _smooth(v, sigmas, period, h)

@@ -25,6 +25,8 @@ from jointscope.tools.robot_guess.sensor_noise import guess_noise
 from jointscope.tools.verbs import init
 
 REAL = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "real"
+CASES = REAL.parents[1] / "cases"
+needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")
 needs_real = pytest.mark.skipif(not REAL.is_dir(), reason="shared/data/real is not beside the project")
 STEP = 2e-4  # [rad] of the encoders
 GYRO_SIGMA = 2e-3  # [rad/s]
@@ -119,6 +121,74 @@ def test_a_calibration_from_a_guessed_file_finds_the_truth(doggy, doggy_data, tm
             assert found[f"{joint}.{law}"].value == pytest.approx(true[name][j], rel=0.01)
         for law, name in (("k_pwm", "kpwm"), ("k_mi", "kmi"), ("inertia", "b")):
             assert found[f"{joint}.{law}"].value == pytest.approx(true[name], rel=0.01)
+
+
+def case(name, tmp_path, *options):
+    """A robot file of one of the small inputs, what `init` wrote as JSON, and the truth."""
+    bag, urdf = CASES / f"{name}.mcap", CASES / f"{name}.urdf"
+    if not bag.is_file():
+        pytest.skip(f"shared/cases/{name}.mcap is not beside the project")
+    assert run(urdf, bag, "-o", tmp_path / "own.yaml", "--json", tmp_path / "own.json", *options) == 0
+    truth = json.loads((CASES / f"{name}.truth.json").read_text())
+    return load_robot(tmp_path / "own.yaml"), json.loads((tmp_path / "own.json").read_text())["drives"], truth
+
+
+@needs_cases
+@pytest.mark.parametrize(("name", "unit"), [("arm_viscous", "N m"), ("arm_amps", "A"), ("arm_coarse", "duty")])
+def test_drives_of_an_arm_are_found_with_unit_and_viscous_friction(tmp_path, name, unit):
+    robot, drives, truth = case(name, tmp_path)
+    assert robot.command.unit == unit and robot.command.scale == (1.0, 1.0, 1.0)
+    for j, joint in enumerate(truth["joints"]):
+        right = {"gain": "k", "inertia": "inertia", "dry": "coulomb", "viscous": "viscous"}
+        for mine, theirs in right.items():
+            found, value = drives[joint][mine], truth[theirs][j]
+            assert abs(found["value"] - value) < max(0.01 * value, 3.5 * found["sigma"]), (joint, mine)
+            assert found["sigma"] < 0.25 * value
+        assert drives[joint]["explained"] > 0.99 and drives[joint]["lost"] == []
+        assert robot.drive_parameter(joint, "inertia").value == pytest.approx(truth["inertia"][j], rel=0.05)
+        if unit == "duty":
+            per_duty = robot.drive_parameter(joint, "k_pwm").value * robot.command_volts
+            assert per_duty == pytest.approx(truth["k"][j], rel=0.02) and not robot.effects
+        else:
+            assert robot.has_effect("motor_viscous", joint)
+            viscous = robot.parameters[f"{joint}.motor_viscous.coefficient"]
+            assert viscous.value == pytest.approx(truth["viscous"][j], rel=0.01) and viscous.null == 0.0
+
+
+@needs_cases
+def test_the_table_of_drives_is_printed_with_sigmas_and_units(tmp_path, capsys):
+    case("arm_amps", tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    head = next(i for i, line in enumerate(lines) if line.startswith("drives by regression"))
+    assert "k [N m/A]" in lines[head + 1]
+    assert "inertia [kg m2]" in lines[head + 1] and "viscous friction [N m s/rad]" in lines[head + 1]
+    assert [line.split()[0] for line in lines[head + 2 : head + 5]] == ["shoulder", "elbow", "wrist"]
+    assert all(line.count("+-") == 4 and line.endswith("%") for line in lines[head + 2 : head + 5])
+
+
+@needs_cases
+def test_a_calibration_of_an_arm_begins_and_ends_right(tmp_path):
+    robot, _, truth = case("arm_amps", tmp_path)
+    bag = CASES / "arm_amps.mcap"
+    found = calibrate(robot, [read_recording(bag, robot)]).robot.parameters
+    for j, joint in enumerate(truth["joints"]):
+        assert found[f"{joint}.torque_constant"].value == pytest.approx(truth["k"][j], rel=2e-3)
+        assert found[f"{joint}.motor_viscous.coefficient"].value == pytest.approx(truth["viscous"][j], rel=5e-3)
+        assert found[f"{joint}.coulomb_torque"].value == pytest.approx(truth["coulomb"][j], rel=5e-3)
+
+
+@needs_cases
+def test_commands_that_are_too_weak_for_the_masses_are_currents(tmp_path):
+    """One axis along gravity shows ratios only; those are said to be ratios, and the priors are wide."""
+    run(CASES / "measured_effort.urdf", CASES / "measured_effort.mcap", "-o", tmp_path / "own.yaml")
+    robot = load_robot(tmp_path / "own.yaml")
+    text = (tmp_path / "own.yaml").read_text()
+    assert robot.command.unit == "A" and "N m would be too little for the masses of shoulder" in text
+    assert "ratios of drive values only" in text
+    constant = robot.parameters["shoulder.torque_constant"]
+    assert constant.prior_sigma == pytest.approx(5.0 * constant.value, rel=0.01)
+    # the truth has the same ratio of constant to friction
+    assert constant.value / robot.parameters["shoulder.coulomb_torque"].value == pytest.approx(2.0 / 0.5, rel=0.01)
 
 
 def test_gyros_are_put_on_their_links_and_turned_as_they_are_mounted(doggy, bag):

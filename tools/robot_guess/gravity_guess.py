@@ -19,7 +19,8 @@ from jointscope.robots.rigid_tree import RigidTree
 Array = NDArray[np.float64]
 
 STANDARD = 9.81  # [m/s^2]
-DOUBTFUL = 0.9  # of the torque of some joint, below which the usual direction is doubted
+DOUBTFUL = 0.99  # of the torque's mean square of some joint: where less is explained, the usual direction is doubted
+EXPLAINED = 0.9  # of every joint that another direction must explain
 CLEARER = 0.25  # of the missing torque's mean square that another direction may leave at most
 OTHERS = {
     "none: the weight is compensated": (0.0, 0.0, 0.0),
@@ -50,7 +51,7 @@ def clearer_gravity(
         if len(missing) == len(usual):
             found.append((float(np.sum(missing)), float(np.max(missing)), words, other))
     total, worst, words, best = min(found, key=lambda entry: entry[0], default=(np.inf, np.inf, "", tree))
-    if total > CLEARER * float(np.sum(usual)) or worst > 1.0 - DOUBTFUL:
+    if total > CLEARER * float(np.sum(usual)) or worst > 1.0 - EXPLAINED:
         return tree, ""
     shares = f"{_percent(total / len(usual))} of the torque is explained so, {_percent(float(np.mean(usual)))} with -z"
     return best, f"{words}: {shares}"

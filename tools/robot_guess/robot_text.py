@@ -3,44 +3,25 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 
-import numpy as np
-
-from jointscope.graphs.starts.drive_regression import Value
-from jointscope.robots.units import joined, of_slide, si_factor, si_unit
-from jointscope.tools.robot_guess.drive_values import EXPLAINED, DriveValues
+from jointscope.robots.units import joined, si_factor, si_unit
+from jointscope.tools.robot_guess.drive_text import effect_lines, parameter_lines
 from jointscope.tools.robot_guess.gyro_mount import Mount
 from jointscope.tools.robot_guess.joint_signs import SignGuess
 from jointscope.tools.robot_guess.other_joints import NOT_THERE, HeldJoint
 from jointscope.tools.robot_guess.robot_guess import SUPPLY, GuessedGyro, RobotGuess
+from jointscope.tools.robot_guess.robot_line import GUESS
+from jointscope.tools.robot_guess.robot_line import as_list as _list
+from jointscope.tools.robot_guess.robot_line import line as _line
+from jointscope.tools.robot_guess.robot_line import number as _number
+from jointscope.tools.robot_guess.robot_line import plain as _plain
 from jointscope.tools.robot_guess.roles import Chosen
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
 from jointscope.tools.robot_guess.signals import Signal
 
-GUESS = "GUESS"
-COLUMN = 48  # where comments begin
-RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
-VISCOUS_EFFECT = ("N m", "A")  # units of commands whose viscous friction is an effect
-ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
-SPREAD, LOST_SPREAD = 2.0, 5.0  # [value] priors of logarithms: a factor 7, or 150, either way
-NO_PULL = 10.0  # times wider, about zero
-RESERVED = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
 FINEST = 1e-8  # [SI unit] sigma below which the noise is that of rounding in the computer
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One parameter of a joint: name, value, unit at a joint that turns, comment, and whether nothing tells it."""
-
-    name: str
-    value: float
-    unit: str
-    comment: str
-    lost: bool
 
 
 def robot_text(guess: RobotGuess, urdf: str) -> str:
@@ -76,8 +57,8 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *(line for gyro in guess.gyros for line in _gyro(gyro, guess)),
         *(f"  # not used: {text}" for text in guess.left_out),
         "",
-        *_effects(guess),
-        *_parameters(guess),
+        *effect_lines(guess),
+        *parameter_lines(guess),
         *([] if free else _noise(len(joints))),
     ]
     return "\n".join(lines) + "\n"
@@ -106,11 +87,6 @@ def guesses(text: str) -> list[str]:
         if mark:
             found.append(f"{value.strip()}  ({why})")
     return found
-
-
-def _line(text: str, comment: str, sure: bool = True, indent: int = 0) -> str:
-    place = " " * indent + text
-    return f"{place.ljust(COLUMN)} # {comment if sure else f'{GUESS}: {comment}'}"
 
 
 def _gravity(guess: RobotGuess) -> str:
@@ -331,86 +307,6 @@ def _turned(mount: Mount) -> str:
     return f"{text}; the link turns about one axis only, the rotation about it is open" if mount.open_axis else text
 
 
-def _effects(guess: RobotGuess) -> list[str]:
-    """Viscous friction of drives whose command is a torque or a current; that of a voltage is in the back-EMF."""
-    if guess.free_links or guess.command_unit[0] not in VISCOUS_EFFECT:
-        return []
-    labels = [f"motor_viscous@{joint}" for joint in guess.roles.joints]
-    return [
-        _line(f"effects: {_list(labels)}", "friction that grows with speed, as drives with gears have it", False),
-        "",
-    ]
-
-
-def _parameters(guess: RobotGuess) -> list[str]:
-    if guess.free_links:
-        return ["parameters: {}"]
-    lines = [_line("parameters:", "start values by regression; a calibration finds them", False), *_unexplained(guess)]
-    for joint, drive in zip(guess.roles.joints, guess.drives, strict=True):
-        for row in (
-            *_drive_rows(guess.command_unit[0], drive),
-            *_spring_rows(drive if joint in guess.elastic else None),
-        ):
-            unit = of_slide(row.unit) if joint in guess.slides else row.unit
-            spread = _number((LOST_SPREAD if row.lost else SPREAD) * row.value)
-            prior = f"prior_sigma: {spread}"
-            if row.name in ZERO_BY_DEFAULT:
-                spread = _number(max(SPREAD * NO_PULL * row.value, 1.0))
-                prior = f"prior: 0.0, prior_sigma: {spread}, positive: false, 'null': 0.0"
-            text = f"{joint}.{row.name}: {{value: {_number(row.value, 5)}, unit: {unit}, {prior}}}"
-            lines.append(_line(text, row.comment, indent=2) if row.comment else f"  {text}")
-    return lines
-
-
-def _unexplained(guess: RobotGuess) -> list[str]:
-    """Joints whose torque the regression does not explain."""
-    poor = [
-        f"{100.0 * max(drive.explained, 0.0):.3g} % of that of {joint}"
-        for joint, drive in zip(guess.roles.joints, guess.drives, strict=True)
-        if drive.explained < EXPLAINED
-    ]
-    if not poor:
-        return []
-    why = "a spring, wrong masses, gravity, names or units"
-    return [f"  # {GUESS}: the regression explains only {', '.join(poor)}: {why} may be the reason"]
-
-
-def _drive_rows(unit: str, drive: DriveValues) -> list[_Row]:
-    """Parameters of a drive; the gain of a duty cycle is per volt."""
-    volts = SUPPLY if unit == "duty" else 1.0
-    rows = [_row("coulomb_torque", "N m", drive, "dry"), _row("inertia", "kg m2", drive, "inertia")]
-    if unit == "A":
-        rows.append(_row("torque_constant", "N m/A", drive, "gain"))
-    if unit in VISCOUS_EFFECT:
-        return [*rows, _row("motor_viscous.coefficient", "N m s/rad", drive, "viscous")]
-    return [*rows, _row("k_pwm", "N m/V", drive, "gain", volts), _row("k_mi", "N m s/rad", drive, "viscous")]
-
-
-def _row(name: str, unit: str, drive: DriveValues, law: str, per: float = 1.0) -> _Row:
-    value, found = drive.start[law] / per, drive.found.get(law)
-    if drive.is_lost(law):
-        return _Row(name, value, unit, f"{GUESS}: {_why_lost(drive, found)}", True)
-    assert found is not None
-    return _Row(name, value, unit, f"+- {found.sigma / per:.1g}", False)
-
-
-def _why_lost(drive: DriveValues, found: Value | None) -> str:
-    if drive.unknown_scale:
-        return "the recording gives ratios of drive values only; hold one that you know with `fixed: true`"
-    if found is None:
-        return "the recording is too short, or moves too little, to tell"
-    return f"lost in its uncertainty: the regression says {found.value:.2g} +- {found.sigma:.1g}"
-
-
-def _spring_rows(drive: DriveValues | None) -> list[_Row]:
-    """A spring at a plain frequency, where a gyroscope will tell the right one."""
-    if drive is None:
-        return []
-    omega = 2.0 * np.pi * RESONANCE
-    stiffness, damping = drive.link * omega**2, 2.0 * DAMPING_RATIO * drive.link * omega
-    return [_Row("stiffness", stiffness, "N m/rad", "", False), _Row("damping", damping, "N m s/rad", "", False)]
-
-
 def _noise(n: int) -> list[str]:
     link, motor = LOOSE
     return [
@@ -424,27 +320,3 @@ def _noise(n: int) -> list[str]:
         f"  link_velocity: {_list([link] * n)}",
         f"  motor_velocity: {_list([motor] * n)}",
     ]
-
-
-def _number(value: float, digits: int = 3) -> str:
-    """Some digits, with a point, so that YAML reads a float."""
-    text = f"{value:.{digits}g}"
-    mantissa, e, exponent = text.partition("e")
-    mantissa = mantissa if "." in mantissa else f"{mantissa}.0"
-    return f"{mantissa}{e}{exponent}"
-
-
-def _plain(text: str) -> str:
-    """A text as YAML reads it back."""
-    simple = re.fullmatch(r"[A-Za-z_/.]([\w./-]|:(?=\S))*", text) and text.lower() not in (
-        "yes",
-        "no",
-        "true",
-        "false",
-        "null",
-    )
-    return text if simple else "'" + text.replace("'", "''") + "'"
-
-
-def _list(values: Iterable[object]) -> str:
-    return "[" + ", ".join(_plain(value) if isinstance(value, str) else str(value) for value in values) + "]"

@@ -19,8 +19,8 @@ EXAMPLE = """example:
   jointscope discover arm.yaml moves.mcap --holdout-share 0.33 -o better.yaml
 
 The recording should move every joint, several at once. Guessed are joints, topics, units, signs, on which link a
-gyroscope sits and how it is turned, noise of the sensors and start values; every guess stands in the file with its
-reason."""
+gyroscope sits and how it is turned, noise of the sensors, and by regression gravity, the unit of the command and the
+drives, which are printed as a table with sigmas; every guess stands in the file with its reason."""
 
 
 def add_parser(subparsers: Any) -> None:
