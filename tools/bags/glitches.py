@@ -54,9 +54,9 @@ def without_glitches(
     if count > max(MOST, MOST_SHARE * len(samples)):
         raise RecordingError(
             f"{channel}: {count} of {len(samples)} samples of {name} jump away from their neighbours and back (at "
-            f"{where} after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes publish "
-            "on this topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot file); find "
-            "the node with `ros2 topic info -v TOPIC`, and record again"
+            f"{where} after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes "
+            "publish on this topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot "
+            "file); find the node with `ros2 topic info -v TOPIC`, and record again"
         )
     j = channels.index(channel)
     text = (

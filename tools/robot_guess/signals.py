@@ -15,7 +15,8 @@ from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.stream_notices import Timing, timing
-from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.timed_samples import TimedSamples
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,9 @@ FIELDS = {
     "std_msgs/msg/Float32MultiArray": ("data",),
 }
 """Message types that are understood, and what of them a robot file can use."""
+
+MEASURED = ("position", "angular_velocity")
+"""Fields that a sensor fills, so that single wild samples in them are none."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,13 @@ def _signal(raw: RawTopic, kind: MessageType, field: str, start_ns: int) -> Sign
         return None
     if columns.values.shape[1] == 0:
         return None
-    stamps = raw.received_ns if columns.stamps is None else columns.stamps
-    samples, _ = in_time_order(raw.name, TimedSamples(stamps, raw.received_ns, columns.values))
+    received = columns.of(raw.received_ns)
+    stamps = received if columns.stamps is None else columns.stamps
+    samples = TimedSamples(stamps, received, columns.values)
+    try:
+        samples = tidy_samples(raw.name, samples, columns.stamps is not None, sensor=field in MEASURED)
+    except RecordingError:  # what nobody can tell the time of is no use; a robot file may still need other topics
+        return None
     names = columns.names or ()
     times = (samples.stamps - start_ns) / 1e9
     return Signal(raw.name, kind.name, field, names, times, samples.values, columns.stamps is not None)
