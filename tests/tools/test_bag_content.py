@@ -205,8 +205,8 @@ def test_joints_that_two_nodes_publish_are_refused_with_the_numbers(doggy, path)
     write_with(path, doggy, messages)
     assert error_of(path, doggy) == (
         "topic /joint_states, field 'position': no message names all of joint1, joint2, joint3: joint1 in 200, joint2 "
-        "in 200, joint3 in 100; expected them in one message: let one node publish them together, or calibrate the joints "
-        "of one node at a time (`jointscope init URDF BAG --joints ...`)"
+        "in 200, joint3 in 100; expected them in one message: let one node publish them together, or calibrate the "
+        "joints of one node at a time (`jointscope init URDF BAG --joints ...`)"
     )
 
 
