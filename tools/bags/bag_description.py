@@ -47,6 +47,7 @@ class TopicDescription:
         names: joint names.
         fields: its numbers.
         trouble: why the topic cannot be read; None where it can.
+        remarks: what was left out or mended, a sentence each.
     """
 
     topic: str
@@ -63,6 +64,7 @@ class TopicDescription:
     names: tuple[str, ...] = ()
     fields: tuple[FieldDescription, ...] = ()
     trouble: str | None = None
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,7 @@ def _details(topic: TopicDescription) -> list[str]:
     lines = [f"    cannot be read: {topic.trouble}"] if topic.trouble else []
     if topic.out_of_order or topic.duplicates:
         lines.append(f"    {topic.out_of_order} messages out of order, {topic.duplicates} repeat a stamp")
+    lines += [f"    {remark}" for remark in topic.remarks]
     if topic.fields and not topic.stamped:
         lines.append("    without header: times are those of reception")
     for part in topic.fields:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.tools.bags.message_type import NUMPY_TYPES, MessageType
+from jointscope.tools.bags.message_type import MessageType
 
 CDR_HEADER = 4  # bytes; alignment counts from behind it
 LITTLE_ENDIAN = 1
@@ -115,7 +115,7 @@ class _Walk:
         if name == "string":
             self.layout.texts.setdefault(path, []).extend(self.text() for _ in range(count))
             return
-        dtype = NUMPY_TYPES[name]
+        dtype = self.type.numpy_type(name)
         if not count:
             return
         size = np.dtype(dtype).itemsize

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.resting_joints import must_move
@@ -20,12 +19,14 @@ from jointscope.tools.bags.bag_description import (
     NeedDescription,
     TopicDescription,
 )
+from jointscope.tools.bags.clock_steps import on_one_clock
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.message_type import MessageType, inner_type
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
 from jointscope.tools.bags.read_recording import (
     check_topic,
     full_type_name,
+    left_out_notices,
     needed_streams,
     read_columns,
     read_recording,
@@ -33,6 +34,7 @@ from jointscope.tools.bags.read_recording import (
 from jointscope.tools.bags.stream_notices import clipping_notices, timing
 from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
+from jointscope.tools.bags.unfilled_stamps import without_unfilled
 
 FLOATS = ("float32", "float64")
 NOT_SHOWN = "covariance"
@@ -127,11 +129,12 @@ def _topic(bag: Bag, name: str, kind: MessageType | str | None, raw: RawTopic | 
 
 def _numeric_topic(name: str, message_type: MessageType, raw: RawTopic) -> TopicDescription:
     columns = {field: read_columns(raw, message_type, field) for field in _float_fields(message_type)}
-    first = next(iter(columns.values()))
-    stamps = raw.received_ns if first.stamps is None else first.stamps
-    index = np.arange(len(stamps))[:, None].astype(float)
-    samples, notices = in_time_order(name, TimedSamples(stamps, raw.received_ns, index))
-    order = samples.values[:, 0].astype(int)
+    first = max(columns.values(), key=lambda part: len(part.values) * part.values.shape[1])
+    received = first.of(raw.received_ns)
+    stamps = received if first.stamps is None else first.stamps
+    samples, unfilled = without_unfilled(name, TimedSamples(stamps, received, np.zeros((len(stamps), 0))))
+    moved, _, steps = on_one_clock({name: samples})
+    samples, notices = in_time_order(name, moved[name])
     seen = timing((samples.stamps - samples.stamps[0]) / 1e9)
     counts = {notice.kind: notice.count for notice in notices}
     return TopicDescription(
@@ -147,12 +150,13 @@ def _numeric_topic(name: str, message_type: MessageType, raw: RawTopic) -> Topic
         duplicates=counts.get("duplicate", 0),
         stamped=first.stamps is not None,
         names=first.names or (),
-        fields=tuple(_field(field, part, order) for field, part in columns.items()),
+        fields=tuple(_field(field, part) for field, part in columns.items()),
+        remarks=tuple(n.text.removeprefix(f"{name}: ") for n in [*left_out_notices(name, first), *unfilled, *steps]),
     )
 
 
-def _field(field: str, columns: Columns, order: NDArray[np.intp]) -> FieldDescription:
-    values = columns.values[order]
+def _field(field: str, columns: Columns) -> FieldDescription:
+    values = columns.values
     width = values.shape[1]
     names = columns.names or ()
     labels = names if len(names) == width else AXES.get(width, tuple(map(str, range(width))))

@@ -85,8 +85,8 @@ def _refuse_scattered(found: MessageParts, named: Sequence[Columns], wanted: Seq
         said = ", ".join(f"{name} in {counts[name]}" for name in wanted)
         raise RecordingError(
             f"topic {found.topic}, field {found.field!r}: no message names all of {', '.join(wanted)}: {said}; "
-            "expected them in one message: let one node publish them together, or calibrate the joints of one node at a time "
-            "(`jointscope init URDF BAG --joints ...`)"
+            "expected them in one message: let one node publish them together, or calibrate the joints of one node at "
+            "a time (`jointscope init URDF BAG --joints ...`)"
         )
 
 

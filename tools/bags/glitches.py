@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wild samples: one to three in a row that leave where the channel was going and come back to it.
 
-A run of samples is a glitch if all of it lies far off the cubic through its neighbours: ten times farther than any
-other sample nearby, and farther than anything nearby moves from one sample to the next. Motion does not do that, a stop
-and a reversal do not either: they change the slope, not one sample. A counter that begins anew stays where it went.
+A run of samples is a glitch if all of it lies outside the range of its neighbours, on the same side: ten times farther
+than any other sample nearby, and farther than anything nearby moves from one sample to the next. Motion does not do
+that, a stop and a reversal do not either. A counter that begins anew stays where it went.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice
 from jointscope.tools.bags.durations import counted
-from jointscope.tools.bags.neighbour_fit import off_neighbours, smallest_changes
+from jointscope.tools.bags.neighbours import beyond_neighbours, smallest_changes
 from jointscope.tools.bags.timed_samples import TimedSamples
 
 Array = NDArray[np.float64]
 
 LONGEST = 3  # samples in a row
-FARTHER = 10.0  # times the misfit of the other samples nearby
+FARTHER = 10.0  # times the distance of the other samples nearby
 BEYOND_STEP = 1.5  # times the largest step nearby
 NEARBY = 12  # samples on either side
 QUANTA = 10.0  # smallest changes of the channel
@@ -43,7 +43,7 @@ def without_glitches(
     """
     values = samples.values if not period else np.unwrap(samples.values, period=period, axis=0)
     since = (samples.stamps - samples.stamps[0]) / 1e9
-    wild = np.column_stack([wild_samples(since, column, period) for column in values.T])
+    wild = np.column_stack([wild_samples(column) for column in values.T])
     rows = wild.any(axis=1)
     count = int(np.count_nonzero(rows))
     if not count:
@@ -54,9 +54,9 @@ def without_glitches(
     if count > max(MOST, MOST_SHARE * len(samples)):
         raise RecordingError(
             f"{channel}: {count} of {len(samples)} samples of {name} jump away from their neighbours and back (at "
-            f"{where} after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes publish "
-            "on this topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot file); find "
-            "the node with `ros2 topic info -v TOPIC`, and record again"
+            f"{where} after its start); expected at most {max(MOST, int(MOST_SHARE * len(samples)))}: two nodes "
+            "publish on this topic, a cable or a driver is broken, or the counter begins anew (`wraps` in the robot "
+            "file); find the node with `ros2 topic info -v TOPIC`, and record again"
         )
     j = channels.index(channel)
     text = (
@@ -67,13 +67,11 @@ def without_glitches(
     return samples.take(~rows), [Notice(name, "glitch", count, text)]
 
 
-def wild_samples(times: Array, column: Array, period: float = 0.0) -> NDArray[np.bool_]:
+def wild_samples(column: Array) -> NDArray[np.bool_]:
     """Which samples of one channel are wild, shape (n,).
 
     Args:
-        times: increasing, shape (n,) [s].
-        column: shape (n,); where it wraps, continued.
-        period: of the counter, 0 for none: jumps of a whole one are no glitch.
+        column: in the order of its stamps, shape (n,); where it wraps, continued.
     """
     found = np.zeros(len(column), bool)
     quantum = float(smallest_changes(column[:, None])[0])
@@ -81,28 +79,20 @@ def wild_samples(times: Array, column: Array, period: float = 0.0) -> NDArray[np
         return found
     floor = QUANTA * quantum
     for length in range(1, LONGEST + 1):
-        off = np.abs(off_neighbours(times, column, length))
-        off[:2] = 0.0
-        for k in np.flatnonzero(off > max(floor, FARTHER * float(np.median(off)))):
-            if not found[k : k + length].any() and _stands_alone(times, column, int(k), length, float(off[k])):
+        beyond = beyond_neighbours(column, length)
+        for k in np.flatnonzero(beyond > floor):
+            if not found[k : k + length].any() and _stands_alone(column, int(k), length, float(beyond[k])):
                 found[k : k + length] = True
     found[_wild_ends(column, floor)] = True
     return found
 
 
-def _stands_alone(times: Array, column: Array, k: int, length: int, off: float) -> bool:
+def _stands_alone(column: Array, k: int, length: int, beyond: float) -> bool:
     """Whether nothing near a run of samples is like it, once it is taken out."""
-    before, after = slice(max(k - NEARBY, 0), k), slice(k + length, k + length + NEARBY)
-    t = np.concatenate([times[before], times[after]])
-    x = np.concatenate([column[before], column[after]])
-    inside = k - before.start
-    misfits = np.abs(off_neighbours(t, x))
-    if len(x) < NEARBY or off <= FARTHER * float(misfits.max(initial=0.0)):
+    others = np.concatenate([column[max(k - NEARBY, 0) : k], column[k + length : k + length + NEARBY]])
+    if beyond <= FARTHER * float(beyond_neighbours(others).max(initial=0.0)):
         return False
-    steps = np.abs(np.diff(x))
-    bridge = float(steps[inside - 1]) / (length + 1) if 0 < inside <= len(steps) else 0.0
-    others = np.delete(steps, inside - 1) if 0 < inside <= len(steps) else steps
-    return off > BEYOND_STEP * max(float(others.max(initial=0.0)), bridge)
+    return beyond > BEYOND_STEP * float(np.abs(np.diff(others)).max(initial=0.0))
 
 
 def _wild_ends(column: Array, floor: float) -> list[int]:

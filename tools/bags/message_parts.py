@@ -25,6 +25,7 @@ from jointscope.tools.bags.slow_columns import slow_columns
 Rows = NDArray[np.intp]
 
 MOST_LAYOUTS = 64  # tried on the fast path before the rest is decoded one by one
+BYTE = 256.0
 HOPELESS = 200  # messages without a number in the wanted field, and none with, are enough to know
 BROKEN_SHARE, FEW_BROKEN = 0.01, 5  # of the messages, or so many, may be unreadable
 
@@ -108,10 +109,12 @@ def _decoded(
     """Messages decoded one by one, and how many could not be; `alone` if there are no others."""
     found: list[Columns] = []
     broken: list[RecordingError] = []
+    unsigned = message_type.ros2 and message_type.holds_bytes(field)  # the decoder takes them as signed
     for k in rows:
         try:
             columns = slow_columns([topic.data[k]], message_type, field, topic.name, first + int(k))
-            found.append(Columns(columns.stamps, columns.values, columns.names, np.array([k])))
+            values = np.where(columns.values < 0, columns.values + BYTE, columns.values) if unsigned else columns.values
+            found.append(Columns(columns.stamps, values, columns.names, np.array([k])))
         except RecordingError as err:
             broken.append(err)
             if alone and not found and len(broken) >= HOPELESS:

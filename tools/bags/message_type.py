@@ -13,7 +13,7 @@ NUMPY_TYPES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
     "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
-"""ROS primitive: numpy type of its little-endian bytes."""
+"""ROS primitive: numpy type of its little-endian bytes; `byte` is signed in ROS 1."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,28 @@ class MessageType:
         """Whether the messages carry a stamp of their own."""
         return any(name == "header" and str(kind[1]) == "std_msgs/msg/Header" for name, kind in self.fields)
 
+    def numpy_type(self, primitive: str) -> str:
+        """The numpy type of a primitive's little-endian bytes.
+
+        Raises:
+            KeyError: it is no number.
+        """
+        return "i1" if primitive == "byte" and not self.ros2 else NUMPY_TYPES[primitive]
+
+    def holds_bytes(self, field: str) -> bool:
+        """Whether a dotted field holds nothing but `byte`."""
+        kind: Any = None
+        inside: str | None = self.name
+        for part in field.split("."):
+            if part.isdecimal() or part == "*":
+                continue
+            fields = dict(self.fields_of(inside)) if inside is not None else {}
+            if part not in fields:
+                return False
+            kind = fields[part]
+            inside = inner_type(kind)
+        return kind is not None and primitive_type(kind) == "byte"
+
     def decode(self, raw: bytes) -> Any:
         """The message with these bytes."""
         if self.ros2:
@@ -64,6 +86,15 @@ def inner_type(kind: Any) -> str | None:
     if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
         kind = kind[1][0]
     return str(kind[1]) if kind[0] == Nodetype.NAME else None
+
+
+def primitive_type(kind: Any) -> str | None:
+    """The primitive in a field or its elements; None for messages."""
+    from rosbags.interfaces import Nodetype
+
+    if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        kind = kind[1][0]
+    return str(kind[1][0]) if kind[0] == Nodetype.BASE else None
 
 
 def is_list_of_texts(kind: Any) -> bool:

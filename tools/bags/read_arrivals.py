@@ -112,7 +112,9 @@ class ArrivalReader:
             columns.append(_columns(need, raw[need.source.topic], types, counts, self._last.get(need.name)))
             self._last[need.name] = columns[-1][1][-1]
         if not self.start_ns:
-            self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
+            # stamps that nobody has filled yet are no beginning
+            filled = [stamps[stamps != 0] for stamps, _ in columns]
+            self.start_ns = min((int(stamps.min()) for stamps in filled if len(stamps)), default=0)
         parts = [
             ((stamps - self.start_ns) / 1e9, (raw[need.source.topic].received_ns - self.start_ns) / 1e9, values)
             for need, (stamps, values) in zip(present, columns, strict=True)

@@ -22,17 +22,15 @@ from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.durations import counted
 from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.fitting_messages import fitting_messages
-from jointscope.tools.bags.glitches import without_glitches
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.message_parts import message_parts
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.own_stamps import at_message_stamps
-from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.silences import with_silences_left_out
-from jointscope.tools.bags.staircase import without_repetitions
 from jointscope.tools.bags.stream_notices import by_importance, clipping_notices, timing_notices
+from jointscope.tools.bags.tidy_samples import cleaned_sensor
 from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
@@ -163,27 +161,6 @@ def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, l
     return replace(samples, values=in_si(need.source, samples.values)), notices
 
 
-def cleaned_sensor(
-    name: str, channels: tuple[str, ...], samples: TimedSamples, wraps: float = 0.0
-) -> tuple[TimedSamples, list[Notice]]:
-    """Samples of a sensor without those of a second publisher, glitches and repetitions, and what was left out.
-
-    Args:
-        name: of the stream.
-        channels: name of each column.
-        samples: in the order of their stamps, finite, in the unit of the bag.
-        wraps: period of the counter behind them, 0 for none.
-
-    Raises:
-        RecordingError: so much would be left out that something else is wrong.
-    """
-    samples, notices = without_second_publisher(name, channels, samples)
-    samples, found = without_glitches(name, channels, samples, wraps)
-    notices += found
-    samples, found = without_repetitions(name, samples)
-    return samples, notices + found
-
-
 def _goal(
     bag: Bag, robot: Robot, raw: dict[str, RawTopic], decode_all: bool
 ) -> tuple[tuple[StreamSource, TimedSamples] | None, list[Notice]]:
@@ -277,9 +254,7 @@ def _samples(
     nan: bool = False,
     known: Container[str] = (),
 ) -> tuple[TimedSamples, list[Notice]]:
-    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay;
-    joints that are `known` are not said to be ignored.
-    """
+    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay."""
     order, notices = column_order(need, columns, known)
     notices += left_out_notices(need.name, columns)
     received, stamps = columns.of(topic.received_ns), columns.stamps

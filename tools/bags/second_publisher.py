@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice
 from jointscope.tools.bags.durations import counted
-from jointscope.tools.bags.neighbour_fit import smallest_changes
+from jointscope.tools.bags.neighbours import smallest_changes
 from jointscope.tools.bags.timed_samples import TimedSamples
 
 FEWEST = 3  # visits

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recording import Notice
-from jointscope.tools.bags.neighbour_fit import smallest_changes
+from jointscope.tools.bags.neighbours import smallest_changes
 from jointscope.tools.bags.timed_samples import TimedSamples
 
 QUANTA = 3.0  # smallest changes of a channel that a change during motion spans

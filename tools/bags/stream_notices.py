@@ -24,7 +24,7 @@ IMPORTANCE = (
     "duplicate", "info", "jitter",
 )  # fmt: skip
 CLIPPED_RUN = 3  # equal extreme samples in a row
-LIMIT_SHARE = 0.2  # of a channel's largest value: below it an extreme is no limit
+LIMIT_SHARE = 0.2  # of the largest value of all channels: below it an extreme is no limit
 CLIPPED_COUNT = 20  # samples on the plateaus of one channel
 
 
@@ -108,19 +108,22 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
         unit: unit of the values.
     """
     parts, total = [], 0
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     for column, channel in zip(values.T, channels, strict=True):
         low, high = (column.min(), column.max()) if np.isfinite(column).all() and len(column) else (0.0, 0.0)
         for extreme in (low, high):
-            # the smaller end of a range that lies on one side is where a signal rests, not a limit
-            is_limit = abs(extreme) > LIMIT_SHARE * max(-low, high)
+            # the smaller end of a range is where a signal rests, not a limit
+            is_limit = abs(extreme) > LIMIT_SHARE * largest
             count = _clipped(column, extreme) if is_limit else 0
             if count >= CLIPPED_COUNT:
                 parts.append(f"{channel} at {extreme:.6g}{'' if unit == '1' else ' ' + unit} in {count} samples")
                 total += count
     if not parts:
         return []
-    meaning = "what acted may be less than was asked for" if name == "command" else "it was beyond what can be measured"
-    return [Notice(name, "clipping", total, f"{name} stays at a limit while it moves ({meaning}): {'; '.join(parts)}")]
+    meaning = " (what acted may be less than what was asked for)" if name == "command" else ""
+    if name != "command" and unit != "1":
+        meaning = " (beyond it nothing is measured: those samples are too small)"
+    return [Notice(name, "clipping", total, f"{name} stays at a limit while it moves{meaning}: {'; '.join(parts)}")]
 
 
 def _clipped(column: Array, extreme: float) -> int:

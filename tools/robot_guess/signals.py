@@ -16,13 +16,17 @@ from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.stream_notices import Timing, timing
-from jointscope.tools.bags.time_order import TimedSamples, in_time_order
+from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.robot_guess.known_fields import KnownField, known_fields
 
 Array = NDArray[np.float64]
 
 COMMANDED = re.compile(r"command|cmd|desired|target|setpoint|reference|goal|(^|\.)output\.|points\.|_d$|_des$")
 """Words in topics and fields with what a controller wants, in contrast to what is measured."""
+
+MEASURED = ("position", "rate")
+"""Quantities that a sensor fills, so that single wild samples in them are none."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +122,13 @@ def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) 
     names = columns.names or ()
     if width == 0 or (names and len(names) != width) or len(set(names)) != len(names):
         return None
-    stamps = raw.received_ns if columns.stamps is None else columns.stamps
-    samples, _ = in_time_order(raw.name, TimedSamples(stamps, raw.received_ns, columns.values))
+    received = columns.of(raw.received_ns)
+    stamps = received if columns.stamps is None else columns.stamps
+    samples = TimedSamples(stamps, received, columns.values)
+    try:
+        samples = tidy_samples(raw.name, samples, columns.stamps is not None, sensor=known.quantity in MEASURED)
+    except RecordingError:  # what nobody can tell the time of is no use; a robot file may still need other topics
+        return None
     times = (samples.stamps - start_ns) / 1e9
     stamped = columns.stamps is not None
     return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.screening import MOVED_ANGLE, MOVED_SIGMAS
+from jointscope.robots.resting_joints import MOVED_ANGLE, MOVED_SIGMAS
 from jointscope.tools.robot_guess.sensor_noise import column_noise
 from jointscope.tools.robot_guess.signals import Signal
 

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One stream tidied up by itself, before the robot is known: clock, order, glitches, second publishers, staircases."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointscope.robots.recording import Notice
+from jointscope.tools.bags.clock_steps import on_one_clock
+from jointscope.tools.bags.glitches import without_glitches
+from jointscope.tools.bags.second_publisher import without_second_publisher
+from jointscope.tools.bags.staircase import without_repetitions
+from jointscope.tools.bags.time_order import in_time_order
+from jointscope.tools.bags.timed_samples import TimedSamples
+from jointscope.tools.bags.unfilled_stamps import without_unfilled
+
+
+def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) -> TimedSamples:
+    """The samples in the order of their stamps; those of a sensor without what no sensor says.
+
+    Args:
+        name: of the stream.
+        samples: in the order of the bag; NaN may be among them.
+        stamped: whether the messages carry stamps.
+        sensor: whether a sensor says it; commands may jump and repeat themselves.
+
+    Raises:
+        RecordingError: the clock cannot be trusted, or too much would be left out.
+    """
+    if stamped:
+        samples, _ = without_unfilled(name, samples)
+        samples = on_one_clock({name: samples})[0][name]
+    samples, _ = in_time_order(name, samples)
+    finite = np.isfinite(samples.values).all(axis=1)
+    if not sensor or not finite.all():
+        return samples
+    return cleaned_sensor(name, tuple(map(str, range(samples.values.shape[1]))), samples)[0]
+
+
+def cleaned_sensor(
+    name: str, channels: tuple[str, ...], samples: TimedSamples, wraps: float = 0.0
+) -> tuple[TimedSamples, list[Notice]]:
+    """Samples of a sensor without those of a second publisher, glitches and repetitions, and what was left out.
+
+    Args:
+        name: of the stream.
+        channels: name of each column.
+        samples: in the order of their stamps, finite, in the unit of the bag.
+        wraps: period of the counter behind them, 0 for none.
+
+    Raises:
+        RecordingError: so much would be left out that something else is wrong.
+    """
+    samples, notices = without_second_publisher(name, channels, samples)
+    samples, found = without_glitches(name, channels, samples, wraps)
+    notices += found
+    samples, found = without_repetitions(name, samples)
+    return samples, notices + found
