@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slopes of accelerations by parameters of the bodies are those of differences, with any share of the Coriolis terms."""
+"""Slopes of accelerations by parameters of the bodies are those of differences, for any share of Coriolis terms."""
 
 from __future__ import annotations
 
