@@ -95,6 +95,8 @@ class RigidTree:
 
         A mimic joint tells where the joint is that it follows, if that is not given itself.
         """
+        if not positions:
+            return {}
         given = self._bodies.leading(positions)
         return {name: float(given[name]) for name in self.other_joints if name in given}
 
