@@ -103,8 +103,9 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
 def _coarser(signals: Array, cells: MotionCells, count: int) -> tuple[Array, NDArray[np.bool_], float]:
     """Signals of so many cells in one, which of them are known, and their length [s]; means of means are means."""
     m = len(signals) // count * count
-    known = cells.known[:m].reshape(-1, count, *cells.known.shape[1:]).all(axis=1)
-    return signals[:m].reshape(-1, count, *signals.shape[1:]).mean(axis=1), known, count * cells.h
+    known = np.all(cells.known[:m].reshape(-1, count, cells.known.shape[1]), axis=1)
+    means = signals[:m].reshape(-1, count, *signals.shape[1:]).mean(axis=1)
+    return means, np.asarray(known, dtype=np.bool_), count * cells.h
 
 
 def _noise_gains(period: float, width: float) -> tuple[float, float]:
