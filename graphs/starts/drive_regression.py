@@ -94,7 +94,10 @@ class DriveEquation:
 
         best = values(total, count)
         others = values(total - self.sums.products, count - self.sums.counts)
-        sigmas = np.sqrt((blocks - 1.0) / blocks * np.sum((others - others.mean(axis=0)) ** 2, axis=0))
+        # few blocks tell less than they seem to: some of their freedom is in the values
+        few = (blocks - 1.0) / max(blocks - len(names), 1.0)
+        spread = np.sum((others - others.mean(axis=0)) ** 2, axis=0)
+        sigmas = np.sqrt(few * (blocks - 1.0) / blocks * spread)
         return {n: Value(float(x), float(s)) for n, x, s in zip(names, best, sigmas, strict=True)}
 
     def _noise(self) -> Array:

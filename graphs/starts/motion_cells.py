@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Stream
 
 Array = NDArray[np.float64]
@@ -74,10 +75,18 @@ def motion_cells(
         sigmas: noise of the encoders, shape (n,) [rad].
         held: whether a command acts until the next one; else it was measured and is linear between samples.
         left_out: stretches of time in which something else acted [s].
+
+    Raises:
+        RecordingError: the two do not overlap.
     """
     period = float(np.median(np.diff(encoder.times)))
     t0 = float(max(encoder.times[0], command.times[0]))
     t1 = float(min(encoder.times[-1], command.times[-1] + (period if held else 0.0)))
+    if t1 - t0 < period:
+        raise RecordingError(
+            f"positions ({encoder.times[0]:.3f} to {encoder.times[-1]:.3f} s) and commands ({command.times[0]:.3f} to "
+            f"{command.times[-1]:.3f} s) do not overlap; check that their stamps come from one clock"
+        )
     h = max(period / CELLS_PER_SAMPLE, SHORTEST_CELL, (t1 - t0) / MOST_CELLS)
     edges: Array = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1, dtype=np.float64)
     path = CubicSpline(encoder.times, encoder.values)

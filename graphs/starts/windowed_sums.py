@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 SIGNALS = ("command", "load", "viscous", "dry", "inertia")
 """What the products are of: u, M a + c + g, v, sign(v) and a of one joint."""
 WIDTHS = (0.06, 0.12, 0.24, 0.48, 0.96)  # [s] of windows that are tried
-FEWEST_CELLS = 12  # in a window, so that it is smooth
+FEWEST_CELLS, CELLS = 12, 96  # in a window, so that it is smooth, and those that are enough
 PER_WINDOW = 4  # windows begin at every quarter
 BLOCKS = 20  # of the recording at the most, each at least
 BLOCK = 1.0  # [windows] long, so that blocks share little
@@ -75,22 +75,22 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
             inertia, inertia^2 [rad^2].
         width: of the windows [s].
     """
+    signals, known, h = _coarser(signals, cells, max(round(width / cells.h) // CELLS, 1))
     m, n = signals.shape[:2]
-    length = max(round(width / cells.h), FEWEST_CELLS)
+    length = max(round(width / h), FEWEST_CELLS)
     window = 1.0 - np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
     stride = max(length // PER_WINDOW, 1)
     if length > m:
         return [WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(n)]
-    rows = sliding_window_view(signals, length, axis=0)[::stride] @ (window / length)
-    unknown = np.vstack([np.zeros((1, n), int), np.cumsum(~cells.known, axis=0)])
-    starts = stride * np.arange(len(rows))
+    starts = np.arange(0, m - length + 1, stride)
+    unknown = np.vstack([np.zeros((1, n), int), np.cumsum(~known, axis=0)])
     usable = unknown[starts + length] == unknown[starts]
-    count = int(np.clip(m * cells.h / (BLOCK * width), 2, BLOCKS))
+    count = int(np.clip(m * h / (BLOCK * width), 2, BLOCKS))
     block = np.minimum(starts * count // max(m - length + 1, 1), count - 1)
-    velocity, acceleration = _noise_gains(cells.period, length * cells.h)
+    velocity, acceleration = _noise_gains(cells.period, length * h)
     found = []
     for j in range(n):
-        good = rows[usable[:, j], j]
+        good = sliding_window_view(signals[:, j], length, axis=0)[starts[usable[:, j]]] @ (window / length)
         counts = np.bincount(block[usable[:, j]], minlength=count).astype(float)
         products = np.stack([part.T @ part for part in np.split(good, np.cumsum(counts[:-1]).astype(int))])
         of_noise = np.zeros((5, 5))
@@ -98,6 +98,14 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
         of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]
         found.append(WindowedSums(width, products[counts > 0], counts[counts > 0], of_noise))
     return found
+
+
+def _coarser(signals: Array, cells: MotionCells, count: int) -> tuple[Array, NDArray[np.bool_], float]:
+    """Signals of so many cells in one, which of them are known, and their length [s]; means of means are means."""
+    m = len(signals) // count * count
+    known = np.all(cells.known[:m].reshape(-1, count, cells.known.shape[1]), axis=1)
+    means = signals[:m].reshape(-1, count, *signals.shape[1:]).mean(axis=1)
+    return means, np.asarray(known, dtype=np.bool_), count * cells.h
 
 
 def _noise_gains(period: float, width: float) -> tuple[float, float]:

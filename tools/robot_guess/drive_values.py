@@ -114,8 +114,7 @@ def find_drives(
             for joint, some in zip(tree.joints, by_width, strict=True)
         ]
 
-    tree, reason = clearer_gravity(tree, equations_of)
-    equations = equations_of(tree)
+    tree, equations, reason = clearer_gravity(tree, equations_of)
     directions = [_direction(equation.direction(), equation.solve().get(GAIN)) for equation in equations]
     gains = [_gain(equation, sign) for equation, (sign, _) in zip(equations, directions, strict=True)]
     links = np.diag(M).tolist()
@@ -194,7 +193,7 @@ def _drive(
         found = {**equation.solve(given), INERTIA: Value(MATCHED * link, np.inf)}
     gain = given.get(GAIN, found.get(GAIN, Value(0.0, np.inf)).value)
     if gain * sign <= 0.0:
-        gain = sign * float(equation.rms[1] / equation.rms[0] if equation.rms[0] > 0.0 else 1.0)
+        gain = sign * (float(equation.rms[1] / equation.rms[0]) if np.all(equation.rms[:2] > 0.0) else 1.0)
     plain = {**{name: value.value for name, value in found.items()}, GAIN: gain}
     driving = equation.torque(gain)
     explained = 1.0 - (equation.missing(plain) / driving) ** 2 if found and driving > 0.0 else 0.0

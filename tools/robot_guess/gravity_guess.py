@@ -34,27 +34,31 @@ OTHERS = {
 
 def clearer_gravity(
     tree: RigidTree, equations_of: Callable[[RigidTree], Sequence[DriveEquation]]
-) -> tuple[RigidTree, str]:
-    """The tree with the gravity that the recording asks for, and why; the same tree and nothing where that will do.
+) -> tuple[RigidTree, Sequence[DriveEquation], str]:
+    """The tree with the gravity that the recording asks for, its equations, and why; the same tree where that will do.
 
     Args:
         tree: with gravity as it usually is.
         equations_of: equations of the drives of a tree.
     """
-    usual = _missing(equations_of(tree))
+    equations = equations_of(tree)
+    usual = _missing(equations)
     if not len(usual) or np.max(usual) <= 1.0 - DOUBTFUL:
-        return tree, ""
+        return tree, equations, ""
     found = []
     for words, gravity in OTHERS.items():
         other = _with_gravity(tree, gravity)
-        missing = _missing(equations_of(other))
+        now = equations_of(other)
+        missing = _missing(now)
         if len(missing) == len(usual):
-            found.append((float(np.sum(missing)), float(np.max(missing)), words, other))
-    total, worst, words, best = min(found, key=lambda entry: entry[0], default=(np.inf, np.inf, "", tree))
+            found.append((float(np.sum(missing)), float(np.max(missing)), words, other, now))
+    if not found:
+        return tree, equations, ""
+    total, worst, words, best, its = min(found, key=lambda entry: entry[0])
     if total > CLEARER * float(np.sum(usual)) or worst > 1.0 - EXPLAINED:
-        return tree, ""
+        return tree, equations, ""
     shares = f"{_percent(total / len(usual))} of the torque is explained so, {_percent(float(np.mean(usual)))} with -z"
-    return best, f"{words}: {shares}"
+    return best, its, f"{words}: {shares}"
 
 
 def _percent(missing: float) -> str:

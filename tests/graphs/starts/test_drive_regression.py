@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulated_arm import Arm, divided, moved, written
 
 from jointscope.graphs.starts.drive_regression import Driven, drive_equations
 from jointscope.graphs.starts.motion_cells import motion_cells
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
 
@@ -116,6 +119,13 @@ def test_two_recordings_tell_more_than_one(tmp_path, streams):
 def test_a_recording_that_is_too_short_tells_nothing(tmp_path, streams):
     encoder, command = (stream.between(2.0, 2.2) for stream in streams)
     assert all(equation.solve() == {} for equation in equations(ARM, tmp_path, (encoder, command)))
+
+
+def test_clocks_that_share_no_time_are_said(streams):
+    encoder, command = streams
+    late = replace(command, times=command.times + 1000.0)
+    with pytest.raises(RecordingError, match=r"commands \(1000\.000 to 1007\.\d+ s\) do not overlap; check that their"):
+        motion_cells(encoder, late, np.full(3, NOISE))
 
 
 @pytest.mark.parametrize("held", [True, False])
