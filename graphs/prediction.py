@@ -22,8 +22,6 @@ from jointscope.robots.robot import Robot
 Array = NDArray[np.float64]
 Rate = Callable[[Array], Array]
 
-SILENT = {"over": "ignore", "invalid": "ignore", "divide": "ignore"}
-
 
 class Predictor:
     """Advances states by the model of one robot.
@@ -49,7 +47,7 @@ class Predictor:
             step: step that each state takes, shape (s,).
         """
         h, torque, cuts = self._h[step][:, None], self._torque[step], self._cuts
-        with np.errstate(**SILENT):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             first = self._model.rates(x, torque)
             if self._euler:
                 return x + h * first

@@ -19,6 +19,8 @@ from jointscope.robots.state_rates import StateRates
 Array = NDArray[np.float64]
 
 STABLE = 1.0  # largest step times rate; Runge-Kutta 4 is stable up to 2.8
+STEEP = 0.5  # the same where friction changes its sign; errors are then a thousandth of an encoder's noise
+FLAT = 0.02  # the same for what friction may still contribute where steps are coarse
 POSTURES = 16  # at which the inertia that moves is looked at
 ANY_ANGLE = np.pi  # [rad] or [m] how far from zero postures may lie where the URDF gives no limits
 FAST = 1.0  # [rad/s] a velocity at which friction is flat
@@ -53,12 +55,14 @@ class StepCuts:
 
     def __init__(self, robot: Robot, h: float, rates: StateRates | None = None):
         flat, steep = _fastest_rates(robot, rates or StateRates(robot))
-        self.coarse = _steps(h * flat)
-        self.fine = max(_steps(h * steep), self.coarse)
+        self.coarse = _steps(h * flat / STABLE)
+        wanted = _steps(h * steep / STEEP)
+        # with two alone the change of sign would be crossed in a leap
+        self.fine = max(wanted + (wanted > 1), self.coarse)
         layout = robot.layout
         self._columns = np.unique(np.r_[layout.joint_v, layout.motor_v]).astype(np.intp)
         # where the slope of tanh has fallen so far that coarse steps do
-        fallen = max(self.fine / self.coarse, 1.0)
+        fallen = max(h * steep / self.coarse / FLAT, 1.0)
         self._band = float(np.arccosh(np.sqrt(fallen))) / robot.choices.friction_sharpness
 
     def fine_ones(self, x: Array, rate: Array, h: Array | float) -> NDArray[np.bool_]:
@@ -68,8 +72,8 @@ class StepCuts:
         return np.asarray(np.any(np.abs(x[..., columns]) < reach, axis=-1))
 
 
-def _steps(rate_times_h: float) -> int:
-    return max(int(np.ceil(rate_times_h / STABLE)), 1)
+def _steps(wanted: float) -> int:
+    return max(int(np.ceil(wanted)), 1)
 
 
 def _fastest_rates(robot: Robot, rates: StateRates) -> tuple[float, float]:

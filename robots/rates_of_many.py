@@ -134,7 +134,8 @@ class _LawOfMany:
         if isinstance(effect, RobotTorque):
             found = effect.law(self._of_robot(x), self._p)
             for rows, torque in zip((layout.joint_link, layout.motor_row), found, strict=True):
-                np.add.at(tau, (slice(None), rows), np.real(torque))
+                for j, row in enumerate(rows.tolist()):
+                    tau[:, row] += np.real(torque[:, j])
             return
         assert isinstance(effect, JointTorque)
         at = self._of_joint(x, load)

@@ -97,7 +97,7 @@ def signals_used(law: Law, p: Mapping[str, Any]) -> tuple[str, ...]:
         law: torque, or rate of a memory.
         p: some values of its parameters.
     """
-    known = {signal: np.full(1, 0.3 + 0.1 * k) for k, signal in enumerate(SIGNALS)}
+    known: dict[str, Any] = {signal: np.full(1, 0.3 + 0.1 * k) for k, signal in enumerate(SIGNALS)}
     try:
         with np.errstate(all="ignore"):
             without = {signal: law(JointSignals(**{**known, signal: np.full(1, np.nan)}), p) for signal in SIGNALS}

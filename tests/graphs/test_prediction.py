@@ -113,8 +113,8 @@ def test_many_starts_side_by_side_go_where_each_goes_alone(arm):
 
 def test_the_motor_of_a_rigid_joint_moves_the_link(arm):
     """Friction over the motor's own inertia would ask for 200 * 2 / 1e-4 * 4e-3 = 16000 steps."""
-    assert StepCuts(arm(inertia=1e-4), 4e-3).fine < 160
-    assert StepCuts(arm(inertia=1.0), 4e-3).fine <= 2
+    assert StepCuts(arm(inertia=1e-4), 4e-3).fine < 320
+    assert StepCuts(arm(inertia=1.0), 4e-3).fine < 8
 
 
 def test_a_model_that_runs_away_ends_without_a_word(arm):
