@@ -86,12 +86,12 @@ class WholeStage:
         return self._from_below(solved) if blunt and noise.estimate else solved
 
     def _settled(
-        self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int = MOST_ITERATIONS
+        self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
     ) -> Solved:
         """A solution whose noise agrees with its residuals."""
         passes = FixedPoint()
         for _ in range(NOISE_PASSES):
-            solution = self._step("all samples", problems, noise, estimate, most)
+            solution = self._step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
             _must_converge(solution, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold)

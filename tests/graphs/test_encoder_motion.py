@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.encoder_motion import encoder_motion, hides_reversals
-from jointscope.graphs.state_damping import FACTOR, FIRST, LARGEST, StateDamping
+from jointscope.graphs.state_damping import FACTOR, FIRST, LARGEST, MOST_TRIES, StateDamping
 from jointscope.graphs.timeline import Timeline
 from jointscope.robots.recording import Recording, Stream
 from jointscope.robots.sensors import MotorEncoder, Topic
@@ -67,10 +67,12 @@ def test_damping_of_states_ends():
     damping = StateDamping.of([np.arange(1000) * 2.5e-3])
     there = np.zeros(1000)
     there[500] = 1.0
-    tries = 0
-    while damping.raised([np.zeros(1000)], [there]):
-        tries += 1
-        assert tries < 20
+    for _ in range(3):
+        tries = 0
+        while damping.raised([np.zeros(1000)], [there]):
+            tries += 1
+            assert tries <= MOST_TRIES
+        damping.tries = 0
     assert damping.values[0][500] >= LARGEST
 
 
