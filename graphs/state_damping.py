@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 REACH = 0.06  # [s] states before and after a bend that move with it
 FIRST, FACTOR, LARGEST = 3e-8, 30.0, 1e-2  # relative to the diagonal
 OF_LARGEST = 0.05  # share of the largest rise from which a rise counts
+MOST_TRIES = 4  # of one step; then the damping of all has its turn
 FEW = 0.3  # share of all ticks; where more of them rise, it is not the bends that are too far
 
 
@@ -29,10 +30,12 @@ class StateDamping:
     Attributes:
         values: of each recording, shape (m,), relative to the diagonal.
         reach: ticks that REACH spans, of each recording.
+        tries: since the last step that was accepted.
     """
 
     values: list[Array]
     reach: list[int]
+    tries: int = 0
 
     @staticmethod
     def of(ticks: Sequence[Array]) -> StateDamping:
@@ -61,14 +64,18 @@ class StateDamping:
         ]
         if largest <= 0.0 or sum(map(np.sum, marked)) > FEW * sum(map(len, marked)):
             return False
-        if any(np.any(values[here] >= LARGEST) for values, here in zip(self.values, marked, strict=True)):
+        if self.tries >= MOST_TRIES or any(
+            np.any(values[here] >= LARGEST) for values, here in zip(self.values, marked, strict=True)
+        ):
             return False
+        self.tries += 1
         for values, here in zip(self.values, marked, strict=True):
             values[here] = np.maximum(FACTOR * values[here], FIRST)
         return True
 
     def relaxed(self) -> None:
         """Lowers it after a step that was accepted."""
+        self.tries = 0
         for values in self.values:
             values /= FACTOR
             values[values < FIRST / FACTOR] = 0.0

@@ -43,6 +43,7 @@ FEW_ITERATIONS = 12
 NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
 SMALL_STEP = 0.1  # [sigma] a last step that changes no value
 BLUNT = (20.0, 60.0)  # [s/rad] friction sharpness on the way to that of the robot
+BELOW_ITERATIONS = 25  # where it does not come to rest in as many, the larger noise stays
 BELOW = 10.0  # times smaller process noise that is tried
 BETTER = 1.5  # times smaller, the one that is preferred ...
 AS_GOOD = 0.02  # ... where the cost rises by less than this per measured value
@@ -85,11 +86,13 @@ class WholeStage:
         solved = self._settled(problems, noise, estimate)
         return self._from_below(solved) if blunt and noise.estimate else solved
 
-    def _settled(self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate) -> Solved:
+    def _settled(
+        self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
+    ) -> Solved:
         """A solution whose noise agrees with its residuals."""
         passes = FixedPoint()
         for _ in range(NOISE_PASSES):
-            solution = self._step("all samples", problems, noise, estimate, MOST_ITERATIONS)
+            solution = self._step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
             _must_converge(solution, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold)
@@ -108,7 +111,7 @@ class WholeStage:
         if np.all(densities(noise) < BETTER * densities(smaller)):
             return above
         try:
-            below = self._settled(above.problems, smaller, above.solution.estimate)
+            below = self._settled(above.problems, smaller, above.solution.estimate, BELOW_ITERATIONS)
         except SolveError:
             return above
         found = below.problems[0].dynamics.steps.noise

@@ -78,6 +78,14 @@ def test_a_push_is_found_beside_a_missing_law(doggy, motion, name):
     assert moment.row == "joint2.link" and moment.t0 <= PUSHED[0] and moment.t1 >= PUSHED[1]
 
 
+def test_a_torque_that_matters_to_nobody_is_no_push_however_clearly_it_stands_out(doggy, motion):
+    """0.15 N m where the motors give more than 50, in a recording without any noise."""
+    quiet = SimpleNamespace(**{**vars(motion), "noise": 1e-4 * motion.noise})
+    assert found(doggy, quiet, 0.01 * push(motion, 1)) == ()
+    (moment,) = found(doggy, quiet, push(motion, 1))
+    assert moment.row == "joint2.link"
+
+
 def test_what_is_left_out_already_is_not_told_again(doggy, motion):
     without = motion.recording.leaving_out([PUSHED])
     assert found(doggy, motion, push(motion, 0), without) == ()
