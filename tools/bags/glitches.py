@@ -23,7 +23,7 @@ LONGEST = 3  # samples in a row
 FARTHER = 10.0  # times the distance of the other samples nearby
 BEYOND_STEP = 1.5  # times the largest step nearby
 NEARBY = 12  # samples on either side
-ANYWHERE, FAST = 4.0, 0.98  # times this quantile of all steps: nothing else in the recording is like it
+ANYWHERE, FAST = 4.0, 0.95  # times this quantile of all steps: nothing else in the recording is like it
 QUANTA = 10.0  # smallest changes of the channel
 MOST_SHARE, MOST = 0.005, 5  # of the samples of a stream, or so many: more are no glitches
 

@@ -108,6 +108,22 @@ def read_recording(
     return replace(recording, notices=by_importance(recording.notices))
 
 
+def read_posture(path: str | Path, robot: Robot) -> tuple[dict[str, float], list[Notice]]:
+    """Where a bag has the joints that the robot does not model [rad or m], and what is said about them.
+
+    Raises:
+        RecordingError: the bag cannot be read, or one of them moves.
+    """
+    if not robot.tree.other_joints:
+        return {}, []
+    needed = [need for need in needed_streams(robot) if need.name in _encoders(robot)]
+    with open_bag(path) as bag:
+        types = {need.name: check_topic(bag, need.source) for need in needed}
+        raw = bag.read(sorted({need.source.topic for need in needed}))
+    parts = [message_parts(raw[need.source.topic], types[need.name], need.source.field) for need in needed]
+    return held_posture(parts, robot, str(path))
+
+
 def _encoders(robot: Robot) -> list[str]:
     """Sensors whose messages may name joints that the robot does not model."""
     return [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder | LinkEncoder)]
