@@ -45,7 +45,7 @@ def without_glitches(
     values = samples.values if not period else np.unwrap(samples.values, period=period, axis=0)
     since = (samples.stamps - samples.stamps[0]) / 1e9
     wild = np.column_stack([wild_samples(column) for column in values.T])
-    rows = wild.any(axis=1)
+    rows = np.asarray(wild.any(axis=1))
     count = int(np.count_nonzero(rows))
     if not count:
         return samples, []

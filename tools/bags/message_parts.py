@@ -91,7 +91,7 @@ def _alike(raw: Sequence[bytes], message_type: MessageType) -> Iterator[Rows]:
         left = np.arange(len(rows))
         while len(left) and tries < MOST_LAYOUTS:
             tries += 1
-            layout = byte_layout(raw[rows[left[0]]], message_type)
+            layout = byte_layout(raw[int(rows[left[0]])], message_type)
             same = np.zeros(len(left), bool)
             same[0] = True
             if layout is not None:

@@ -34,6 +34,7 @@ from jointscope.tools.bags.read_recording import (
 )
 
 BLOCK = 20_000  # messages
+ONE_SECOND = 1_000_000_000  # [ns]
 
 
 class ArrivalReader:
@@ -124,9 +125,7 @@ class ArrivalReader:
         if not present:
             return Arrivals.merged((), [], [])
         if not self.start_ns:
-            # stamps that nobody has filled yet are no beginning
-            filled = [stamps[stamps != 0] for stamps, _ in columns]
-            self.start_ns = min((int(stamps.min()) for stamps in filled if len(stamps)), default=0)
+            self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
         parts = [
             (
                 (stamps - self.start_ns) / 1e9,
@@ -155,7 +154,17 @@ class ArrivalReader:
             return None
         for part in columns.left_out:
             self._left_out[need.name, part.what] += part.count
-        return columns
+        return self._filled(need, columns)
+
+    def _filled(self, need: StreamSource, columns: Columns) -> Columns:
+        """The messages whose stamps are filled."""
+        if columns.stamps is None or columns.stamps.max() < ONE_SECOND:
+            return columns  # a simulated clock begins at zero
+        zero = columns.stamps == 0
+        count = int(np.count_nonzero(zero))
+        if count:
+            self._left_out[need.name, "whose stamp is zero"] += count
+        return columns.take(~zero) if count else columns
 
     def notices(self) -> list[str]:
         """What was left out because it does not fit, a sentence each."""

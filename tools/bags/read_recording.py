@@ -34,6 +34,7 @@ from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.unstamped import sent_earlier
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,11 @@ def _on_one_time_axis(
     moved, seams, found = on_one_clock({name: samples[name] for name in stamped})
     notices += found
     moved, found = brought_together(moved)
-    return {**samples, **moved}, seams, notices + found
+    notices += found
+    for name in samples.keys() - moved.keys():
+        moved[name], notice = sent_earlier(name, samples[name], {other: moved[other] for other in stamped})
+        notices.append(notice)
+    return {name: moved[name] for name in samples}, seams, notices
 
 
 def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
@@ -276,8 +281,6 @@ def _samples(
     values = columns.values[:, order]
     if stamps is None:
         stamps = received
-        text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
-        notices.append(Notice(need.name, "info", len(stamps), text))
     if need.source.stamped_by:
         whole = continued(values, need.source.wraps) if need.source.wraps else values
         values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)

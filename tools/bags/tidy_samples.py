@@ -34,7 +34,7 @@ def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) 
         samples, _ = without_unfilled(name, samples)
         samples = on_one_clock({name: samples})[0][name]
     samples, _ = in_time_order(name, samples)
-    finite = np.isfinite(samples.values).all(axis=1)
+    finite = np.asarray(np.isfinite(samples.values).all(axis=1))
     if not sensor or finite.mean() < MOSTLY:
         return samples
     samples = samples.take(finite)

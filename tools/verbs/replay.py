@@ -108,7 +108,7 @@ def _in_posture(robot: Robot, bag: Path) -> tuple[Robot, list[str]]:
 def _replayed(
     args: argparse.Namespace, robot: Robot, progress: Progress, stack: ExitStack
 ) -> tuple[ReplayResult, list[str]]:
-    """The replay with everything that listens to it, and what was left out; the table is complete when `stack` closes."""
+    """The replay with all that listens to it, and what was left out; the table is complete when `stack` closes."""
     from jointscope.graphs.fixed_lag.replay import replay
     from jointscope.tools.bags import ArrivalReader
     from jointscope.tools.replay_listeners import Listeners, Pace
