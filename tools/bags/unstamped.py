@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages without stamps: when they were sent follows from when they came in, and from how long messages take.
 
-    sent = received - typical latency of the encoders' messages (received - stamp), on the same way to the recorder
+    sent = received - smallest typical latency of other messages (received - stamp), on the same way to the recorder
 
 Without it a command would seem to act before it was sent, which no model explains; what is left is a delay, which
 `command_delay` finds.
@@ -33,8 +33,8 @@ def sent_earlier(name: str, samples: TimedSamples, stamped: Mapping[str, TimedSa
     shift = usual if 0.0 < usual < LONGEST else 0.0
     less = f", less the {duration(shift)} that other messages take" if shift else ""
     text = (
-        f"{name}: its messages carry no stamp; the time of reception stands in for it{less}; if the model does not fit, "
-        f"look for a delay: jointscope add ROBOT command_delay@robot -o ROBOT"
+        f"{name}: its messages carry no stamp; the time of reception stands in for it{less}; if the model does not "
+        "fit, look for a delay: jointscope add ROBOT command_delay@robot -o ROBOT"
     )
     if name != "command":
         text = text.partition("; if")[0]
