@@ -145,17 +145,21 @@ def test_any_type_and_field_with_a_header_can_be_mapped(doggy, tmp_path, name, m
     assert_same_streams(recording, read_recording(tmp_path / name, robot, decode_all=True))
 
 
-def test_without_a_header_the_time_of_reception_counts_and_is_noted(doggy, tmp_path):
+def test_without_a_header_the_time_of_reception_counts_less_what_messages_take_and_is_noted(doggy, tmp_path):
     command = Topic("/duty", "std_msgs/msg/Float64MultiArray", "data", "duty", doggy.command.names)
     robot = dataclasses.replace(doggy, command=command)
     recording = some_recording(robot)
     write_bag(tmp_path / "run.mcap", recording, robot)
     read = read_recording(tmp_path / "run.mcap", robot)
     assert np.array_equal(read.command.values, recording.command.values)
-    assert np.array_equal(read.command.times, read.command.received)
+    latency = min(np.median(s.received - s.times) for name, s in read.streams.items() if name != "command")
+    assert np.allclose(read.command.times, read.command.received - latency, atol=2e-9)
+    assert 1e-4 < latency < 3e-4
     assert [n.text for n in read.notices if n.kind == "info"] == [
         "command: the messages name no joints; the order of the robot file is assumed",
-        "command: std_msgs/msg/Float64MultiArray carries no stamp; the time of reception stands in for it",
+        "command: its messages carry no stamp; the time of reception stands in for it, less the "
+        f"{1e6 * latency:.3g} us that other messages take; if the model does not fit, look for a delay: "
+        "jointscope add ROBOT command_delay@robot -o ROBOT"
     ]
 
 

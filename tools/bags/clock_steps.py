@@ -19,7 +19,7 @@ from jointscope.robots.recording import Notice
 from jointscope.tools.bags.durations import duration
 from jointscope.tools.bags.timed_samples import TimedSamples
 
-SMALLEST_STEP = 0.02  # [s]
+SMALLEST_FORWARD, SMALLEST_BACK = 0.1, 0.02  # [s] lost messages and a queue that empties look like small steps forward
 PERIODS = 5.0  # a step is longer than so many periods
 WINDOW = 50  # messages on either side that tell the latency
 AGREE = 0.2  # of the step: the latency must jump as the stamps do
@@ -48,7 +48,8 @@ def clock_steps(samples: TimedSamples) -> list[ClockStep]:
         return []
     stamp_steps, received_steps = np.diff(samples.stamps) / 1e9, np.diff(samples.received) / 1e9
     period = float(np.median(np.abs(stamp_steps)))
-    allowed = max(SMALLEST_STEP, PERIODS * period)
+    allowed = np.where(stamp_steps < 0, SMALLEST_BACK, SMALLEST_FORWARD)
+    allowed = np.maximum(allowed, PERIODS * period)
     odd = (stamp_steps < 0) | (stamp_steps > allowed)
     latency = samples.latency
     found: list[ClockStep] = []
@@ -58,7 +59,7 @@ def clock_steps(samples: TimedSamples) -> list[ClockStep]:
         size = float(np.median(before) - np.median(after)) if len(before) else 0.0
         jump = float(stamp_steps[k - 1] - received_steps[k - 1])
         steady = float(np.median(np.abs(after - np.median(after)))) < 0.1 * abs(size)
-        if abs(size) > allowed and abs(jump - size) < AGREE * abs(size) and steady and len(after) > 2:
+        if abs(size) > allowed[k - 1] and abs(jump - size) < AGREE * abs(size) and steady and len(after) > 2:
             found.append(ClockStep(int(k), int(samples.received[k]), size))
             begin = int(k)
     return found

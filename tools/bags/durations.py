@@ -17,8 +17,9 @@ def duration(seconds: float) -> str:
         return f"{1e3 * size:.3g} ms"
     if size < 2 * MINUTE:
         return f"{size:.4g} s"
+    size = float(round(size))
     if size < 2 * HOUR:
-        return f"{size // MINUTE:.0f} min {size % MINUTE:.3g} s"
+        return f"{size // MINUTE:.0f} min {size % MINUTE:.0f} s"
     if size < 2 * DAY:
         return f"{size // HOUR:.0f} h {size % HOUR / MINUTE:.0f} min"
     return f"{size / DAY:.0f} days" if size < 2 * YEAR else f"{size / YEAR:.0f} years"

@@ -2,7 +2,7 @@
 """Wild samples: one to three in a row that leave where the channel was going and come back to it.
 
 A run of samples is a glitch if all of it lies outside the range of its neighbours, on the same side: ten times farther
-than any other sample nearby, and farther than anything nearby moves from one sample to the next. Motion does not do
+than any other sample nearby, and farther than anything moves from one sample to the next. Motion does not do
 that, a stop and a reversal do not either. A counter that begins anew stays where it went.
 """
 
@@ -23,6 +23,7 @@ LONGEST = 3  # samples in a row
 FARTHER = 10.0  # times the distance of the other samples nearby
 BEYOND_STEP = 1.5  # times the largest step nearby
 NEARBY = 12  # samples on either side
+ANYWHERE, FAST = 4.0, 0.95  # times this quantile of all steps: nothing else in the recording is like it
 QUANTA = 10.0  # smallest changes of the channel
 MOST_SHARE, MOST = 0.005, 5  # of the samples of a stream, or so many: more are no glitches
 
@@ -44,7 +45,7 @@ def without_glitches(
     values = samples.values if not period else np.unwrap(samples.values, period=period, axis=0)
     since = (samples.stamps - samples.stamps[0]) / 1e9
     wild = np.column_stack([wild_samples(column) for column in values.T])
-    rows = wild.any(axis=1)
+    rows = np.asarray(wild.any(axis=1))
     count = int(np.count_nonzero(rows))
     if not count:
         return samples, []
@@ -77,14 +78,24 @@ def wild_samples(column: Array) -> NDArray[np.bool_]:
     quantum = float(smallest_changes(column[:, None])[0])
     if len(column) < 2 * NEARBY or not np.isfinite(quantum):
         return found
-    floor = QUANTA * quantum
+    steps = np.abs(np.diff(column))
+    floor = max(QUANTA * quantum, ANYWHERE * float(np.quantile(steps, FAST)))
     for length in range(1, LONGEST + 1):
         beyond = beyond_neighbours(column, length)
-        for k in np.flatnonzero(beyond > floor):
+        for k in np.flatnonzero((beyond > floor) & (beyond > BEYOND_STEP * _largest_steps(column, length))):
             if not found[k : k + length].any() and _stands_alone(column, int(k), length, float(beyond[k])):
                 found[k : k + length] = True
     found[_wild_ends(column, floor)] = True
     return found
+
+
+def _largest_steps(column: Array, length: int) -> Array:
+    """Largest step near the run of samples that begins at each, without those that touch it, shape (n,)."""
+    n, width = len(column), NEARBY - 1
+    steps = np.concatenate([np.zeros(NEARBY), np.abs(np.diff(column)), np.zeros(NEARBY + length)])
+    largest = np.lib.stride_tricks.sliding_window_view(steps, width).max(axis=1)  # over those from k - NEARBY on
+    k = np.arange(n)
+    return np.maximum(largest[k], largest[np.minimum(k + NEARBY + length, len(largest) - 1)])
 
 
 def _stands_alone(column: Array, k: int, length: int, beyond: float) -> bool:

@@ -87,11 +87,11 @@ def _alike(raw: Sequence[bytes], message_type: MessageType) -> Iterator[Rows]:
     tries = 0
     for size in np.unique(sizes):
         rows = np.flatnonzero(sizes == size)
-        table = np.frombuffer(b"".join(raw[k] for k in rows), dtype=np.uint8).reshape(len(rows), int(size))
+        table = np.frombuffer(b"".join(raw[k] for k in rows.tolist()), dtype=np.uint8).reshape(len(rows), int(size))
         left = np.arange(len(rows))
         while len(left) and tries < MOST_LAYOUTS:
             tries += 1
-            layout = byte_layout(raw[rows[left[0]]], message_type)
+            layout = byte_layout(raw[int(rows[left[0]])], message_type)
             same = np.zeros(len(left), bool)
             same[0] = True
             if layout is not None:

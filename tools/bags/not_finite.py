@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice
@@ -21,8 +22,8 @@ def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSample
     Raises:
         RecordingError: more than a few are not.
     """
-    bad = ~(np.abs(samples.values) < LARGEST)  # NaN compares false
-    rows = bad.any(axis=1)
+    bad: NDArray[np.bool_] = ~(np.abs(samples.values) < LARGEST)  # NaN compares false
+    rows = np.asarray(bad.any(axis=1))
     count = int(np.count_nonzero(rows))
     if not count:
         return samples, []
@@ -37,7 +38,9 @@ def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSample
             f"{100 * MOST:g} %: check the field and the driver, or remove {name} from the robot file if it is a sensor "
             "that is not needed"
         )
-    which = ", ".join(channel for channel, any_bad in zip(channels, bad.any(axis=0), strict=True) if any_bad)
+    which = ", ".join(
+        channel for channel, any_bad in zip(channels, np.asarray(bad.any(axis=0)), strict=True) if any_bad
+    )
     text = (
         f"{name}: left out {counted(count, 'message')} that hold no number (NaN or infinite) in {which}, the first at "
         f"{since:.3f} s"

@@ -7,6 +7,7 @@ control loop has to cope with late and repeated messages, so a replay must hand 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -18,6 +19,8 @@ from jointscope.robots.arrivals import Arrivals
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
+from jointscope.tools.bags.columns import Columns
+from jointscope.tools.bags.durations import counted
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.read_recording import (
@@ -31,6 +34,7 @@ from jointscope.tools.bags.read_recording import (
 )
 
 BLOCK = 20_000  # messages
+ONE_SECOND = 1_000_000_000  # [ns]
 
 
 class ArrivalReader:
@@ -67,6 +71,7 @@ class ArrivalReader:
         self._progress = progress
         self._block = block
         self._last: dict[str, np.ndarray] = {}
+        self._left_out: Counter[tuple[str, str]] = Counter()
 
     def __iter__(self) -> Iterator[Arrivals]:
         """Reads the bag.
@@ -80,6 +85,7 @@ class ArrivalReader:
             messages = bag.messages(topics, self._progress)
             counts = dict.fromkeys(topics, 0)
             self._last.clear()
+            self._left_out.clear()
             while block := list(islice(messages, self._block)):
                 raw = {topic: RawTopic(topic) for topic in topics}
                 places: dict[str, list[int]] = {topic: [] for topic in topics}
@@ -106,34 +112,71 @@ class ArrivalReader:
         types: dict[str, MessageType],
         counts: dict[str, int],
     ) -> Arrivals:
-        present = [need for need in self._needed if raw[need.source.topic].data]
-        columns = []
-        for need in present:
-            columns.append(_columns(need, raw[need.source.topic], types, counts, self._last.get(need.name)))
+        present, found, columns = [], [], []
+        for need in self._needed:
+            topic = raw[need.source.topic]
+            fitting = self._fitting(need, topic, types, counts) if topic.data else None
+            if fitting is None:
+                continue
+            present.append(need)
+            found.append(fitting)
+            columns.append(_in_si(need, topic, fitting, self._last.get(need.name)))
             self._last[need.name] = columns[-1][1][-1]
+        if not present:
+            return Arrivals.merged((), [], [])
         if not self.start_ns:
-            # stamps that nobody has filled yet are no beginning
-            filled = [stamps[stamps != 0] for stamps, _ in columns]
-            self.start_ns = min((int(stamps.min()) for stamps in filled if len(stamps)), default=0)
+            self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
         parts = [
-            ((stamps - self.start_ns) / 1e9, (raw[need.source.topic].received_ns - self.start_ns) / 1e9, values)
-            for need, (stamps, values) in zip(present, columns, strict=True)
+            (
+                (stamps - self.start_ns) / 1e9,
+                (fitting.of(raw[need.source.topic].received_ns) - self.start_ns) / 1e9,
+                values,
+            )
+            for need, fitting, (stamps, values) in zip(present, found, columns, strict=True)
         ]
-        keys = [np.array(places[need.source.topic], dtype=float) for need in present]
+        keys = [
+            fitting.of(np.array(places[need.source.topic], dtype=float))
+            for need, fitting in zip(present, found, strict=True)
+        ]
         return Arrivals.merged(tuple(need.name for need in present), parts, keys)
 
+    def _fitting(
+        self, need: StreamSource, topic: RawTopic, types: dict[str, MessageType], counts: dict[str, int]
+    ) -> Columns | None:
+        """The messages of a block that fit, what does not is counted; None where a later block has none that do."""
+        wanted, width = wanted_of(need)
+        columns = read_columns(
+            topic, types[need.name], need.source.field, first=counts[topic.name], wanted=wanted, width=width
+        )
+        later = need.name in self._last
+        if later and wanted and columns.names and not set(wanted) <= set(columns.names):
+            self._left_out[need.name, "of other joints"] += len(topic.data)
+            return None
+        for part in columns.left_out:
+            self._left_out[need.name, part.what] += part.count
+        return self._filled(need, columns)
 
-def _columns(
-    need: StreamSource,
-    topic: RawTopic,
-    types: dict[str, MessageType],
-    counts: dict[str, int],
-    before: np.ndarray | None,
+    def _filled(self, need: StreamSource, columns: Columns) -> Columns:
+        """The messages whose stamps are filled."""
+        if columns.stamps is None or columns.stamps.max() < ONE_SECOND:
+            return columns  # a simulated clock begins at zero
+        zero = columns.stamps == 0
+        count = int(np.count_nonzero(zero))
+        if count:
+            self._left_out[need.name, "whose stamp is zero"] += count
+        return columns.take(~zero) if count else columns
+
+    def notices(self) -> list[str]:
+        """What was left out because it does not fit, a sentence each."""
+        return [
+            f"{name}: left out {counted(count, 'message')} {what}" for (name, what), count in self._left_out.items()
+        ]
+
+
+def _in_si(
+    need: StreamSource, topic: RawTopic, columns: Columns, before: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stamps [ns] and samples in SI units of one stream, as they lie in the block; `before` is the last one's."""
-    message_type = types[need.name]
-    wanted, width = wanted_of(need)
-    columns = read_columns(topic, message_type, need.source.field, first=counts[topic.name], wanted=wanted, width=width)
     order, _ = column_order(need, columns)
     stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
     return stamps, in_si(need.source, columns.values[:, order], before)

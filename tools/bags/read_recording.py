@@ -35,6 +35,7 @@ from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.unstamped import sent_earlier
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,22 @@ def read_recording(
     return replace(recording, notices=by_importance(recording.notices))
 
 
+def read_posture(path: str | Path, robot: Robot) -> tuple[dict[str, float], list[Notice]]:
+    """Where a bag has the joints that the robot does not model [rad or m], and what is said about them.
+
+    Raises:
+        RecordingError: the bag cannot be read, or one of them moves.
+    """
+    if not robot.tree.other_joints:
+        return {}, []
+    needed = [need for need in needed_streams(robot) if need.name in _encoders(robot)]
+    with open_bag(path) as bag:
+        types = {need.name: check_topic(bag, need.source) for need in needed}
+        raw = bag.read(sorted({need.source.topic for need in needed}))
+    parts = [message_parts(raw[need.source.topic], types[need.name], need.source.field) for need in needed]
+    return held_posture(parts, robot, str(path))
+
+
 def _encoders(robot: Robot) -> list[str]:
     """Sensors whose messages may name joints that the robot does not model."""
     return [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder | LinkEncoder)]
@@ -149,7 +166,11 @@ def _on_one_time_axis(
     moved, seams, found = on_one_clock({name: samples[name] for name in stamped})
     notices += found
     moved, found = brought_together(moved)
-    return {**samples, **moved}, seams, notices + found
+    notices += found
+    for name in samples.keys() - moved.keys():
+        moved[name], notice = sent_earlier(name, samples[name], {other: moved[other] for other in stamped})
+        notices.append(notice)
+    return {name: moved[name] for name in samples}, seams, notices
 
 
 def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
@@ -261,8 +282,6 @@ def _samples(
     values = columns.values[:, order]
     if stamps is None:
         stamps = received
-        text = f"{need.name}: {message_type.name} carries no stamp; the time of reception stands in for it"
-        notices.append(Notice(need.name, "info", len(stamps), text))
     if need.source.stamped_by:
         whole = continued(values, need.source.wraps) if need.source.wraps else values
         values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)

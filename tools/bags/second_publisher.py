@@ -21,7 +21,8 @@ LONGEST_VISIT = 3  # samples
 FARTHER = 10.0  # the way there and back, in usual steps of the other samples
 MOST_VISITS = 0.8  # share of the visits that must lead far away
 LOOKED_AT = 5  # samples that come most often
-ALTERNATING = 4.0  # times farther to the next sample than to the one after it
+FAR = 20.0  # usual ways over two samples: a jump
+MIXED = 0.03  # share of the samples that jump there and back
 
 
 def without_second_publisher(
@@ -35,7 +36,7 @@ def without_second_publisher(
         samples: in the order of their stamps, finite.
 
     Raises:
-        RecordingError: two nodes alternate, and nothing tells which of them is right.
+        RecordingError: two nodes publish, and nothing tells which of them is right.
     """
     _, which, counts = np.unique(samples.values, axis=0, return_inverse=True, return_counts=True)
     which = which.reshape(-1)
@@ -52,7 +53,7 @@ def without_second_publisher(
             f"between those of the driver, {counted(len(kept), 'message')}; stop it: `ros2 topic info -v` names it"
         )
         notices.append(Notice(name, "foreign", count, text))
-    _refuse_alternating(name, channels, kept)
+    _refuse_mixed(name, channels, kept)
     return kept, notices
 
 
@@ -76,18 +77,20 @@ def _comes_and_goes(values: NDArray[np.float64], is_it: NDArray[np.bool_]) -> bo
     return bool(far.mean() >= MOST_VISITS)
 
 
-def _refuse_alternating(name: str, channels: tuple[str, ...], samples: TimedSamples) -> None:
-    """Two streams woven into one: the next sample is far away, the one after it is near."""
+def _refuse_mixed(name: str, channels: tuple[str, ...], samples: TimedSamples) -> None:
+    """Two streams woven into one: again and again the next sample is far away, and the one after it is near."""
     if len(samples) < 20:
         return
-    near = np.median(np.abs(samples.values[2:] - samples.values[:-2]), axis=0)
-    steps = np.abs(np.diff(samples.values, axis=0))
-    far = np.median(steps, axis=0)
-    usual = np.maximum(near, smallest_changes(samples.values))
-    for channel, one, two in zip(channels, far, usual, strict=True):
-        if one > ALTERNATING * two:
-            raise RecordingError(
-                f"{channel} jumps to and fro by {one:.4g} from each message of {name} to the next: two nodes publish "
-                "on this topic in turn, and nothing tells which is right; expected one node: find them with "
-                "`ros2 topic info -v TOPIC`, stop one, and record again"
-            )
+    back = np.abs(samples.values[2:] - samples.values[:-2])
+    there = np.abs(np.diff(samples.values, axis=0))[:-1]
+    usual = np.maximum(np.median(back, axis=0), smallest_changes(samples.values[::2]))
+    jumps = (there > FAR * usual) & (FARTHER * back < there)
+    counts = np.count_nonzero(jumps, axis=0)
+    worst = int(np.argmax(counts))
+    if counts[worst] > MIXED * len(samples):
+        size = float(np.median(there[jumps[:, worst], worst]))
+        raise RecordingError(
+            f"{channels[worst]} jumps to and fro by {size:.4g} {counts[worst]} times in {len(samples)} messages of "
+            f"{name}: two nodes publish on this topic, and nothing tells which is right; expected one node: find them "
+            "with `ros2 topic info -v TOPIC`, stop one, and record again"
+        )

@@ -15,6 +15,7 @@ import numpy as np
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.tools.bags.durations import duration
+from jointscope.tools.bags.stream_notices import timing
 
 Stretch = tuple[float, float]
 
@@ -46,7 +47,15 @@ def with_silences_left_out(recording: Recording, encoder: str) -> Recording:
             f"samples are missing in most of the recording, for {duration(sum(t1 - t0 for t0, t1 in stretches))} in all"
         )
         return replace(recording, notices=[*recording.notices, Notice("recording", "gap", len(stretches), text)])
-    return replace(without, notices=[*recording.notices, _notice(stretches, commands, sensors, silent)])
+    said = [n for n in recording.notices if n.kind != "gap" or not _is_silence(recording.streams[n.stream], stretches)]
+    return replace(without, notices=[*said, _notice(stretches, commands, sensors, silent)])
+
+
+def _is_silence(stream: Stream, stretches: list[Stretch]) -> bool:
+    """Whether the gaps of a stream are no others than those that are left out."""
+    seen = timing(stream.times)
+    at = seen.longest_gap_at + 0.5 * seen.longest_gap
+    return seen.gaps <= len(stretches) and any(t0 <= at <= t1 for t0, t1 in stretches)
 
 
 def _has_period(stream: Stream) -> bool:

@@ -14,6 +14,9 @@ from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
 
+MOSTLY = 0.9  # of the samples that must be numbers to tell wild ones
+FEWEST = 30  # samples that tell anything
+
 
 def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) -> TimedSamples:
     """The samples in the order of their stamps; those of a sensor without what no sensor says.
@@ -31,9 +34,10 @@ def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) 
         samples, _ = without_unfilled(name, samples)
         samples = on_one_clock({name: samples})[0][name]
     samples, _ = in_time_order(name, samples)
-    finite = np.isfinite(samples.values).all(axis=1)
-    if not sensor or not finite.all():
+    finite = np.asarray(np.isfinite(samples.values).all(axis=1))
+    if not sensor or finite.mean() < MOSTLY:
         return samples
+    samples = samples.take(finite)
     return cleaned_sensor(name, tuple(map(str, range(samples.values.shape[1]))), samples)[0]
 
 
@@ -51,6 +55,8 @@ def cleaned_sensor(
     Raises:
         RecordingError: so much would be left out that something else is wrong.
     """
+    if len(samples) < FEWEST:
+        return samples, []
     samples, notices = without_second_publisher(name, channels, samples)
     samples, found = without_glitches(name, channels, samples, wraps)
     notices += found

@@ -84,19 +84,31 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.replay_text import replay_text
 
-    robot = load_robot(args.robot)
+    robot, said = _in_posture(load_robot(args.robot), args.bag)
     with progress_bar() as progress, ExitStack() as stack:
-        result = _replayed(args, robot, progress, stack)
+        result, left_out = _replayed(args, robot, progress, stack)
         write_replay(result, files)
     print(replay_text(result))
+    for notice in [*said, *left_out]:
+        print(f"note: {notice}")
     written = [path for path in outputs if path is not None]
     if written:
         print(f"\nWrote {', '.join(map(str, written))}")
     return 0
 
 
-def _replayed(args: argparse.Namespace, robot: Robot, progress: Progress, stack: ExitStack) -> ReplayResult:
-    """The replay with everything that listens to it; the table is complete when `stack` closes."""
+def _in_posture(robot: Robot, bag: Path) -> tuple[Robot, list[str]]:
+    """The robot with its other joints where the bag has them, and what is said about them."""
+    from jointscope.tools.bags.read_recording import read_posture
+
+    posture, notices = read_posture(bag, robot)
+    return robot.in_posture(posture), [notice.text for notice in notices]
+
+
+def _replayed(
+    args: argparse.Namespace, robot: Robot, progress: Progress, stack: ExitStack
+) -> tuple[ReplayResult, list[str]]:
+    """The replay with all that listens to it, and what was left out; the table is complete when `stack` closes."""
     from jointscope.graphs.fixed_lag.replay import replay
     from jointscope.tools.bags import ArrivalReader
     from jointscope.tools.replay_listeners import Listeners, Pace
@@ -119,7 +131,8 @@ def _replayed(args: argparse.Namespace, robot: Robot, progress: Progress, stack:
     result = replay(robot, arrivals, args.lag, adapt=adapt, smoothed_every=args.lagged_every, listener=listener)
     if table is not None:
         table.finish()
-    return _with_source(result, args, arrivals, progress)
+    left_out = arrivals.notices()
+    return _with_source(result, args, arrivals, progress), left_out
 
 
 def _with_source(
