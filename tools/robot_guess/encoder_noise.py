@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jointscope.robots.recording import Stream
-from jointscope.tools.robot_guess.sensor_noise import FEWEST_LEVELS, NoiseGuess, guess_noise
+from jointscope.tools.robot_guess.sensor_noise import FEWEST_LEVELS, NoiseGuess, guess_each
 from jointscope.tools.robot_guess.standing import ROUGHER, Stance
 
 MUCH = 1.5  # ratio from which two encoders do not measure alike
@@ -26,9 +26,10 @@ def encoder_noise(
         stances: all joints that the bag has, by name, among them those that stand.
     """
     times, values = encoder.times, encoder.values
+    each = guess_each(times, values, units)
     of_unit = {
-        unit: guess_noise(times, values[:, [j for j, u in enumerate(units) if u == unit]], unit)
-        for unit in dict.fromkeys(units)
+        unit: max((guess for guess, u in zip(each, units, strict=True) if u == unit), key=lambda guess: guess.sigma)
+        for unit in units
     }
     at_rest = {
         slide: [s.noise for joint, s in stances.items() if not s.moves and s.noise > 0 and (joint in slides) == slide]
@@ -36,7 +37,7 @@ def encoder_noise(
     }
     found = []
     for j, unit in enumerate(units):
-        own = guess_noise(times, values[:, [j]], unit)
+        own = each[j]
         resting = at_rest[unit in ("m", "mm")]
         if resting and own.sigma > ROUGHER * float(np.median(resting)):
             text = "that of joints that stand still; the motion is too fast for the rate to show it"

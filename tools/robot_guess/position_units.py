@@ -14,14 +14,14 @@ from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.units import si_factor
 from jointscope.tools.robot_guess.gyro_mount import SeenRate, find_mount, seen_rate
-from jointscope.tools.robot_guess.joint_signs import joint_left, joint_signs
+from jointscope.tools.robot_guess.joint_signs import FEW_JOINTS, joint_left, joint_signs
 
 Array = NDArray[np.float64]
 
 BEYOND = 5.0  # times the range of the URDF that no motion covers
 LARGEST = 1.2  # times the range that a motion may cover, for a unit to be possible
 HALF, WORTH_CHANGING = 0.5, 0.1  # another unit must leave less than this part, and that much less of the power
-INSTANTS = 600  # that are enough to judge by
+INSTANTS, LEAST = 600, 200  # that are enough to judge by; of many joints
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,7 @@ def _with(guess: UnitGuess, slides: NDArray[np.bool_], unit: str) -> UnitGuess:
 def seen_rates(encoder: Stream, gyros: Sequence[Stream], most: int = INSTANTS) -> list[SeenRate]:
     """What those gyroscopes saw that turn, beside the motion of an encoder [rad]."""
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
+    most = min(most, max(most * FEW_JOINTS // encoder.values.shape[1], LEAST))
     found = [seen_rate(motion, gyro, most) for gyro in gyros]
     return [seen for seen in found if seen is not None]
 
