@@ -170,7 +170,8 @@ def _on(tree: RigidTree, body: str, rate: Array, seen: SeenRate, mirrored: bool)
 def _turned(body: str, measured: Array, rate: Array, unit: str, open_axis: bool) -> Mount:
     power, C = float(np.sum(measured**2)), measured.T @ rate
     both = power + float(np.sum(rate**2))
-    square = max(_right_angles(), key=lambda R: float(np.sum(R * C)))
+    right = _right_angles()
+    square = right[int(np.argmax(np.einsum("kij,ij->k", right, C)))]
     left_square = (both - 2.0 * float(np.sum(square * C))) / power
     free = _wahba(C)
     left_free = (both - 2.0 * float(np.sum(free * C))) / power
@@ -186,12 +187,12 @@ def _wahba(C: Array) -> Array:
 
 
 @cache
-def _right_angles() -> tuple[Array, ...]:
-    """The 24 rotations by right angles, the identity first."""
+def _right_angles() -> Array:
+    """The 24 rotations by right angles, the identity first, shape (24, 3, 3)."""
     found = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             R = np.eye(3)[list(order)] * np.array(signs)[:, None]
             if np.linalg.det(R) > 0:
                 found.append(R)
-    return tuple(found)
+    return np.stack(found)
