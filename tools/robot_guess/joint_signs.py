@@ -7,7 +7,7 @@ still say nothing, and without any there is nothing to try.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -41,7 +41,7 @@ class SignGuess:
     mirrored: bool = True
 
 
-def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Sequence[float]) -> SignGuess:
+def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Callable[[], Sequence[float]]) -> SignGuess:
     """Signs of the joints by gyroscopes and drives.
 
     A joint that counts backwards also seems to move against its command; a gyroscope whose frame is left-handed looks
@@ -50,12 +50,12 @@ def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Sequence[f
     Args:
         tree: the robot.
         gyros: what they and the encoders saw.
-        drives: -1 for each joint that moves against its command, as the encoders count, shape (n,).
+        drives: finds -1 for each joint that moves against its command, as the encoders count, else 1.
     """
     found = joint_signs(tree, gyros)
     if all(sign > 0 for sign in found.signs):
         return found
-    by_command = tuple(float(sign) for sign in drives)
+    by_command = tuple(float(sign) for sign in drives())
     if by_command in (found.signs, *found.others):
         return SignGuess(by_command, (), mirrored=False)
     mounts = [find_mount(tree, gyro, mirrored=True) for gyro in gyros]

@@ -21,9 +21,10 @@ from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
 from jointscope.tools.robot_guess.encoder_noise import encoder_noise
 from jointscope.tools.robot_guess.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.robot_guess.joint_signs import SignGuess, encoder_signs
+from jointscope.tools.robot_guess.named_signal import Chosen, Wish
 from jointscope.tools.robot_guess.other_joints import HeldJoint, Typed, held_joints
 from jointscope.tools.robot_guess.position_units import UnitGuess, position_units, seen_rates
-from jointscope.tools.robot_guess.roles import Chosen, Roles, Wish, assign_roles, command_unit
+from jointscope.tools.robot_guess.roles import Roles, assign_roles, command_unit
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
@@ -137,7 +138,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     def drives(positions: Stream) -> list[DriveValues]:
         return drive_values(tree, positions, command, per_unit, torque, masses)
 
-    signs = encoder_signs(tree, seen_rates(seen, streams), [drive.sign for drive in drives(encoder)])
+    signs = encoder_signs(tree, seen_rates(seen, streams), lambda: [drive.sign for drive in drives(encoder)])
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
     gyros, left_out = _gyros(tree, seen, roles.imus, streams, signs)
     left_out += _unused(signals, roles, masses)

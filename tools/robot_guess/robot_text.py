@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 import numpy as np
 
 from jointscope.robots.units import joined, of_slide, si_factor, si_unit
 from jointscope.tools.robot_guess.gyro_mount import Mount
+from jointscope.tools.robot_guess.held_text import held_lines
 from jointscope.tools.robot_guess.joint_signs import SignGuess
-from jointscope.tools.robot_guess.other_joints import NOT_THERE, HeldJoint
+from jointscope.tools.robot_guess.named_signal import Chosen
 from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, GuessedGyro, RobotGuess
-from jointscope.tools.robot_guess.roles import Chosen
+from jointscope.tools.robot_guess.robot_line import GUESS
+from jointscope.tools.robot_guess.robot_line import as_list as _list
+from jointscope.tools.robot_guess.robot_line import line as _line
+from jointscope.tools.robot_guess.robot_line import number as _number
+from jointscope.tools.robot_guess.robot_line import plain as _plain
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
 from jointscope.tools.robot_guess.signals import Signal
 
-GUESS = "GUESS"
-COLUMN = 48  # where comments begin
 RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
-RESERVED = ("yes", "no", "on", "off", "true", "false", "null", "y", "n")
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -42,7 +43,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         _line(f"gravity: {_list(GRAVITY)}", "[m/s^2] in the base frame; z of the base points up", sure=False),
         _line(f"joints: {_list(joints)}", "joints of the URDF that move and are driven in the recording"),
         *(f"# {text}" for text in guess.following),
-        *_held(guess.held),
+        *held_lines(guess.held),
         "",
         "model:",
         *_model(free, tuple(joint for joint in joints if joint not in guess.elastic)),
@@ -63,21 +64,6 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def locked_line(guess: RobotGuess) -> str:
-    """One line for the screen about joints that are held; empty if there are none."""
-    ways = (
-        ("stand still in the recording", [h for h in guess.held if h.seen and not h.on_word]),
-        ("held at their mean on your word", [h for h in guess.held if h.on_word]),
-        (NOT_THERE, [h for h in guess.held if not h.seen]),
-    )
-    parts = [
-        ", ".join(f"{h.joint} {h.position:.4g}" if h.seen else h.joint for h in held) + f" ({why})"
-        for why, held in ways
-        if held
-    ]
-    return f"locked: {'; '.join(parts)}" if parts else ""
-
-
 def guesses(text: str) -> list[str]:
     """The guessed lines of a robot file: "key: value (why)"."""
     found = []
@@ -88,30 +74,12 @@ def guesses(text: str) -> list[str]:
     return found
 
 
-def _line(text: str, comment: str, sure: bool = True, indent: int = 0) -> str:
-    place = " " * indent + text
-    return f"{place.ljust(COLUMN)} # {comment if sure else f'{GUESS}: {comment}'}"
-
-
 def _model(free: bool, rigid_joints: tuple[str, ...]) -> list[str]:
     said = "`jointscope discover` finds which joints are elastic"
     rigid = [_line(f"rigid_joints: {_list(rigid_joints)}", said, indent=2)] if rigid_joints else []
     if free:
         return [_line("link_dynamics: free", "the URDF has no inertias", indent=2), *rigid]
     return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", *rigid]
-
-
-def _held(held: tuple[HeldJoint, ...]) -> list[str]:
-    """Where other joints stand."""
-    if not held:
-        return []
-    lines = ["locked:                                          # other joints that matter, [rad] or [m]"]
-    return lines + [_line(f"{_plain(h.joint)}: {_position(h.position)}", h.reason, False, 2) for h in held]
-
-
-def _position(value: float) -> str:
-    """A position to a tenth of a milliradian or better, as YAML reads a float."""
-    return f"{value:.6f}".rstrip("0").ljust(3 + (value < 0), "0")
 
 
 def _constants(guess: RobotGuess) -> list[str]:
@@ -330,27 +298,3 @@ def _noise(n: int) -> list[str]:
         f"  link_velocity: {_list([link] * n)}",
         f"  motor_velocity: {_list([motor] * n)}",
     ]
-
-
-def _number(value: float) -> str:
-    """Three digits, with a point, so that YAML reads a float."""
-    text = f"{value:.3g}"
-    mantissa, e, exponent = text.partition("e")
-    mantissa = mantissa if "." in mantissa else f"{mantissa}.0"
-    return f"{mantissa}{e}{exponent}"
-
-
-def _plain(text: str) -> str:
-    """A text as YAML reads it back."""
-    simple = re.fullmatch(r"[A-Za-z_/.]([\w./-]|:(?=\S))*", text) and text.lower() not in (
-        "yes",
-        "no",
-        "true",
-        "false",
-        "null",
-    )
-    return text if simple else "'" + text.replace("'", "''") + "'"
-
-
-def _list(values: Iterable[object]) -> str:
-    return "[" + ", ".join(_plain(value) if isinstance(value, str) else str(value) for value in values) + "]"

@@ -60,7 +60,7 @@ def guess_each(times: Array, values: Array, units: Sequence[str]) -> list[NoiseG
         units: of the channels, for the reason.
     """
     rough = column_noise(times, values)
-    return [_guess(column[:, None], *found) for column, *found in zip(values.T, rough, units, strict=True)]
+    return [_guess(column[:, None], found, unit) for column, found, unit in zip(values.T, rough, units, strict=True)]
 
 
 def _guess(values: Array, rough: float, unit: str) -> NoiseGuess:
