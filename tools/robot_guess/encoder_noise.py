@@ -27,10 +27,7 @@ def encoder_noise(
     """
     times, values = encoder.times, encoder.values
     each = guess_each(times, values, units)
-    of_unit = {
-        unit: max((guess for guess, u in zip(each, units, strict=True) if u == unit), key=lambda guess: guess.sigma)
-        for unit in units
-    }
+    of_unit = {unit: _middle([guess for guess, u in zip(each, units, strict=True) if u == unit]) for unit in units}
     at_rest = {
         slide: [s.noise for joint, s in stances.items() if not s.moves and s.noise > 0 and (joint in slides) == slide]
         for slide in (False, True)
@@ -44,5 +41,10 @@ def encoder_noise(
             found.append(NoiseGuess(float(np.median(resting)), text))
             continue
         few = len(np.unique(values[:, j])) < FEWEST_LEVELS
-        found.append(of_unit[unit] if few or of_unit[unit].sigma < MUCH * own.sigma else own)
+        alike = own.sigma / MUCH < of_unit[unit].sigma < own.sigma * MUCH
+        found.append(of_unit[unit] if few or alike else own)
     return tuple(found)
+
+
+def _middle(guesses: Sequence[NoiseGuess]) -> NoiseGuess:
+    return sorted(guesses, key=lambda guess: guess.sigma)[len(guesses) // 2]

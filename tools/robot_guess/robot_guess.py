@@ -17,6 +17,7 @@ from jointscope.robots.rigid_tree import RigidTree, moving_joints
 from jointscope.robots.units import si_factor
 from jointscope.robots.urdf_bodies import UrdfBodies
 from jointscope.tools.bags.open_bag import Progress
+from jointscope.tools.robot_guess.command_order import order_by_motion
 from jointscope.tools.robot_guess.drive_values import DriveValues, drive_values
 from jointscope.tools.robot_guess.encoder_noise import encoder_noise
 from jointscope.tools.robot_guess.gyro_mount import Mount, find_mount, seen_rate
@@ -131,6 +132,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = (replace(stream, values=stream.values * units.factor) for stream in (raw, links or raw))
     drive = command_unit(roles.command)
+    roles = replace(roles, command=_ordered(roles, tree, encoder, masses))
     command = _stream(roles.command, roles.joints)
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
     per_unit = SUPPLY if drive[0] == "duty" else 1.0
@@ -183,6 +185,19 @@ def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
     """Prismatic joints of a URDF."""
     kinds = {name: joint.shortname() for name, joint in zip(bodies.model.names, bodies.model.joints, strict=True)}
     return tuple(joint for joint in bodies.free if kinds[joint].startswith("JointModelP"))
+
+
+def _ordered(roles: Roles, tree: RigidTree, encoder: Stream, masses: bool) -> Chosen:
+    """The command; where it names no joints, with its columns in the order that the motion asks for."""
+    command, signal = roles.command, roles.command.signal
+    if signal.names or signal.topic == roles.motor_encoder.signal.topic:
+        return command
+    places = tuple(int(name) for name in command.names) or tuple(range(tree.n))
+    found = order_by_motion(tree, masses, encoder, signal.times, signal.values, places)
+    if found == places:
+        return command
+    reason = "its messages name no joints; the motion asks for this order of their columns"
+    return replace(command, names=tuple(map(str, found)), reason=reason, sure=False)
 
 
 def _in_si(
