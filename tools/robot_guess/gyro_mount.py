@@ -112,7 +112,7 @@ def find_mount(tree: RigidTree, seen: SeenRate, mirrored: bool = False, seats: C
         mirrored: whether its frame may be left-handed.
         seats: links that it could sit on; all if empty.
     """
-    found = _all_mounts(tree, seen, mirrored, seats)
+    found = all_mounts(tree, seen, mirrored, seats)
     if not found or found[0].left > FITS:
         return None
     others = tuple(m.body for m in found[1:] if m.left < found[0].left + ALIKE)
@@ -127,10 +127,10 @@ def least_left(tree: RigidTree, seen: SeenRate, seats: Collection[str] = ()) -> 
 
 def likely_seats(tree: RigidTree, seen: SeenRate, most: int) -> tuple[str, ...]:
     """The links that explain a gyroscope best, though none may do it well."""
-    return tuple(mount.body for mount in _all_mounts(tree, seen, True, ())[:most])
+    return tuple(mount.body for mount in all_mounts(tree, seen, True, ())[:most])
 
 
-def _all_mounts(tree: RigidTree, seen: SeenRate, mirrored: bool, seats: Collection[str]) -> list[Mount]:
+def all_mounts(tree: RigidTree, seen: SeenRate, mirrored: bool, seats: Collection[str]) -> list[Mount]:
     """The gyroscope on each link, best first."""
     mounts = (_on(tree, body, rate, seen, mirrored) for body, rate in _rates(tree, seen, seats))
     return sorted((mount for mount in mounts if mount is not None), key=lambda mount: mount.left)

@@ -127,7 +127,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     links = None if roles.link_encoder is None else _stream(roles.link_encoder, roles.joints)
     streams = [s.stream(("x", "y", "z")) for s in roles.imus]
     units = position_units(tree, links or raw, streams)
-    held = _in_si(held, bodies, tree, units.units)
+    held = _in_si(held, bodies, tree, units)
     tree = tree.locked_at({h.joint: h.position for h in held})
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = (replace(stream, values=stream.values * units.factor) for stream in (raw, links or raw))
@@ -136,6 +136,10 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     command = _stream(roles.command, roles.joints)
     torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
     per_unit = SUPPLY if drive[0] == "duty" else 1.0
+
+    def noise(positions: Stream) -> tuple[NoiseGuess, ...]:
+        scaled = replace(positions, values=positions.values * np.array(units.scales or 1.0))
+        return encoder_noise(scaled, units.units, tree.slides, {} if units.scales else roles.stances)
 
     def drives(positions: Stream) -> list[DriveValues]:
         return drive_values(tree, positions, command, per_unit, torque, masses)
@@ -154,8 +158,8 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         encoder_signs=signs,
         command_unit=drive,
         drives=drives(turned),
-        encoder_noise=encoder_noise(raw, units.units, tree.slides, roles.stances),
-        link_noise=None if links is None else encoder_noise(links, units.units, tree.slides, roles.stances),
+        encoder_noise=noise(raw),
+        link_noise=None if links is None else noise(links),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
@@ -200,14 +204,16 @@ def _ordered(roles: Roles, tree: RigidTree, encoder: Stream, masses: bool) -> Ch
     return replace(command, names=tuple(map(str, found)), reason=reason, sure=False)
 
 
-def _in_si(
-    held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, units: tuple[str, ...]
-) -> tuple[HeldJoint, ...]:
+def _in_si(held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, found: UnitGuess) -> tuple[HeldJoint, ...]:
     """Joints that are held, their positions in rad and m: they are measured in the unit of others of their kind."""
-    of_kind = {joint in tree.slides: unit for joint, unit in zip(tree.joints, units, strict=True)}
+    of_kind = {joint in tree.slides: unit for joint, unit in zip(tree.joints, found.units, strict=True)}
     slides = _slides(bodies)
     unit = {h.joint: of_kind.get(h.joint in slides, "m" if h.joint in slides else "rad") for h in held}
-    return tuple(replace(h, position=h.position * si_factor(unit[h.joint])) for h in held)
+    before = "; measured before a gear whose ratio nothing tells: divide by it" if found.scales else ""
+    return tuple(
+        replace(h, position=h.position * si_factor(unit[h.joint]), reason=h.reason + (before if h.seen else ""))
+        for h in held
+    )
 
 
 def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:
