@@ -11,8 +11,9 @@ from jointscope.robots.units import joined, of_slide, si_factor, si_unit
 from jointscope.tools.robot_guess.gyro_text import gyro_lines
 from jointscope.tools.robot_guess.held_text import held_lines
 from jointscope.tools.robot_guess.joint_signs import SignGuess
+from jointscope.tools.robot_guess.measured_robot import GRAVITY
 from jointscope.tools.robot_guess.named_signal import Chosen
-from jointscope.tools.robot_guess.robot_guess import GRAVITY, SUPPLY, RobotGuess
+from jointscope.tools.robot_guess.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.robot_guess.robot_line import GUESS
 from jointscope.tools.robot_guess.robot_line import as_list as _list
 from jointscope.tools.robot_guess.robot_line import line as _line
