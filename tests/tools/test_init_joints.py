@@ -202,6 +202,15 @@ def test_an_array_of_commands_in_another_order_is_put_in_that_of_the_motion(arm,
         assert "the motion asks for this order" in (tmp_path / f"{name}.yaml").read_text()
 
 
+def test_commands_on_a_topic_for_each_joint_are_named(arm, held, tmp_path, capsys):
+    topics = {"/joint_states": held.states()}
+    for joint in ("shoulder", "elbow"):
+        topics[f"/{joint}_controller/command"] = {"data": held.commands((joint,))["effort"]}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    assert "commands come joint by joint, on /elbow_controller/command, /shoulder_" in capsys.readouterr().err
+
+
 def test_arrays_of_motors_are_read(arm, held, tmp_path):
     names = ("shoulder", "elbow", "wrist")
     low = {"type": "own_msgs/msg/LowState", "position": held.states(names)["position"]}

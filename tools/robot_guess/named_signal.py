@@ -113,7 +113,7 @@ def _unclear(signal: Signal, ambiguous: Sequence[tuple[str, tuple[str, ...]]]) -
     for name, others in ambiguous:
         known = name in signal.names
         columns = signal.columns((name,) if known else others)
-        if not np.any(np.nanmax(columns, axis=0) > np.nanmin(columns, axis=0)):
+        if not any(np.ptp(column[np.isfinite(column)]) for column in columns.T if np.isfinite(column).any()):
             continue
         joint, in_bag = (others[0], name) if known else (name, others[0])
         here, there = (signal.topic, "the URDF") if known else ("the URDF", signal.topic)

@@ -97,6 +97,8 @@ def _with(guess: UnitGuess, slides: NDArray[np.bool_], unit: str) -> UnitGuess:
 
 def seen_rates(encoder: Stream, gyros: Sequence[Stream], most: int = INSTANTS) -> list[SeenRate]:
     """What those gyroscopes saw that turn, beside the motion of an encoder [rad]."""
+    if not gyros:
+        return []
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
     most = min(most, max(most * FEW_JOINTS // encoder.values.shape[1], LEAST))
     found = [seen_rate(motion, gyro, most) for gyro in gyros]

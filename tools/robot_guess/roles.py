@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.screening import MIN_SAMPLES
 from jointscope.tools.robot_guess.known_fields import IMU
 from jointscope.tools.robot_guess.named_signal import Chosen, NamedSignal, Wish, named_signal
 from jointscope.tools.robot_guess.signals import Signal
@@ -139,6 +140,10 @@ def _need_joints(motors: NamedSignal, urdf_joints: tuple[str, ...], stance: Mapp
     signal = motors.signal
     if motors.unclear:
         raise RecordingError(motors.unclear)
+    if len(signal.times) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{signal.topic} is too short: {len(signal.times)} positions; expected at least {MIN_SAMPLES}; record longer"
+        )
     if not motors.names and signal.names:
         raise RecordingError(
             f"{signal.topic} names {', '.join(signal.names)}, the URDF has {', '.join(urdf_joints)}: none in common; "
@@ -228,6 +233,12 @@ def _drive(
         if not found.signal.names:
             reason, sure = f"{reason}; it names no joints, its columns are taken in the order of the URDF", False
         return found, reason, sure and sum(count == max(counts) for count in counts) == 1
+    single = [s.topic for s in arrays if s.values.shape[1] == 1]
+    if len(single) > 1:
+        raise RecordingError(
+            f"nothing in the bag drives the motors on one topic: commands come joint by joint, on {', '.join(single)}; "
+            "put them together into one sensor_msgs/msg/JointState with names and effort, and record that"
+        )
     raise RecordingError(
         "nothing in the bag drives the motors: no effort on a command topic nor with the joint positions that varies "
         f"for {', '.join(moving)}; record the duty cycle, voltage or torque (JointState.effort) beside the positions"
