@@ -142,7 +142,7 @@ def _need_joints(motors: NamedSignal, urdf_joints: tuple[str, ...], stance: Mapp
         raise RecordingError(motors.unclear)
     if len(signal.times) < MIN_SAMPLES:
         raise RecordingError(
-            f"{signal.topic} is too short: {len(signal.times)} positions; expected at least {MIN_SAMPLES}; record longer"
+            f"{signal.topic} is too short: {len(signal.times)} positions; expected at least {MIN_SAMPLES}"
         )
     if not motors.names and signal.names:
         raise RecordingError(
