@@ -11,6 +11,7 @@ as long.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,24 +66,29 @@ class BodyRates:
         columns = R_joint_frame.T @ columns
         return columns[:, :, 0], columns[:, :, 1 : 1 + n], columns[:, :, 1 + n :]
 
-    def of_joints(self, q: Array, v: Array) -> Array:
-        """Angular velocities of everything that moves, each in the frame behind its joint.
+    def of_joints(self, q: Array, v: Array, wanted: Collection[int] | None = None) -> dict[int, Array]:
+        """Angular velocities of what moves, each in the frame behind its joint.
 
         Args:
             q: positions, shape (m, n) [rad].
             v: velocities, shape (m, n) [rad/s].
+            wanted: indices of joints in the model; None for all.
 
         Returns:
-            Rates by index of the joint in the model, the first one of the base, shape (n + 1, m, 3) [rad/s].
+            Rates by index of the joint in the model, each of shape (m, 3) [rad/s]; with those of all before them.
         """
-        rates = np.zeros((self._model.njoints, len(q), 3))
-        for joint in range(1, self._model.njoints):
+        parents = self._model.parents
+        needed = set(range(1, self._model.njoints) if wanted is None else wanted)
+        for joint in range(self._model.njoints - 1, 0, -1):
+            if joint in needed:
+                needed.add(int(parents[joint]))
+        rates = {0: np.zeros((len(q), 3))}
+        for joint in sorted(needed - {0}):
             if joint not in self._links:
                 self._links[joint] = self._link(joint)
             link = self._links[joint]
             R = _rotation(link.axis, q[:, link.column]) @ link.R_parent_joint.T
-            rates[joint] = (R @ rates[self._model.parents[joint], :, :, None])[:, :, 0]
-            rates[joint] += link.axis * v[:, link.column, None]
+            rates[joint] = (R @ rates[parents[joint]][:, :, None])[:, :, 0] + link.axis * v[:, link.column, None]
         return rates
 
     def _chain(self, frame: int) -> tuple[list[_Link], Array]:

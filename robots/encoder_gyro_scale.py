@@ -89,11 +89,22 @@ def slopes_of(recording: Recording, robot: Robot, gyro: Gyro) -> list[Slope]:
     axes = np.eye(3)
     columns = [turns[j] for j in seen]
     columns += [np.cross(axis, sum(turns)) for axis in axes] + [np.tile(axis, (len(measured), 1)) for axis in axes]
-    columns += [_slow(J[:, :, j] * bend[:, [k]]) for j in seen for k in range(robot.n)]
+    columns += [_slow(J[:, :, j] * bend[:, [k]]) for j in seen for k in _on_the_branch(robot, gyro)]
     X = np.stack([c for c in columns if np.abs(c).max() > 1e-9], axis=2)
     values, spread = _jackknife(X, measured, len(seen))
     sigma = np.hypot(spread, LEFT_ALONE if len(seen) == 1 else LEFT)
     return [Slope(robot.joints[j], gyro.name, float(values[i]), float(sigma[i])) for i, j in enumerate(seen)]
+
+
+def _on_the_branch(robot: Robot, gyro: Gyro) -> list[int]:
+    """Joints that can load those before a gyro: all that stand on the first of them, where no joints follow others."""
+    tree, below = robot.tree, robot.tree.joints_below(gyro.body)
+    if tree.coupling is not None or not below:
+        return list(range(robot.n))
+    first = tree.model.getJointId(tree.joints[below[0]])
+    return [
+        k for k, joint in enumerate(tree.joints) if first in list(tree.model.supports[tree.model.getJointId(joint)])
+    ]
 
 
 def _jackknife(X: Array, y: Array, count: int) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ All functions take many samples at once; where pinocchio has no call for many, i
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -251,10 +251,11 @@ class RigidTree:
         omega, by_q, by_v = self._rates.rate(frame, coupling.positions(q), coupling.rates(v))
         return omega, by_q @ coupling.G, by_v @ coupling.G
 
-    def joint_rates(self, q: Array, v: Array) -> Array:
-        """Angular velocities behind all joints of `model`, see `BodyRates.of_joints`, shape (joints, m, 3) [rad/s]."""
-        coupling = self.coupling
-        return self._rates.of_joints(*((q, v) if coupling is None else (coupling.positions(q), coupling.rates(v))))
+    def joint_rates(self, q: Array, v: Array, wanted: Collection[int] | None = None) -> dict[int, Array]:
+        """Angular velocities behind joints of `model`, see `BodyRates.of_joints`, each of shape (m, 3) [rad/s]."""
+        if self.coupling is not None:
+            q, v = self.coupling.positions(q), self.coupling.rates(v)
+        return self._rates.of_joints(q, v, wanted)
 
     def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:
         """Pose of a body in the base frame: R_base_body, shape (m, 3, 3), and p_base_body, shape (m, 3) [m]."""

@@ -103,6 +103,15 @@ def _with_rotation(text, rows):
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.parametrize("ratios", [(50.0, 50.0, 50.0), (120.0, 80.5, 33.0), (1.5, 1.0, 2.0)])
+def test_positions_before_gears_are_scaled_by_what_the_gyroscopes_say(arm, motion, tmp_path, ratios):
+    robot, recording = guessed(arm, motion, tmp_path, encoder=ratios)
+    assert robot.motor_encoder.source.unit == "rad"
+    np.testing.assert_allclose(robot.motor_encoder.source.scale, 1.0 / np.array(ratios), rtol=2e-3)
+    np.testing.assert_allclose(recording.streams["motor_encoder"].values, motion.q, atol=3e-3)
+    np.testing.assert_allclose(robot.motor_encoder.sigmas, 2e-5, rtol=0.2)
+
+
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_a_joint_that_counts_backwards_is_told_by_its_command(arm, motion, tmp_path, joint):
     signs = np.where(np.arange(3) == joint, -1.0, 1.0)

@@ -188,6 +188,29 @@ def test_an_array_of_commands_is_taken_in_the_order_of_the_urdf_and_marked(arm, 
         assert re.search(r"command: .* # GUESS: .* its columns are taken in the order of the URDF", text)
 
 
+def test_an_array_of_commands_in_another_order_is_put_in_that_of_the_motion(arm, held, free, tmp_path):
+    for name, motion, order in (("three", free, ("wrist", "shoulder", "elbow")), ("two", held, ("elbow", "shoulder"))):
+        topics = {
+            "/joint_states": motion.states(),
+            "/effort_controller/commands": {"data": motion.commands(order)["effort"]},
+        }
+        bag = write_arm_bag(tmp_path / f"{name}.mcap", motion.times, topics)
+        assert init(arm, bag, "-o", tmp_path / f"{name}.yaml") == 0
+        np.testing.assert_allclose(
+            read_recording(bag, load_robot(tmp_path / f"{name}.yaml")).command.values, motion.torque
+        )
+        assert "the motion asks for this order" in (tmp_path / f"{name}.yaml").read_text()
+
+
+def test_commands_on_a_topic_for_each_joint_are_named(arm, held, tmp_path, capsys):
+    topics = {"/joint_states": held.states()}
+    for joint in ("shoulder", "elbow"):
+        topics[f"/{joint}_controller/command"] = {"data": held.commands((joint,))["effort"]}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    assert "commands come joint by joint, on /elbow_controller/command, /shoulder_" in capsys.readouterr().err
+
+
 def test_arrays_of_motors_are_read(arm, held, tmp_path):
     names = ("shoulder", "elbow", "wrist")
     low = {"type": "own_msgs/msg/LowState", "position": held.states(names)["position"]}

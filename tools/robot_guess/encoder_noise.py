@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jointscope.robots.recording import Stream
-from jointscope.tools.robot_guess.sensor_noise import FEWEST_LEVELS, NoiseGuess, guess_noise
+from jointscope.tools.robot_guess.sensor_noise import FEWEST_LEVELS, NoiseGuess, guess_each
 from jointscope.tools.robot_guess.standing import ROUGHER, Stance
 
 MUCH = 1.5  # ratio from which two encoders do not measure alike
@@ -26,22 +26,25 @@ def encoder_noise(
         stances: all joints that the bag has, by name, among them those that stand.
     """
     times, values = encoder.times, encoder.values
-    of_unit = {
-        unit: guess_noise(times, values[:, [j for j, u in enumerate(units) if u == unit]], unit)
-        for unit in dict.fromkeys(units)
-    }
+    each = guess_each(times, values, units)
+    of_unit = {unit: _middle([guess for guess, u in zip(each, units, strict=True) if u == unit]) for unit in units}
     at_rest = {
         slide: [s.noise for joint, s in stances.items() if not s.moves and s.noise > 0 and (joint in slides) == slide]
         for slide in (False, True)
     }
     found = []
     for j, unit in enumerate(units):
-        own = guess_noise(times, values[:, [j]], unit)
+        own = each[j]
         resting = at_rest[unit in ("m", "mm")]
         if resting and own.sigma > ROUGHER * float(np.median(resting)):
             text = "that of joints that stand still; the motion is too fast for the rate to show it"
             found.append(NoiseGuess(float(np.median(resting)), text))
             continue
         few = len(np.unique(values[:, j])) < FEWEST_LEVELS
-        found.append(of_unit[unit] if few or of_unit[unit].sigma < MUCH * own.sigma else own)
+        alike = own.sigma / MUCH < of_unit[unit].sigma < own.sigma * MUCH
+        found.append(of_unit[unit] if few or alike else own)
     return tuple(found)
+
+
+def _middle(guesses: Sequence[NoiseGuess]) -> NoiseGuess:
+    return sorted(guesses, key=lambda guess: guess.sigma)[len(guesses) // 2]

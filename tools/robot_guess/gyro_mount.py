@@ -13,12 +13,13 @@ A gyroscope whose frame is left-handed is one that a reflection explains and no 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations, product
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.joint_motion import JointMotion, window_mean
@@ -102,38 +103,50 @@ def seen_rate(motion: JointMotion, gyro: Stream, most: int) -> SeenRate | None:
     return seen if seen.power > STANDS_STILL**2 else None
 
 
-def find_mount(tree: RigidTree, seen: SeenRate, mirrored: bool = False) -> Mount | None:
+def find_mount(tree: RigidTree, seen: SeenRate, mirrored: bool = False, seats: Collection[str] = ()) -> Mount | None:
     """The link that a gyroscope sits on; None where no link explains it.
 
     Args:
         tree: the robot.
         seen: what the gyroscope and the encoders saw.
         mirrored: whether its frame may be left-handed.
+        seats: links that it could sit on; all if empty.
     """
-    found = [m for m in (_on(tree, body, rate, seen, mirrored) for body, rate in _rates(tree, seen)) if m is not None]
-    found.sort(key=lambda mount: mount.left)
+    found = all_mounts(tree, seen, mirrored, seats)
     if not found or found[0].left > FITS:
         return None
     others = tuple(m.body for m in found[1:] if m.left < found[0].left + ALIKE)
     return replace(found[0], others=others)
 
 
-def least_left(tree: RigidTree, seen: SeenRate) -> float:
+def least_left(tree: RigidTree, seen: SeenRate, seats: Collection[str] = ()) -> float:
     """Share of a gyroscope's power that remains at the best link, 1 where none explains it."""
-    mount = find_mount(tree, seen)
+    mount = find_mount(tree, seen, seats=seats)
     return 1.0 if mount is None else mount.left
 
 
-def _rates(tree: RigidTree, seen: SeenRate) -> Sequence[tuple[str, Array]]:
+def likely_seats(tree: RigidTree, seen: SeenRate, most: int) -> tuple[str, ...]:
+    """The links that explain a gyroscope best, though none may do it well."""
+    return tuple(mount.body for mount in all_mounts(tree, seen, True, ())[:most])
+
+
+def all_mounts(tree: RigidTree, seen: SeenRate, mirrored: bool, seats: Collection[str]) -> list[Mount]:
+    """The gyroscope on each link, best first."""
+    mounts = (_on(tree, body, rate, seen, mirrored) for body, rate in _rates(tree, seen, seats))
+    return sorted((mount for mount in mounts if mount is not None), key=lambda mount: mount.left)
+
+
+def _rates(tree: RigidTree, seen: SeenRate, seats: Collection[str]) -> list[tuple[str, Array]]:
     """The first link behind every joint and its rate without its mean; further ones on the same joint turn alike."""
-    rates = tree.joint_rates(seen.q, seen.v)
-    found: dict[int, tuple[str, Array]] = {}
+    first: dict[int, tuple[str, Array]] = {}
     for frame in tree.model.frames:
-        joint = int(frame.parentJoint)
-        if frame.name in tree.bodies and joint > 0 and joint not in found:
-            rate = rates[joint] @ frame.placement.rotation
-            found[joint] = (frame.name, rate - rate.mean(axis=0))
-    return [(body, rate) for body, rate in found.values() if np.mean(np.sum(rate**2, axis=1)) > STANDS_STILL**2]
+        if frame.type == pin.FrameType.BODY and frame.parentJoint > 0:
+            first.setdefault(int(frame.parentJoint), (frame.name, frame.placement.rotation))
+    chosen = {joint: body for joint, body in first.items() if not seats or body[0] in seats}
+    rates = tree.joint_rates(seen.q, seen.v, chosen)
+    found = [(body, rates[joint] @ R_joint_body) for joint, (body, R_joint_body) in chosen.items()]
+    found = [(body, rate - rate.mean(axis=0)) for body, rate in found]
+    return [(body, rate) for body, rate in found if np.mean(np.sum(rate**2, axis=1)) > STANDS_STILL**2]
 
 
 def _on(tree: RigidTree, body: str, rate: Array, seen: SeenRate, mirrored: bool) -> Mount | None:
@@ -157,7 +170,8 @@ def _on(tree: RigidTree, body: str, rate: Array, seen: SeenRate, mirrored: bool)
 def _turned(body: str, measured: Array, rate: Array, unit: str, open_axis: bool) -> Mount:
     power, C = float(np.sum(measured**2)), measured.T @ rate
     both = power + float(np.sum(rate**2))
-    square = max(_right_angles(), key=lambda R: float(np.sum(R * C)))
+    right = _right_angles()
+    square = right[int(np.argmax(np.einsum("kij,ij->k", right, C)))]
     left_square = (both - 2.0 * float(np.sum(square * C))) / power
     free = _wahba(C)
     left_free = (both - 2.0 * float(np.sum(free * C))) / power
@@ -173,12 +187,12 @@ def _wahba(C: Array) -> Array:
 
 
 @cache
-def _right_angles() -> tuple[Array, ...]:
-    """The 24 rotations by right angles, the identity first."""
+def _right_angles() -> Array:
+    """The 24 rotations by right angles, the identity first, shape (24, 3, 3)."""
     found = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             R = np.eye(3)[list(order)] * np.array(signs)[:, None]
             if np.linalg.det(R) > 0:
                 found.append(R)
-    return tuple(found)
+    return np.stack(found)

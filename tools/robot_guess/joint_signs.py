@@ -7,7 +7,7 @@ still say nothing, and without any there is nothing to try.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.rigid_tree import RigidTree
-from jointscope.tools.robot_guess.gyro_mount import ALIKE, SeenRate, find_mount, least_left
+from jointscope.tools.robot_guess.gyro_mount import ALIKE, SeenRate, find_mount, least_left, likely_seats
 
 Array = NDArray[np.float64]
 Signs = tuple[float, ...]
 
 HALF, WORTH_TURNING = 0.5, 0.1  # turned joints must leave less than this part, and that much less of the power
 ALL_PATTERNS, PAIRS = 4, 12  # joints up to which all patterns, and pairs of joints, are tried
+FEW_JOINTS, SEATS = 8, 3  # joints up to which all links are asked, and how many links are with more
 MOVING = 0.02  # [rad/s] rms of a joint that a gyroscope could see
 
 
@@ -40,7 +41,7 @@ class SignGuess:
     mirrored: bool = True
 
 
-def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Sequence[float]) -> SignGuess:
+def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Callable[[], Sequence[float]]) -> SignGuess:
     """Signs of the joints by gyroscopes and drives.
 
     A joint that counts backwards also seems to move against its command; a gyroscope whose frame is left-handed looks
@@ -49,12 +50,12 @@ def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Sequence[f
     Args:
         tree: the robot.
         gyros: what they and the encoders saw.
-        drives: -1 for each joint that moves against its command, as the encoders count, shape (n,).
+        drives: finds -1 for each joint that moves against its command, as the encoders count, else 1.
     """
     found = joint_signs(tree, gyros)
     if all(sign > 0 for sign in found.signs):
         return found
-    by_command = tuple(float(sign) for sign in drives)
+    by_command = tuple(float(sign) for sign in drives())
     if by_command in (found.signs, *found.others):
         return SignGuess(by_command, (), mirrored=False)
     mounts = [find_mount(tree, gyro, mirrored=True) for gyro in gyros]
@@ -78,7 +79,7 @@ def joint_signs(tree: RigidTree, gyros: Sequence[SeenRate]) -> SignGuess:
     as_is = left.of(straight)
     if as_is < WORTH_TURNING:
         return SignGuess(straight)
-    seen = _turning(tree, gyros)
+    seen = left.joints
     best = _all_patterns(left, seen, straight) if len(seen) <= ALL_PATTERNS else _one_by_one(left, seen, straight)
     least = left.of(best[0])
     if least > HALF * as_is or as_is - least < WORTH_TURNING:
@@ -91,20 +92,30 @@ class _Left:
 
     def __init__(self, tree: RigidTree, gyros: Sequence[SeenRate]):
         self._tree, self._gyros = tree, gyros
-        self._known: dict[Signs, float] = {}
+        self._seats = [likely_seats(tree, gyro, tree.n if tree.n <= FEW_JOINTS else SEATS) for gyro in gyros]
+        self._chains = [self._chain(gyro, seats) for gyro, seats in zip(gyros, self._seats, strict=True)]
+        self._known: dict[tuple[int, Signs], float] = {}
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Joints before one of the gyroscopes that turn fast enough to be seen."""
+        return tuple(sorted({j for chain in self._chains for j in chain}))
 
     def of(self, signs: Signs) -> float:
-        if signs not in self._known:
-            s = np.array(signs)
-            turned = (replace(gyro, q=gyro.q * s, v=gyro.v * s) for gyro in self._gyros)
-            self._known[signs] = float(np.mean([least_left(self._tree, gyro) for gyro in turned]))
-        return self._known[signs]
+        return float(np.mean([self._of_one(k, signs) for k in range(len(self._gyros))]))
 
+    def _of_one(self, k: int, signs: Signs) -> float:
+        chain, gyro = self._chains[k], self._gyros[k]
+        key = (k, tuple(signs[j] for j in chain))
+        if key not in self._known:
+            turned = replace(gyro, q=gyro.q * np.array(signs), v=gyro.v * np.array(signs))
+            self._known[key] = least_left(self._tree, turned, self._seats[k])
+        return self._known[key]
 
-def _turning(tree: RigidTree, gyros: Sequence[SeenRate]) -> tuple[int, ...]:
-    """Joints that turn, fast enough for a gyroscope to see."""
-    speed = np.sqrt(np.mean(np.vstack([gyro.v for gyro in gyros]) ** 2, axis=0))
-    return tuple(j for j in range(tree.n) if speed[j] > MOVING and tree.joints[j] not in tree.slides)
+    def _chain(self, gyro: SeenRate, seats: Sequence[str]) -> tuple[int, ...]:
+        speed = np.sqrt(np.mean(gyro.v**2, axis=0))
+        below = {j for body in seats for j in self._tree.joints_below(body)}
+        return tuple(j for j in sorted(below) if speed[j] > MOVING and self._tree.joints[j] not in self._tree.slides)
 
 
 def _all_patterns(left: _Left, joints: Sequence[int], straight: Signs) -> list[Signs]:
@@ -119,20 +130,18 @@ def _one_by_one(left: _Left, joints: Sequence[int], straight: Signs) -> list[Sig
     """A pattern that no further turn betters, and its equals on the last step."""
     found = [straight]
     while True:
-        steps = sorted(_steps(found[0], joints), key=lambda signs: -sum(signs))
-        least = min(left.of(signs) for signs in steps)
-        if least > left.of(found[0]) - ALIKE:
+        now = left.of(found[0])
+        if now < ALIKE:
             return found
+        steps = [_turned(found[0], (j,)) for j in joints]
+        least = min((left.of(signs) for signs in steps), default=now)
+        if least > now - ALIKE and len(joints) <= PAIRS:
+            steps = [_turned(found[0], pair) for pair in combinations(joints, 2)]
+            least = min((left.of(signs) for signs in steps), default=now)
+        if least > now - ALIKE:
+            return found
+        steps.sort(key=lambda signs: -sum(signs))
         found = [signs for signs in steps if left.of(signs) < least + ALIKE]
-
-
-def _steps(signs: Signs, joints: Sequence[int]) -> Iterator[Signs]:
-    """One joint turned; of few joints two, as well."""
-    for j in joints:
-        yield _turned(signs, (j,))
-    if len(joints) <= PAIRS:
-        for pair in combinations(joints, 2):
-            yield _turned(signs, pair)
 
 
 def _turned(signs: Signs, joints: Sequence[int]) -> Signs:

@@ -11,7 +11,6 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.field_path import EVERY
 from jointscope.tools.bags.message_type import MessageType, is_list_of_texts
 
@@ -93,8 +92,8 @@ def _interfaces(kind: MessageType, first: bytes) -> list[KnownField]:
             continue
         try:
             items: list[Any] = list(getattr(kind.decode(first), name))
-        except Exception as err:  # the decoder leaks errors of many kinds on damaged bytes
-            raise RecordingError(f"a message of {kind.name} cannot be decoded") from err
+        except Exception:  # the decoder leaks errors of many kinds on damaged bytes
+            continue
         common = set.intersection(*(set(getattr(item, texts[0])) for item in items)) if items else set()
         found += [
             KnownField(f"{name}.{EVERY}.{numbers[0]}.{word}", QUANTITIES[word])

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.urdf_bodies import UrdfBodies
-from jointscope.tools.robot_guess.roles import Roles, Wish
+from jointscope.tools.robot_guess.named_signal import Wish
+from jointscope.tools.robot_guess.roles import Roles
 
 NOT_THERE = "assumed at 0: not in the bag"
 

@@ -13,15 +13,22 @@ from jointscope.robots.joint_motion import joint_motion
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.units import si_factor
+from jointscope.tools.robot_guess.gear_ratios import gear_scales
 from jointscope.tools.robot_guess.gyro_mount import SeenRate, find_mount, seen_rate
-from jointscope.tools.robot_guess.joint_signs import joint_left, joint_signs
+from jointscope.tools.robot_guess.joint_signs import FEW_JOINTS, joint_left, joint_signs
 
 Array = NDArray[np.float64]
 
 BEYOND = 5.0  # times the range of the URDF that no motion covers
 LARGEST = 1.2  # times the range that a motion may cover, for a unit to be possible
 HALF, WORTH_CHANGING = 0.5, 0.1  # another unit must leave less than this part, and that much less of the power
-INSTANTS = 600  # that are enough to judge by
+FLEXIBLE = 0.05  # relative; ratios nearer to 1 are left to calibration
+MUCH_BETTER = 0.25  # of the remaining power that ratios of gears may leave
+BEFORE_A_GEAR = (
+    "the motion would go far beyond the limits of the URDF otherwise; if these are positions before a gear, write "
+    "unit: rad and scale: [1/ratio, ...]"
+)
+INSTANTS, LEAST = 600, 200  # that are enough to judge by; of many joints
 
 
 @dataclass(frozen=True)
@@ -31,15 +38,17 @@ class UnitGuess:
     Attributes:
         units: in the bag, by joint: rad, deg or turn; of a prismatic joint m or mm.
         reason: why others than rad and m; empty for those.
+        scales: factors on the values of the bag, as of gears; empty for none.
     """
 
     units: tuple[str, ...]
     reason: str = ""
+    scales: tuple[float, ...] = ()
 
     @property
     def factor(self) -> Array:
         """From the bag to SI units, shape (n,)."""
-        return np.array([si_factor(unit) for unit in self.units])
+        return np.array([si_factor(unit) for unit in self.units]) * np.array(self.scales or 1.0)
 
 
 def position_units(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream]) -> UnitGuess:
@@ -55,7 +64,7 @@ def position_units(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream]) ->
     allowed = tree.limits[:, 1] - tree.limits[:, 0]
     beyond = span > BEYOND * allowed
     turning, sliding = "deg" if np.any(beyond & ~slides) else "rad", "mm" if np.any(beyond & slides) else "m"
-    reason = "the motion would go far beyond the limits of the URDF otherwise" if np.any(beyond) else ""
+    reason = BEFORE_A_GEAR if np.any(beyond) else ""
     by_limits = UnitGuess(tuple(sliding if slide else turning for slide in slides), reason)
     left = {turning: _left(tree, encoder, gyros, by_limits)}
     for unit in ("rad", "deg", "turn"):
@@ -63,9 +72,23 @@ def position_units(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream]) ->
         if gyros and unit not in left and possible:
             left[unit] = _left(tree, encoder, gyros, _with(by_limits, slides, unit))
     best = min(left, key=lambda unit: left[unit])
-    if left[best] > HALF * left[turning] or left[turning] - left[best] < WORTH_CHANGING:
-        return by_limits
-    return replace(_with(by_limits, slides, best), reason="so fast do the gyroscopes say that the joints turn")
+    found = by_limits
+    if left[best] < HALF * left[turning] and left[turning] - left[best] > WORTH_CHANGING:
+        found = replace(_with(by_limits, slides, best), reason="so fast do the gyroscopes say that the joints turn")
+    return _geared(tree, encoder, gyros, found) or found
+
+
+def _geared(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream], found: UnitGuess) -> UnitGuess | None:
+    """Positions from before gears, where the gyroscopes agree with their ratios much better than with any unit."""
+    scales = gear_scales(tree, seen_rates(encoder, gyros))
+    if scales is None or np.all(np.abs(scales / found.factor - 1.0) < FLEXIBLE):
+        return None
+    ratios = ", ".join(f"{1.0 / scale:.4g}" for scale in scales)
+    reason = f"so far do the gyroscopes say that the links turn: gears of {ratios}"
+    geared = UnitGuess(("rad",) * tree.n, reason, tuple(scales.tolist()))
+    if _left(tree, encoder, gyros, geared) > MUCH_BETTER * _left(tree, encoder, gyros, found):
+        return None
+    return geared
 
 
 def _with(guess: UnitGuess, slides: NDArray[np.bool_], unit: str) -> UnitGuess:
@@ -74,7 +97,10 @@ def _with(guess: UnitGuess, slides: NDArray[np.bool_], unit: str) -> UnitGuess:
 
 def seen_rates(encoder: Stream, gyros: Sequence[Stream], most: int = INSTANTS) -> list[SeenRate]:
     """What those gyroscopes saw that turn, beside the motion of an encoder [rad]."""
+    if not gyros:
+        return []
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
+    most = min(most, max(most * FEW_JOINTS // encoder.values.shape[1], LEAST))
     found = [seen_rate(motion, gyro, most) for gyro in gyros]
     return [seen for seen in found if seen is not None]
 

@@ -10,27 +10,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.errors import RobotError
 from jointscope.robots.joint_motion import joint_motion
 from jointscope.robots.recording import Stream
-from jointscope.robots.rigid_tree import RigidTree, moving_joints
+from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.units import si_factor
 from jointscope.robots.urdf_bodies import UrdfBodies
 from jointscope.tools.bags.open_bag import Progress
 from jointscope.tools.robot_guess.drive_values import Drives, DriveValues, find_drives, find_signs
-from jointscope.tools.robot_guess.encoder_noise import encoder_noise
 from jointscope.tools.robot_guess.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.robot_guess.joint_signs import SignGuess, encoder_signs
-from jointscope.tools.robot_guess.other_joints import HeldJoint, Typed, held_joints
-from jointscope.tools.robot_guess.position_units import UnitGuess, position_units, seen_rates
-from jointscope.tools.robot_guess.roles import Chosen, Roles, Wish, assign_roles
+from jointscope.tools.robot_guess.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
+from jointscope.tools.robot_guess.other_joints import HeldJoint, Typed
+from jointscope.tools.robot_guess.position_units import UnitGuess, seen_rates
+from jointscope.tools.robot_guess.roles import Roles
 from jointscope.tools.robot_guess.sample_times import guess_sample_times
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.robot_guess.signals import Signal, read_signals
 
 Array = NDArray[np.float64]
 
-GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] ROS: z of the base points up
 SUPPLY = 24.0  # [V]
 ENOUGH = 3000  # instants for the mounting of a gyroscope
 
@@ -87,10 +85,10 @@ class RobotGuess:
     elastic: tuple[str, ...] = ()
     slides: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
-    gravity: tuple[float, ...] = GRAVITY
-    gravity_reason: str = ""
     held: tuple[HeldJoint, ...] = ()
     following: tuple[str, ...] = ()
+    gravity: tuple[float, ...] = GRAVITY
+    gravity_reason: str = ""
 
     @property
     def free_links(self) -> bool:
@@ -110,109 +108,64 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         RecordingError: the bag cannot be read, lacks positions or what drives the motors, or a joint moves that must
             not be left out.
     """
-    urdf, known = typed.urdf, moving_joints(typed.urdf)
-    bodies = UrdfBodies.read(urdf)
-    _no_followers(bodies, typed.wish)
     signals = read_signals(typed.bag, progress)
-    roles = assign_roles(signals, known, _slides(bodies), typed.wish)
-    masses, trouble = _masses(urdf, roles.joints)
-    if not masses:
-        roles = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
-        if roles.link_encoder is None:
-            raise RobotError(
-                f"{urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected one "
-                f"of them; add <inertial> to the links, or record a topic with the positions of the links ({trouble})"
-            )
-    held = held_joints(bodies, roles, typed, free_links=not masses)
-    tree = RigidTree(urdf, roles.joints, np.array(GRAVITY), inertias=masses)
-    raw = _stream(roles.motor_encoder, roles.joints)
-    links = None if roles.link_encoder is None else _stream(roles.link_encoder, roles.joints)
-    streams = [s.stream(("x", "y", "z")) for s in roles.imus]
-    units = position_units(tree, links or raw, streams)
-    held = _in_si(held, bodies, tree, units.units)
-    tree = tree.locked_at({h.joint: h.position for h in held})
+    robot = measured_robot(typed, signals)
+    roles, tree, masses = robot.roles, robot.tree, robot.masses
+    torque = None if roles.joint_torque is None else role_stream(roles.joint_torque, roles.joints)
+    noises = robot.noise(roles.motor_encoder)
+
+    def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
+        return _drives(robot, positions, noises, torque, elastic)
+
     # the links turn the gyroscopes, and their encoders know where zero is
-    encoder, seen = (replace(stream, values=stream.values * units.factor) for stream in (raw, links or raw))
-    torque = None if roles.joint_torque is None else _stream(roles.joint_torque, roles.joints)
-    noises = encoder_noise(raw, units.units, tree.slides, roles.stances)
-    sigmas = units.factor * [noise.sigma for noise in noises]
-    first = _drives(tree, encoder, roles, sigmas, torque, (), masses) if streams else None
-    signs = encoder_signs(tree, seen_rates(seen, streams), [drive.sign for drive in first.joints] if first else ())
+    encoder, seen = robot.encoder, robot.links or robot.encoder
+    signs = encoder_signs(tree, seen_rates(seen, robot.gyros), lambda: [d.sign for d in drives(encoder).joints])
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
-    gyros, left_out = _gyros(tree, seen, roles.imus, streams, signs)
+    gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     elastic = _seen(tree, gyros) if masses else ()
-    drives = _drives(tree, turned, roles, sigmas, torque, elastic, masses)
+    drive = drives(turned, elastic)
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
-        name=typed.name or urdf.stem,
-        urdf=urdf,
+        name=typed.name or typed.urdf.stem,
+        urdf=typed.urdf,
         bag=str(typed.bag),
         roles=roles,
         masses=masses,
-        position_units=units,
+        position_units=robot.units,
         encoder_signs=signs,
-        command_unit=drives.unit,
-        drives=drives.joints,
-        gravity=tuple(drives.gravity.tolist()),
-        gravity_reason=drives.gravity_reason,
+        command_unit=drive.unit,
+        drives=drive.joints,
+        gravity=tuple(drive.gravity.tolist()),
+        gravity_reason=drive.gravity_reason,
         encoder_noise=noises,
-        link_noise=None if links is None else encoder_noise(links, units.units, tree.slides, roles.stances),
+        link_noise=None if roles.link_encoder is None else robot.noise(roles.link_encoder),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
         elastic=elastic,
-        held=held,
-        following=_following(bodies, roles.joints),
+        held=robot.held,
+        following=_following(robot.bodies, roles.joints),
     )
 
 
 def _drives(
-    tree: RigidTree,
+    robot: MeasuredRobot,
     encoder: Stream,
-    roles: Roles,
-    sigmas: Array,
+    noises: Sequence[NoiseGuess],
     torque: Stream | None,
     elastic: tuple[str, ...],
-    masses: bool,
 ) -> Drives:
     """Unit of the command, and the drive of each joint."""
-    command = _stream(roles.command, roles.joints)
-    if not masses:
+    roles, tree = robot.roles, robot.tree
+    # noise is that of positions behind gears, in the unit of the bag
+    sigmas = np.array([si_factor(unit) * noise.sigma for unit, noise in zip(robot.units.units, noises, strict=True)])
+    command = role_stream(roles.command, roles.joints)
+    if not robot.masses:
         return find_signs(encoder, command, sigmas, torque, tree.gravity)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
-
-
-def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
-    """Complains about mimic joints among those that the user named.
-
-    Raises:
-        RobotError: there is one.
-    """
-    for joint in (*wish.joints, *wish.locked):
-        if joint in bodies.followers:
-            raise RobotError(
-                f"{joint} is a mimic joint of {bodies.path.name}: {joint} follows {bodies.followers[joint].leader} and "
-                f"is modelled with it; leave it out of --joints and --lock"
-            )
-
-
-def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
-    """Prismatic joints of a URDF."""
-    kinds = {name: joint.shortname() for name, joint in zip(bodies.model.names, bodies.model.joints, strict=True)}
-    return tuple(joint for joint in bodies.free if kinds[joint].startswith("JointModelP"))
-
-
-def _in_si(
-    held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, units: tuple[str, ...]
-) -> tuple[HeldJoint, ...]:
-    """Joints that are held, their positions in rad and m: they are measured in the unit of others of their kind."""
-    of_kind = {joint in tree.slides: unit for joint, unit in zip(tree.joints, units, strict=True)}
-    slides = _slides(bodies)
-    unit = {h.joint: of_kind.get(h.joint in slides, "m" if h.joint in slides else "rad") for h in held}
-    return tuple(replace(h, position=h.position * si_factor(unit[h.joint])) for h in held)
 
 
 def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:
@@ -230,19 +183,6 @@ def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     """Joints that turn with a gyroscope behind them."""
     seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
     return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
-
-
-def _masses(urdf: Path, joints: tuple[str, ...]) -> tuple[bool, str]:
-    """Whether the bodies have masses, and what is wrong if not."""
-    try:
-        RigidTree(urdf, joints, np.array(GRAVITY))
-    except RobotError as err:
-        return False, str(err)
-    return True, ""
-
-
-def _stream(chosen: Chosen, joints: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
-    return chosen.signal.stream(chosen.names or joints, factor)
 
 
 def _gyros(

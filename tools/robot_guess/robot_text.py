@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from jointscope.robots.units import joined, si_factor, si_unit
 from jointscope.tools.robot_guess.drive_text import effect_lines, parameter_lines
-from jointscope.tools.robot_guess.gyro_mount import Mount
+from jointscope.tools.robot_guess.gyro_text import gyro_lines
+from jointscope.tools.robot_guess.held_text import held_lines
 from jointscope.tools.robot_guess.joint_signs import SignGuess
-from jointscope.tools.robot_guess.other_joints import NOT_THERE, HeldJoint
-from jointscope.tools.robot_guess.robot_guess import SUPPLY, GuessedGyro, RobotGuess
+from jointscope.tools.robot_guess.named_signal import Chosen
+from jointscope.tools.robot_guess.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.robot_guess.robot_line import GUESS
 from jointscope.tools.robot_guess.robot_line import as_list as _list
 from jointscope.tools.robot_guess.robot_line import line as _line
 from jointscope.tools.robot_guess.robot_line import number as _number
 from jointscope.tools.robot_guess.robot_line import plain as _plain
-from jointscope.tools.robot_guess.roles import Chosen
 from jointscope.tools.robot_guess.sensor_noise import NoiseGuess
-from jointscope.tools.robot_guess.signals import Signal
+from jointscope.tools.robot_guess.source_text import FINEST, sigma_line, source_lines
 
-FINEST = 1e-8  # [SI unit] sigma below which the noise is that of rounding in the computer
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
@@ -42,7 +43,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         _line(f"gravity: {_list(guess.gravity)}", f"[m/s^2] in the base frame; {_gravity(guess)}", sure=False),
         _line(f"joints: {_list(joints)}", "joints of the URDF that move and are driven in the recording"),
         *(f"# {text}" for text in guess.following),
-        *_held(guess.held),
+        *held_lines(guess.held),
         "",
         "model:",
         *_model(free, tuple(joint for joint in joints if joint not in guess.elastic)),
@@ -54,7 +55,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *_motor_encoder(guess),
         *_link_encoder(guess),
         *(_torque(guess) if free else ()),
-        *(line for gyro in guess.gyros for line in _gyro(gyro, guess)),
+        *(line for gyro in guess.gyros for line in gyro_lines(gyro, guess.encoder_signs)),
         *(f"  # not used: {text}" for text in guess.left_out),
         "",
         *effect_lines(guess),
@@ -62,21 +63,6 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *([] if free else _noise(len(joints))),
     ]
     return "\n".join(lines) + "\n"
-
-
-def locked_line(guess: RobotGuess) -> str:
-    """One line for the screen about joints that are held; empty if there are none."""
-    ways = (
-        ("stand still in the recording", [h for h in guess.held if h.seen and not h.on_word]),
-        ("held at their mean on your word", [h for h in guess.held if h.on_word]),
-        (NOT_THERE, [h for h in guess.held if not h.seen]),
-    )
-    parts = [
-        ", ".join(f"{h.joint} {h.position:.4g}" if h.seen else h.joint for h in held) + f" ({why})"
-        for why, held in ways
-        if held
-    ]
-    return f"locked: {'; '.join(parts)}" if parts else ""
 
 
 def guesses(text: str) -> list[str]:
@@ -101,41 +87,11 @@ def _model(free: bool, rigid_joints: tuple[str, ...]) -> list[str]:
     return [_line("integrator: simpson", "euler | midpoint | simpson", indent=2), "  coriolis: true", *rigid]
 
 
-def _held(held: tuple[HeldJoint, ...]) -> list[str]:
-    """Where other joints stand."""
-    if not held:
-        return []
-    lines = ["locked:                                          # other joints that matter, [rad] or [m]"]
-    return lines + [_line(f"{_plain(h.joint)}: {_position(h.position)}", h.reason, False, 2) for h in held]
-
-
-def _position(value: float) -> str:
-    """A position to a tenth of a milliradian or better, as YAML reads a float."""
-    return f"{value:.6f}".rstrip("0").ljust(3 + (value < 0), "0")
-
-
 def _constants(guess: RobotGuess) -> list[str]:
     if guess.command_unit[0] != "duty":
         return []
     text = f"motor.supply_voltage: {SUPPLY}"
     return ["constants:", _line(text, "[V] not in the recording; see the data sheet", sure=False, indent=2), ""]
-
-
-def _source(signal: Signal, unit: str, indent: int = 4) -> list[str]:
-    space = " " * indent
-    return [
-        _line(f"topic: {signal.topic}", _timing(signal), indent=indent),
-        f"{space}type: {signal.msgtype}",
-        f"{space}field: {signal.field}",
-        f"{space}unit: {unit}",
-    ]
-
-
-def _timing(signal: Signal) -> str:
-    seen = signal.timing
-    text = f"{seen.rate:.4g} Hz, jitter {1e3 * seen.jitter:.2f} ms"
-    text += f", {seen.gaps} gap{'s' * (seen.gaps != 1)} of up to {seen.longest_gap:.3g} s" if seen.gaps else ""
-    return text if signal.stamped else f"{text}; no stamps, times are those of reception"
 
 
 def _names(chosen: Chosen, joints: tuple[str, ...], indent: int) -> list[str]:
@@ -155,6 +111,12 @@ def _names(chosen: Chosen, joints: tuple[str, ...], indent: int) -> list[str]:
 def _signs(signs: Iterable[float], reason: str, indent: int) -> list[str]:
     values = [float(sign) for sign in signs]
     return [_line(f"scale: {_list(values)}", reason, False, indent)] if min(values) < 0 else []
+
+
+def _scale(scales: Sequence[float], reason: str) -> list[str]:
+    """Factors on the positions of joints that count backwards or before a gear."""
+    values = [float(f"{scale:.6g}") for scale in scales]
+    return [] if all(value == 1.0 for value in values) else [_line(f"scale: {_list(values)}", reason, False, 4)]
 
 
 def _wraps(chosen: Chosen) -> list[str]:
@@ -183,7 +145,7 @@ def _command(guess: RobotGuess) -> list[str]:
     signs = [drive.sign for drive in guess.drives]
     lines = [
         _line("command:", command.reason, command.sure),
-        *_source(command.signal, unit, 2)[:3],
+        *source_lines(command.signal, unit, 2)[:3],
         _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),
@@ -202,20 +164,12 @@ def _measured(guess: RobotGuess) -> list[str]:
     return [_line("held: false", "measured beside the positions; true: a command that acts until the next", False, 2)]
 
 
-def _sigma(noise: NoiseGuess, unit: str) -> str:
-    """The line with a sensor's noise, which was found in a unit of the bag."""
-    sigma = max(si_factor(unit) * noise.sigma, FINEST) if noise.sigma > 0 else 1e-4
-    reason = noise.reason if noise.sigma > 0 else "nothing to see in the recording; see the data sheet"
-    return _line(f"sigma: {_number(sigma)}", f"[{si_unit(unit)}] {reason}", False, 4)
-
-
 def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
     """The line with the noise of encoders, a list where they measure in different units."""
     if len(set(units)) == len(set(noises)) == 1:
-        return _sigma(noises[0], units[0])
-    values = [
-        f"{_number(max(si_factor(unit) * (n.sigma or 1e-4), FINEST))}" for n, unit in zip(noises, units, strict=True)
-    ]
+        return sigma_line(noises[0], units[0])
+    sigmas = [si_factor(unit) * (n.sigma or 1e-4) for n, unit in zip(noises, units, strict=True)]
+    values = [_number(max(sigma, FINEST)) for sigma in sigmas]
     reasons = "; ".join(dict.fromkeys(n.reason for n in noises))
     return _line(f"sigma: [{', '.join(values)}]", f"[{joined([si_unit(u) for u in units])}] {reasons}", False, 4)
 
@@ -239,8 +193,11 @@ def _encoder(
 ) -> list[str]:
     units = guess.position_units.units
     unit = units[0] if len(set(units)) == 1 else _list(units)
-    source = _source(chosen.signal, unit)
-    if guess.position_units.reason:
+    source = source_lines(chosen.signal, unit)
+    scales = np.array(guess.encoder_signs.signs) * np.array(guess.position_units.scales or 1.0)
+    if guess.position_units.scales:
+        signs = f"{guess.position_units.reason}; {signs}" if min(scales) < 0 else guess.position_units.reason
+    elif guess.position_units.reason:
         source[-1] = _line(f"unit: {unit}", guess.position_units.reason, False, 4)
     return [
         f"  {kind}:",
@@ -249,7 +206,7 @@ def _encoder(
         *_names(chosen, guess.roles.joints, 4),
         *_wraps(chosen),
         *_stamps(chosen, guess),
-        *_signs(guess.encoder_signs.signs, signs, 4),
+        *_scale(scales.tolist(), signs),
         *zero,
         _sigmas(noise, units),
     ]
@@ -262,49 +219,11 @@ def _torque(guess: RobotGuess) -> list[str]:
     return [
         "  joint_torque:",
         _line("kind: joint_torque", chosen.reason, chosen.sure, 4),
-        *_source(chosen.signal, "N m"),
+        *source_lines(chosen.signal, "N m"),
         *_names(chosen, guess.roles.joints, 4),
         *_stamps(chosen, guess),
-        _sigma(guess.torque_noise, "N m"),
+        sigma_line(guess.torque_noise, "N m"),
     ]
-
-
-def _gyro(gyro: GuessedGyro, guess: RobotGuess) -> list[str]:
-    mount = gyro.mount
-    R = [[round(float(x), 4) + 0.0 for x in row] for row in mount.R_imu_body]
-    return [
-        f"  {gyro.name}:",
-        "    kind: gyro",
-        *_source(gyro.signal, mount.unit),
-        _line(f"body: {_plain(mount.body)}", _seat(mount), False, 4),
-        "    form: full",
-        _sigma(gyro.noise, mount.unit),
-        "    bias: {value: [0.0, 0.0, 0.0], prior_sigma: 0.1}",
-        *_handed(mount, guess.encoder_signs),
-        _line("R_imu_body:", _turned(mount), False, 4),
-        f"      value: [{', '.join(_list(row) for row in R)}]",
-        "      prior_sigma: 0.1",
-    ]
-
-
-def _handed(mount: Mount, signs: SignGuess) -> list[str]:
-    if not mount.left_handed:
-        return []
-    text = "only a reflection explains it; x is turned, then R_imu_body holds"
-    if signs.others:
-        others = " or ".join(_list(other) for other in signs.others)
-        text += f"; as well: no reflection, but `scale: {others}` of command and encoder, joints that count backwards"
-    return [_line("left_handed: true", text, False, 4)]
-
-
-def _seat(mount: Mount) -> str:
-    text = f"the encoders explain {100 * (1 - mount.left):.1f} % of its motion if it sits there"
-    return f"{text}, and about as much on {', '.join(mount.others)}" if mount.others else text
-
-
-def _turned(mount: Mount) -> str:
-    text = "right angles" if mount.square else "not in right angles"
-    return f"{text}; the link turns about one axis only, the rotation about it is open" if mount.open_axis else text
 
 
 def _noise(n: int) -> list[str]:

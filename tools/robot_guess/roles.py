@@ -13,55 +13,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.wrapped_counter import continued, wrapping_jump
-from jointscope.tools.robot_guess.joint_names import match_names
+from jointscope.robots.screening import MIN_SAMPLES
 from jointscope.tools.robot_guess.known_fields import IMU
+from jointscope.tools.robot_guess.named_signal import Chosen, NamedSignal, Wish, named_signal
 from jointscope.tools.robot_guess.signals import Signal
 from jointscope.tools.robot_guess.standing import Stance, stances
 
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
 DRIVEN = re.compile(r"effort|torque|current|duty|pwm|volt")
-TURNS = (2.0 * np.pi, 360.0, 1.0)  # periods of counters, in rad, degrees, turns
-NEAR_A_TURN = 0.1  # relative; the joint moves on while its counter jumps
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What the user said.
-
-    Attributes:
-        joints: those to use; empty for all that move and are driven.
-        names: what messages call some of them, where that is not to be guessed.
-        locked: joints to hold at their mean although they move.
-    """
-
-    joints: tuple[str, ...] = ()
-    names: Mapping[str, str] = field(default_factory=dict)
-    locked: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """A signal in its role.
-
-    Attributes:
-        signal: where it is.
-        names: joint names in the messages, one per joint of the robot; places, counted from 0, where the messages
-            name none, and empty where those are all places in order.
-        reason: why this one.
-        sure: whether nothing else could be meant.
-        wraps: period after which its counter begins anew, in the unit of the bag; the signal is continued already.
-        by_ending: joints whose names are not those of the URDF.
-        by_order: whether the names have nothing in common with those of the URDF and are taken in its order.
-    """
-
-    signal: Signal
-    names: tuple[str, ...]
-    reason: str
-    sure: bool
-    wraps: float = 0.0
-    by_ending: tuple[str, ...] = ()
-    by_order: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,35 +44,6 @@ class Roles:
     imus: tuple[Signal, ...]
     stances: Mapping[str, Stance] = field(default_factory=dict)
     driven: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Named:
-    """A signal and what it calls the joints of the URDF; who else could be meant, if that is not clear."""
-
-    signal: Signal
-    names: Mapping[str, str]
-    by_ending: tuple[str, ...] = ()
-    unclear: str = ""
-    turns: Mapping[str, float] = field(default_factory=dict)
-    by_order: bool = False
-
-    def chosen(self, joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
-        """The signal in a role."""
-        names = tuple(self.names[joint] for joint in joints)
-        turn = max((self.turns.get(name, 0.0) for name in names), default=0.0)
-        if not self.signal.names and names == tuple(map(str, range(self.signal.values.shape[1]))):
-            names = ()
-        by_ending = tuple(joint for joint in joints if joint in self.by_ending)
-        return Chosen(self.signal, names, reason, sure, turn, by_ending, self.by_order)
-
-    def varies(self, joint: str) -> bool:
-        """Whether a joint has samples that differ."""
-        if joint not in self.names:
-            return False
-        column = self.signal.columns((self.names[joint],))[:, 0]
-        good = column[np.isfinite(column)]
-        return bool(len(good) > len(column) / 2 and np.ptp(good) > 0)
 
 
 def assign_roles(
@@ -144,7 +74,7 @@ def assign_roles(
             "the bag holds no joint positions; expected sensor_msgs/msg/JointState.position or the state of a "
             "controller, besides commands"
         )
-    named = [_named(s, urdf_joints, wish) for s in positions]
+    named = [named_signal(s, urdf_joints, wish) for s in positions]
     link_side = [n for n in named if LINK_SIDE.search(n.signal.topic.lower())]
     # encoders whose topics say nothing else sit on the motors
     candidates = [n for n in named if n not in link_side] or named
@@ -185,69 +115,7 @@ def _check_wish(wish: Wish, urdf_joints: tuple[str, ...]) -> None:
         raise RecordingError(f"{both[0]} stands under --joints and under --lock; expected one of them")
 
 
-def _named(signal: Signal, urdf_joints: tuple[str, ...], wish: Wish) -> _Named:
-    """Which columns of a signal belong to which joints; by place only where the messages name none."""
-    turns = _turns(signal) if signal.quantity == "position" else {}
-    signal = _continued(signal, turns)
-    said = {joint: name for joint, name in wish.names.items() if name in signal.names}
-    if not signal.names:
-        candidates = tuple(joint for joint in urdf_joints if not wish.joints or joint in wish.joints)
-        fits = next((c for c in (candidates, urdf_joints) if len(c) == signal.values.shape[1]), ())
-        return _Named(signal, {joint: str(place) for place, joint in enumerate(fits)}, turns=turns)
-    left = [joint for joint in urdf_joints if joint not in said]
-    rest = [name for name in signal.names if name not in said.values()]
-    # a name that several joints could have belongs to the one that the user named
-    match = match_names(left, rest)
-    if match.ambiguous and wish.joints:
-        match = match_names([joint for joint in left if joint in wish.joints], rest)
-    names = {**match.found, **said}
-    strangers = not names and not match.ambiguous
-    candidates = tuple(joint for joint in urdf_joints if not wish.joints or joint in wish.joints)
-    if strangers and len(candidates) == len(signal.names):
-        by_order = dict(zip(candidates, signal.names, strict=True))
-        return _Named(signal, by_order, candidates, "", turns, by_order=True)
-    return _Named(signal, names, match.alike, _unclear(signal, match.ambiguous), turns)
-
-
-def _unclear(signal: Signal, ambiguous: Sequence[tuple[str, tuple[str, ...]]]) -> str:
-    """A complaint about a moving joint that could be several; empty where there is none."""
-    for name, others in ambiguous:
-        known = name in signal.names
-        columns = signal.columns((name,) if known else others)
-        if not np.any(np.nanmax(columns, axis=0) > np.nanmin(columns, axis=0)):
-            continue
-        joint, in_bag = (others[0], name) if known else (name, others[0])
-        here, there = (signal.topic, "the URDF") if known else ("the URDF", signal.topic)
-        return (
-            f"{name} of {here} could be {' or '.join(others)} of {there}; say which, as in "
-            f"--joints {joint}={in_bag}, with all joints that the robot shall have"
-        )
-    return ""
-
-
-def _turns(signal: Signal) -> dict[str, float]:
-    """Periods of counters that begin anew, by the name or place of their column."""
-    labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
-    jumps = {label: wrapping_jump(signal.times, column) for label, column in zip(labels, signal.values.T, strict=True)}
-    found = {
-        label: next((turn for turn in TURNS if abs(jump / turn - 1.0) < NEAR_A_TURN), 0.0)
-        for label, jump in jumps.items()
-    }
-    return {label: turn for label, turn in found.items() if turn}
-
-
-def _continued(signal: Signal, turns: Mapping[str, float]) -> Signal:
-    if not turns:
-        return signal
-    labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
-    columns = [
-        continued(signal.values[:, [k]], turns[label]) if label in turns else signal.values[:, [k]]
-        for k, label in enumerate(labels)
-    ]
-    return replace(signal, values=np.hstack(columns))
-
-
-def _stances(named: _Named, slides: Sequence[str]) -> dict[str, Stance]:
+def _stances(named: NamedSignal, slides: Sequence[str]) -> dict[str, Stance]:
     """How the joints of a position signal behave."""
     joints = {name: joint for joint, name in named.names.items()}
     found = stances(named.signal, tuple(joints), [joint in slides for joint in joints.values()])
@@ -262,7 +130,7 @@ def _why(rivals: Sequence[str]) -> str:
     return f"also there: {', '.join(rivals)}" if rivals else "the positions that are not those of links or commands"
 
 
-def _need_joints(motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance]) -> None:
+def _need_joints(motors: NamedSignal, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance]) -> None:
     """Complains where the positions belong to no joint of the URDF, or none of them moves.
 
     Raises:
@@ -271,6 +139,10 @@ def _need_joints(motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[s
     signal = motors.signal
     if motors.unclear:
         raise RecordingError(motors.unclear)
+    if len(signal.times) < MIN_SAMPLES:
+        raise RecordingError(
+            f"{signal.topic} is too short: {len(signal.times)} positions; expected at least {MIN_SAMPLES}"
+        )
     if not motors.names and signal.names:
         raise RecordingError(
             f"{signal.topic} names {', '.join(signal.names)}, the URDF has {', '.join(urdf_joints)}: none in common; "
@@ -292,8 +164,8 @@ def _need_joints(motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[s
 
 
 def _joints(
-    motors: _Named,
-    drive: _Named,
+    motors: NamedSignal,
+    drive: NamedSignal,
     stance: Mapping[str, Stance],
     urdf_joints: tuple[str, ...],
     wish: Wish,
@@ -321,7 +193,7 @@ def _joints(
     return tuple(driven)
 
 
-def _encoder(named: _Named, joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
+def _encoder(named: NamedSignal, joints: tuple[str, ...], reason: str, sure: bool) -> Chosen:
     """An encoder; one that has no names is a guess, too."""
     chosen = named.chosen(joints, reason, sure)
     if named.signal.names:
@@ -330,8 +202,8 @@ def _encoder(named: _Named, joints: tuple[str, ...], reason: str, sure: bool) ->
 
 
 def _drive(
-    signals: list[Signal], motors: _Named, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance], wish: Wish
-) -> tuple[_Named, str, bool]:
+    signals: list[Signal], motors: NamedSignal, urdf_joints: tuple[str, ...], stance: Mapping[str, Stance], wish: Wish
+) -> tuple[NamedSignal, str, bool]:
     """What acts on the motors, why, and whether nothing else could: a commanded effort, else a measured one.
 
     Raises:
@@ -360,6 +232,12 @@ def _drive(
         if not found.signal.names:
             reason, sure = f"{reason}; it names no joints, its columns are taken in the order of the URDF", False
         return found, reason, sure and sum(count == max(counts) for count in counts) == 1
+    single = [s.topic for s in arrays if s.values.shape[1] == 1]
+    if len(single) > 1:
+        raise RecordingError(
+            f"nothing in the bag drives the motors on one topic: commands come joint by joint, on {', '.join(single)}; "
+            "put them together into one sensor_msgs/msg/JointState with names and effort, and record that"
+        )
     raise RecordingError(
         "nothing in the bag drives the motors: no effort on a command topic nor with the joint positions that varies "
         f"for {', '.join(moving)}; record the duty cycle, voltage or torque (JointState.effort) beside the positions"
@@ -367,27 +245,31 @@ def _drive(
 
 
 def _driving(
-    signal: Signal, motors: _Named, urdf_joints: tuple[str, ...], moving: tuple[str, ...], wish: Wish
-) -> _Named:
+    signal: Signal, motors: NamedSignal, urdf_joints: tuple[str, ...], moving: tuple[str, ...], wish: Wish
+) -> NamedSignal:
     """What a command calls the joints; one without names has as many columns as the encoder, or as joints move."""
     if signal.names:
-        return _named(signal, urdf_joints, wish)
+        return named_signal(signal, urdf_joints, wish)
     shown = tuple(joint for joint in urdf_joints if joint in motors.names)
     chosen = tuple(joint for joint in urdf_joints if joint in wish.joints)
     fits = next((c for c in (chosen, shown, moving, urdf_joints) if len(c) == signal.values.shape[1]), ())
     if signal.topic == motors.signal.topic and not motors.signal.names:
-        return _Named(signal, motors.names)  # of the same message, in the same order
-    return _Named(signal, {joint: str(place) for place, joint in enumerate(fits)})
+        return NamedSignal(signal, motors.names)  # of the same message, in the same order
+    return NamedSignal(signal, {joint: str(place) for place, joint in enumerate(fits)})
 
 
 def _torque(
-    signals: list[Signal], link_side: list[_Named], urdf_joints: tuple[str, ...], wish: Wish, joints: tuple[str, ...]
+    signals: list[Signal],
+    link_side: list[NamedSignal],
+    urdf_joints: tuple[str, ...],
+    wish: Wish,
+    joints: tuple[str, ...],
 ) -> Chosen | None:
     """Torques that are measured behind the motors."""
     topics = [n.signal.topic for n in link_side]
     for signal in signals:
         if signal.quantity == "effort" and signal.topic in topics:
-            named = _named(signal, urdf_joints, wish)
+            named = named_signal(signal, urdf_joints, wish)
             if all(named.varies(joint) for joint in joints):
                 return named.chosen(joints, "efforts beside the positions of the links", False)
     return None

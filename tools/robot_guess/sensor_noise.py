@@ -9,14 +9,13 @@ lowest order counts that leaves hardly more than the best one, in the quieter st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import comb
-from scipy.stats import chi2
+from scipy.special import comb, gammaincinv
 
 Array = NDArray[np.float64]
 
@@ -49,8 +48,23 @@ def guess_noise(times: Array, values: Array, unit: str) -> NoiseGuess:
         values: samples, shape (n, m).
         unit: for the reason.
     """
-    step = max((_step(column) for column in values.T), default=0.0)
-    rough = max(column_noise(times, values), default=0.0)
+    return max(guess_each(times, values, [unit] * values.shape[1]), key=lambda guess: guess.sigma)
+
+
+def guess_each(times: Array, values: Array, units: Sequence[str]) -> list[NoiseGuess]:
+    """Noise of each channel of a sensor.
+
+    Args:
+        times: shape (n,) [s].
+        values: samples, shape (n, m).
+        units: of the channels, for the reason.
+    """
+    rough = column_noise(times, values)
+    return [_guess(column[:, None], found, unit) for column, found, unit in zip(values.T, rough, units, strict=True)]
+
+
+def _guess(values: Array, rough: float, unit: str) -> NoiseGuess:
+    step = _step(values[:, 0])
     # rounding is not quite white, so it looks somewhat rougher than it is
     if step > 0.0 and rough < ROUNDING * step / np.sqrt(12.0):
         return NoiseGuess(float(step / np.sqrt(12.0)), f"steps of {step:.3g} {unit} over sqrt(12)")
@@ -117,13 +131,14 @@ def _from_order(values: Array, order: int, weight: Array) -> float:
     around = np.stack([values[i : i + len(weight)] for i in range(order + 1)], axis=1)
     rest = np.sum(weight * (around - around[:, :1]), axis=1) ** 2
     width = int(np.clip(len(rest) // STRETCHES, *WINDOW))
-    parts = np.array([part.mean() for part in np.array_split(rest, max(len(rest) // width, 1))])
+    count = max(len(rest) // width, 1)
+    parts = rest[: count * (len(rest) // count)].reshape(count, -1).mean(axis=1)
     parts = parts[parts > 0.0]
     if not len(parts):
         return 0.0
-    freedom = max(len(rest) / len(parts) / _correlated(order), 1.0)
+    freedom = max(len(rest) / count / _correlated(order), 1.0)  # of chi square, in one stretch
     share = QUIET if len(parts) > 1 else 0.5
-    return float(np.sqrt(np.quantile(parts, share) * freedom / chi2.ppf(share, freedom)))
+    return float(np.sqrt(np.quantile(parts, share) * freedom / (2.0 * gammaincinv(freedom / 2.0, share))))
 
 
 def _weights(times: Array, order: int) -> Array:

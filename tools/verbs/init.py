@@ -11,7 +11,7 @@ from jointscope.tools.progress import progress_bar, reading
 from jointscope.tools.whole_file import check_outputs, whole_file, write_json
 
 if TYPE_CHECKING:
-    from jointscope.tools.robot_guess.roles import Wish
+    from jointscope.tools.robot_guess.named_signal import Wish
 
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
@@ -55,9 +55,10 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
     from jointscope.tools.robot_guess.drive_table import drive_content, drive_table
+    from jointscope.tools.robot_guess.held_text import locked_line
     from jointscope.tools.robot_guess.other_joints import Typed
     from jointscope.tools.robot_guess.robot_guess import guess_robot
-    from jointscope.tools.robot_guess.robot_text import guesses, locked_line, robot_text
+    from jointscope.tools.robot_guess.robot_text import guesses, robot_text
 
     typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name)
     with progress_bar() as progress:
@@ -80,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     held = {h.joint for h in guess.held}
     print("\n".join(f"  {line}" for line in guesses(text) if line.partition(":")[0].strip("'") not in held))
     print("\n".join(drive_table(guess)))
-    lines = [*([locked_line(guess)] if held else []), *guess.following]
+    lines = [*([locked_line(guess.held)] if held else []), *guess.following]
     lines += [f"not used: {text}" for text in guess.left_out]
     print("\n".join([*(f"  {line}" for line in lines), *(f"note: {n}" for n in description.notices)]))
     verdict = "can" if description.usable else "cannot"
@@ -92,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _wish(joints: str, locked: str) -> Wish:
     """What the options say about joints."""
-    from jointscope.tools.robot_guess.roles import Wish
+    from jointscope.tools.robot_guess.named_signal import Wish
 
     given = [part.strip().partition("=") for part in joints.split(",") if part.strip()]
     return Wish(
