@@ -16,6 +16,7 @@ LOWEST, HIGHEST = 0.15, 2.0  # [Hz]
 TURN, SLIDE = (0.7, 1.3), (0.1, 0.25)  # widths of the motion [rad], [m]
 SHARE = 0.6  # of the range between the limits
 SPEED_SHARE = 0.9  # of the limit of the velocity
+PLACEHOLDER = 0.01  # of the speed of the motion
 RAMP = 0.6  # [s] until the motion has its full size
 STEP = 1e-4  # [s] of the differences that give velocity and acceleration
 
@@ -60,9 +61,9 @@ def make_motion(joints: Sequence[UrdfJoint], centre: Array, rng: np.random.Gener
         low, high = SLIDE if joint.kind == "prismatic" else TURN
         width = min(rng.uniform(low, high), SHARE * (joint.upper - joint.lower))
         sizes[k] = width / np.ptp(away[:, k])
-        # limits that would leave next to nothing of the motion are placeholders
-        if speeds[k] * sizes[k] > SPEED_SHARE * joint.speed > 0.2 * speeds[k] * sizes[k]:
-            sizes[k] = SPEED_SHARE * joint.speed / speeds[k]
+        # limits that would leave nothing of the motion are placeholders
+        if joint.speed > PLACEHOLDER * speeds[k] * sizes[k]:
+            sizes[k] = min(sizes[k], SPEED_SHARE * joint.speed / speeds[k])
         margin = 0.02 * (joint.upper - joint.lower) if np.isfinite(joint.upper) else 0.0
         room = (joint.upper - centre[k] - margin, centre[k] - joint.lower - margin)
         for reach, free in zip((away[:, k].max(), -away[:, k].min()), room, strict=True):

@@ -79,8 +79,7 @@ def _named(seed: int) -> Iterator[Named]:
     except JointscopeError as err:
         yield Named(f"calibration, seed {seed}", "calibrate", str(err))
         return
-    said = [*calibration.findings, *(moment.sentence(made["calibration"]) for moment in calibration.isolated)]
-    for text in dict.fromkeys(said):
+    for text in calibration.findings:
         if ACCUSING.search(text):
             yield Named(f"calibration, seed {seed}", "calibrate", text)
     for moment in compare_model("calibrated", calibration.robot, made["moves"]).isolated:
