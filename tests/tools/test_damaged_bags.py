@@ -43,6 +43,22 @@ def refused(path, robot):
     return text
 
 
+@pytest.mark.parametrize("name", ["x" * 5000 + ".mcap", "loop.mcap"])
+def test_a_path_that_cannot_be_opened_is_one_line(doggy, tmp_path, name):
+    (tmp_path / "loop.mcap").symlink_to(tmp_path / "loop.mcap")
+    with pytest.raises(RecordingError) as error:
+        read_recording(tmp_path / name, doggy)
+    assert "\n" not in str(error.value) and len(str(error.value)) < 400
+
+
+def test_a_definition_that_lacks_a_type_is_damaged(doggy, sound, tmp_path):
+    content = (sound / "run.bag").read_bytes()
+    broken = content.replace(b"MSG: std_msgs/Header", b"MSG: std_msgs/Hxader")
+    assert broken != content
+    (tmp_path / "run.bag").write_bytes(broken)
+    assert "is damaged: 'std_msgs/msg/Header'" in refused(tmp_path / "run.bag", doggy)
+
+
 @pytest.mark.parametrize("name", (*BARE, "run"))
 def test_a_missing_bag_is_said_to_be_missing(doggy, tmp_path, name):
     path = tmp_path / name

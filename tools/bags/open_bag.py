@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.tools.bags.message_type import MessageType, defined_message_type
+from jointscope.tools.bags.message_type import MessageType, defined_message_type, inner_type
 
 Progress = Callable[[int, int], None]
 
@@ -83,7 +83,9 @@ class Bag:
         """
         connection = self._infos[topic].connections[0]
         try:
-            return defined_message_type(connection.msgtype, connection.msgdef, self.ros2)
+            found = defined_message_type(connection.msgtype, connection.msgdef, self.ros2)
+            _look_up(found, found.name, set())
+            return found
         except RecordingError as err:
             raise RecordingError(f"{self.path}, topic {topic}: {err}") from err
         except Exception as err:  # the parser of definitions leaks errors of many kinds
@@ -198,9 +200,22 @@ def one_line(err: BaseException) -> str:
     return (text if len(text) <= 160 else text[:157] + "...").rstrip(".")
 
 
+def _look_up(message_type: MessageType, name: str, seen: set[str]) -> None:
+    """Looks up all types inside one; a damaged definition lacks some."""
+    seen.add(name)
+    for _, kind in message_type.fields_of(name):
+        inside = inner_type(kind)
+        if inside is not None and inside not in seen:
+            _look_up(message_type, inside, seen)
+
+
 def _storage(path: Path) -> Path:
     """What to open: the path itself, or the only storage file of a folder without metadata."""
-    if not path.exists():
+    try:
+        is_there = path.exists()
+    except OSError as err:  # a name that no file can have, a folder that must not be entered
+        raise RecordingError(f"cannot read the bag {str(path)[:160]}: {err.strerror or one_line(err)}") from err
+    if not is_there:
         raise RecordingError(f"the bag {path} does not exist; expected a .bag, a .mcap, a .db3 or a ROS 2 bag folder")
     if not path.is_dir() or (path / "metadata.yaml").exists():
         return path

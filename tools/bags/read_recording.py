@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +13,23 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Notice, Recording, Stream
 from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import LinkEncoder, MotorEncoder, Topic
+from jointscope.robots.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.units import joined
 from jointscope.robots.wrapped_counter import continued
-from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.clock_steps import on_one_clock
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.durations import counted
-from jointscope.tools.bags.field_path import field_path
 from jointscope.tools.bags.fitting_messages import fitting_messages
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.message_parts import message_parts
 from jointscope.tools.bags.message_type import MessageType
+from jointscope.tools.bags.needed_streams import StreamSource as StreamSource
+from jointscope.tools.bags.needed_streams import check_topic as check_topic
+from jointscope.tools.bags.needed_streams import column_order as column_order
+from jointscope.tools.bags.needed_streams import full_type_name as full_type_name
+from jointscope.tools.bags.needed_streams import in_si as in_si
+from jointscope.tools.bags.needed_streams import needed_streams as needed_streams
+from jointscope.tools.bags.needed_streams import wanted_of as wanted_of
 from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.own_stamps import at_message_stamps
@@ -36,27 +41,6 @@ from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
 from jointscope.tools.bags.unstamped import sent_earlier
-
-
-@dataclass(frozen=True)
-class StreamSource:
-    """A stream that a robot needs.
-
-    Attributes:
-        name: "command" or the sensor's name.
-        source: where it is in the bag.
-        channels: name of each column.
-    """
-
-    name: str
-    source: Topic
-    channels: tuple[str, ...]
-
-
-def needed_streams(robot: Robot) -> list[StreamSource]:
-    """All streams a robot needs, the command first."""
-    command = StreamSource("command", robot.command, tuple(f"{joint}.command" for joint in robot.joints))
-    return [command, *(StreamSource(s.name, s.source, s.channels) for s in robot.sensors.values())]
 
 
 def read_recording(
@@ -131,13 +115,6 @@ def _encoders(robot: Robot) -> list[str]:
     return [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder | LinkEncoder)]
 
 
-def wanted_of(need: StreamSource) -> tuple[tuple[str, ...], int | None]:
-    """Names that a message must have, and number of values of one without names."""
-    names = need.source.names
-    by_place = bool(names) and all(name.isdecimal() for name in names)
-    return ((), None) if by_place else (names, len(need.channels))
-
-
 def _in_bag_order(
     needed: Sequence[StreamSource],
     raw: Mapping[str, RawTopic],
@@ -201,48 +178,6 @@ def _goal(
     return (need, samples), notices + found
 
 
-def check_topic(bag: Bag, source: Topic) -> MessageType:
-    """Checks that a bag has a topic with messages of the right type, and the field in it.
-
-    Raises:
-        RecordingError: it does not; the message says what is there instead.
-    """
-    place = f"{bag.path}: topic {source.topic}"
-    if source.topic not in bag.topics:
-        hint = did_you_mean(source.topic, bag.topics)
-        raise RecordingError(f"{place} is missing; record it, or change `topic` in the robot file{hint}")
-    types = bag.type_names(source.topic)
-    if types != (full_type_name(source.msgtype),):
-        raise RecordingError(
-            f"{place} holds {' and '.join(types)}; the robot file expects {full_type_name(source.msgtype)}"
-        )
-    if bag.count(source.topic) == 0:
-        raise RecordingError(f"{place} is empty: it holds no message; check that its driver ran while recording")
-    message_type = bag.message_type(source.topic)
-    field_path(message_type, source.field, source.topic)
-    return message_type
-
-
-def full_type_name(name: str) -> str:
-    """The ROS 2 spelling of a message type: "sensor_msgs/Imu" is "sensor_msgs/msg/Imu"."""
-    package, _, rest = name.partition("/")
-    return name if "/" in rest else f"{package}/msg/{rest}"
-
-
-def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-    """Samples in SI units, counters continued, each joint with its own factor.
-
-    Args:
-        source: where they come from.
-        values: as they stand in the bag, shape (n, m).
-        before: what the last sample before them became, shape (m,); None for the first ones.
-    """
-    factor = source.factor
-    if not source.wraps:
-        return values * factor
-    return continued(values, source.wraps, None if before is None else before / factor) * factor
-
-
 def read_columns(
     topic: RawTopic,
     message_type: MessageType,
@@ -299,55 +234,6 @@ def left_out_notices(name: str, columns: Columns) -> list[Notice]:
         return []
     said = ", ".join(f"{counted(part.count, 'message')} {part.what}" for part in columns.left_out)
     return [Notice(name, "foreign", sum(part.count for part in columns.left_out), f"{name}: left out {said}")]
-
-
-def column_order(
-    need: StreamSource, columns: Columns, known: Container[str] = ()
-) -> tuple[NDArray[np.intp], list[Notice]]:
-    """Which column of the message belongs to which channel; joints that are `known` otherwise are not ignored."""
-    place = f"topic {need.source.topic}, field {need.source.field!r}"
-    width, wanted = columns.values.shape[1], need.source.names
-    names = columns.names or ()
-    if wanted and not names and all(name.isdecimal() for name in wanted):
-        return _by_place(need, width), []
-    if not wanted or not names:
-        if width != len(need.channels):
-            raise RecordingError(
-                f"{place}: {need.name} expects {len(need.channels)} values ({', '.join(need.channels)}), got {width}"
-            )
-        text = f"{need.name}: the messages name no joints; the order of the robot file is assumed"
-        unchecked = wanted and not names and width > 1
-        return np.arange(width), [Notice(need.name, "info", 0, text)] if unchecked else []
-    if width != len(names):
-        raise RecordingError(f"{place}: {width} values for {len(names)} joint names ({', '.join(names)})")
-    missing = [name for name in wanted if name not in names]
-    if missing:
-        raise RecordingError(
-            f"{place}: no joint {missing[0]!r} in the messages, which name {', '.join(names)}; "
-            f"set `names` of {need.name} in the robot file"
-        )
-    _refuse_repeated(names, place)
-    extra = [name for name in names if name not in wanted and name not in known]
-    text = f"{need.name}: joints of the bag that the robot does not have are ignored: {', '.join(extra)}"
-    notices = [Notice(need.name, "info", len(extra), text)] if extra else []
-    return np.array([names.index(name) for name in wanted]), notices
-
-
-def _by_place(need: StreamSource, width: int) -> NDArray[np.intp]:
-    """Columns of messages without names, where the robot file counts their places from 0."""
-    order = np.array([int(name) for name in need.source.names])
-    if order.max() >= width:
-        raise RecordingError(
-            f"topic {need.source.topic}, field {need.source.field!r}: {width} values, `names` of {need.name} asks for "
-            f"place {order.max()}; expected 0 to {width - 1}"
-        )
-    return order
-
-
-def _refuse_repeated(names: Sequence[str], place: str) -> None:
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise RecordingError(f"{place}: the joint name {repeated[0]!r} stands {names.count(repeated[0])} times")
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:
