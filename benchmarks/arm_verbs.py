@@ -13,11 +13,13 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 MEMORY = 6 * 2**30  # [B] a process may have; a mistake shall not stop the machine
 FOLLOWED = 3  # refusals in a row whose advice is taken
-QUICK_LIMIT = 300.0  # [s] for a verb that only looks
+QUICK_LIMIT = 300.0  # [s] of computing, for a verb that only looks
+PATIENCE = 10.0  # times a limit, on the wall: a busy machine takes no row out of the table
 ROBOT, RESULT, JSON = "robot.yaml", "calibrated.yaml", "calibration.json"
 COMMAND = re.compile(r"jointscope (?:init|info|calibrate|add|remove)(?: [^`\n;)]*[^`\n;),.: ])?")
 PLACEHOLDER = re.compile(r"(?:^|\s)(?:\.\.\.|…|[A-Z]{3,}[A-Z.a-z]*)(?=\s|$)")
@@ -92,7 +94,7 @@ def first_contact(folder: Path, urdf: str, bag: str, limit: float) -> Session:
         folder: where the commands run; it is left as they leave it.
         urdf: path of the URDF as it is typed.
         bag: path of the recording as it is typed.
-        limit: of the calibration [s].
+        limit: of the calibration [s of computing].
     """
     session = Session()
     waiting = [f"init {urdf} {bag} -o {ROBOT}"]
@@ -119,14 +121,14 @@ def run_verb(arguments: Sequence[str], folder: Path, limit: float) -> Typed:
     environment = {**os.environ, **dict.fromkeys(THREADS, "1")}
     with out.open("wb") as stdout, err.open("wb") as stderr:
         process = subprocess.Popen(
-            command, cwd=folder, env=environment, stdout=stdout, stderr=stderr, preexec_fn=_limited, text=True
+            command, cwd=folder, env=environment, stdout=stdout, stderr=stderr, preexec_fn=partial(_limited, limit)
         )
-        ended, status, used = _wait(process.pid, limit)
+        ended, status, used = _wait(process.pid, PATIENCE * limit)
         process.returncode = os.waitstatus_to_exitcode(status)
     texts = [path.read_text(encoding="utf-8", errors="replace") for path in (out, err)]
     out.unlink()
     err.unlink()
-    code = process.returncode if ended else 124
+    code = process.returncode if ended and process.returncode != -signal.SIGXCPU else 124
     return Typed(shlex.join(arguments), code, *texts, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
 
 
@@ -158,5 +160,7 @@ def _wait(pid: int, limit: float) -> tuple[bool, int, resource.struct_rusage]:
     return False, status, used
 
 
-def _limited() -> None:
+def _limited(seconds: float) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    whole = max(1, round(seconds))
+    resource.setrlimit(resource.RLIMIT_CPU, (whole, whole + 5))

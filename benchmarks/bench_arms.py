@@ -32,7 +32,7 @@ from patience import say
 
 import jointscope.graphs
 
-LIMIT = 900.0  # [s] of a calibration
+LIMIT = 900.0  # [s] of computing, of a calibration
 
 
 def main() -> None:
@@ -137,7 +137,11 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--only", default="*", metavar="NAME", help="only robots whose name matches, as 'ur*'")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes, each on one core; 2 by default")
     parser.add_argument(
-        "--limit", type=float, default=LIMIT, metavar="S", help=f"time for a calibration [s]; {LIMIT:g} by default"
+        "--limit",
+        type=float,
+        default=LIMIT,
+        metavar="S",
+        help=f"computing time for a calibration [s]; {LIMIT:g} by default",
     )
     temporary = Path(tempfile.gettempdir())
     folder = temporary / f"jointscope-bench-arms-{simulation()}"
