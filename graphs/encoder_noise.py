@@ -33,6 +33,7 @@ FOURTH_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 ALIKE = 0.15  # relative difference of what both say about white noise
 TOO_SMALL = 1.5  # times the sigma, noise that the samples show by themselves
+ALTERNATING, FAR = -0.6, 4.0  # correlation of neighbouring differences, and [sigma] beyond which none counts more
 TYPICAL = 1.4826  # standard deviation of normal numbers over the median of their sizes
 
 
@@ -59,7 +60,10 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
     lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
     highest = np.max([_roughness(fit.stream.values) for fit in fits], axis=0)
     for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
-        if all(_is_white(fit.series.measured[:, j] - fit.series.predicted[:, j]) for fit in fits):
+        # a smaller sigma hides nothing, whatever colour is left
+        if chi2[j] < AGREES[0] or all(
+            _is_white(fit.series.measured[:, j] - fit.series.predicted[:, j]) for fit in fits
+        ):
             wanted = float(sigmas[j] * np.sqrt(chi2[j]))
             bounded = max(wanted, lowest[j]) if wanted < sigmas[j] else min(wanted, highest[j])
             # a bound may lie beyond what is there already
@@ -71,7 +75,8 @@ def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     """The robot with sigmas that are not far below what every look at the samples shows.
 
     With a sigma that is too small the states follow the noise, which process noise then seems to explain. Differences
-    of fourth and of sixth order see the same noise where it is white, and different parts of a motion.
+    of fourth and of sixth order see the same noise where it is white, and different parts of a motion; and those of
+    white noise change their sign from one to the next, those of a motion do not.
     """
     changed = {}
     for encoder in (robot.motor_encoder, robot.link_encoder):
@@ -91,8 +96,16 @@ def _visible_noise(values: Array) -> Array:
     for column in values.T:
         parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
         fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
-        found.append(sixth if abs(fourth - sixth) < ALIKE * sixth else 0.0)
+        alike = abs(fourth - sixth) < ALIKE * sixth and all(map(_alternates, parts))
+        found.append(sixth if alike else 0.0)
     return np.array(found)
+
+
+def _alternates(differences: Array) -> bool:
+    """Whether differences of order n are those of white noise, correlated by -n / (n + 1) from one to the next."""
+    typical = TYPICAL * float(np.median(np.abs(differences)))
+    part = np.clip(differences, -FAR * typical, FAR * typical)
+    return float(part[:-1] @ part[1:]) < ALTERNATING * float(part @ part)
 
 
 def _rounding(stream: Stream, sigmas: Array) -> Array:
