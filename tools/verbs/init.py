@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
   jointscope info moves.mcap --robot arm.yaml
+  jointscope calibrate arm.yaml moves.mcap -o arm_calibrated.yaml
   jointscope discover arm.yaml moves.mcap --holdout-share 0.33 -o better.yaml
 
 The recording should move every joint, several at once. Guessed are joints, topics, units, signs, on which link a
@@ -83,11 +84,14 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(drive_table(guess)))
     lines = [*([locked_line(guess.held)] if held else []), *guess.following]
     lines += [f"not used: {text}" for text in guess.left_out]
-    print("\n".join([*(f"  {line}" for line in lines), *(f"note: {n}" for n in description.notices)]))
+    for line in (*(f"  {line}" for line in lines), *(f"note: {notice}" for notice in description.notices)):
+        print(line)
     verdict = "can" if description.usable else "cannot"
     reason = "" if description.usable else f": {description.problem}"
     print(f"\nWrote {args.output}; the recording {verdict} be used with it{reason}")
-    print(f"Check the lines marked GUESS, then: jointscope discover {args.output} {args.bag} --holdout-share 0.33")
+    calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
+    print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
+    print("`jointscope discover` with --holdout-share 0.33 and the same arguments finds what the model lacks.")
     return 0
 
 
