@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -32,8 +33,18 @@ def test_sentences_about_pushes_accuse_and_those_about_numbers_do_not():
     assert not ACCUSING.search("6 parameters from 500 samples: typically +-10 %, worst elbow.inertia with +-17 %")
 
 
-def test_short_recordings_go_through_the_whole_check(monkeypatch):
-    monkeypatch.setattr(perfect_recordings, "SECONDS", {"calibration": 4.0, "moves": 2.0})
+class Moment:
+    def sentence(self, recording):
+        return f"a push in {recording.path}"
+
+
+def test_what_calibrate_and_compare_name_is_counted_and_shown(monkeypatch):
+    calibration = SimpleNamespace(findings=("all is explained", "a collision at 3 s"), robot=None)
+    monkeypatch.setattr(perfect_recordings, "SECONDS", {"calibration": 1.5, "moves": 1.5})
+    monkeypatch.setattr(perfect_recordings, "accusations", lambda robot, recording: [])
+    monkeypatch.setattr(perfect_recordings, "calibrate", lambda robot, recordings: calibration)
+    monkeypatch.setattr(perfect_recordings, "compare_model", lambda *_: SimpleNamespace(isolated=(Moment(),)))
     section = perfect_recordings.run(quick=True)
     (promise,) = section.targets
-    assert promise.measured == str(len(section.numbers["named"]))
+    assert (promise.measured, promise.met) == ("2", False)
+    assert [row[1] for row in section.tables[0].rows] == ["calibrate", "compare"]
