@@ -34,6 +34,7 @@ from jointscope.graphs.noise_floor import SETTLING, channel_floors
 from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.starts.drive_signal import with_known_drive_signal
 from jointscope.graphs.whole_stage import approach
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.recording import Recording, Stream
@@ -124,6 +125,7 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     the paper. A robot that was never calibrated gets process noise from the recording.
     """
     check_recordings(robot, [recording], every_joint=False)
+    robot = with_known_drive_signal(robot, [recording])
     robot = robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})
     sigmas = [parameter.sigma for parameter in robot.parameters.values()]
     calibrated = "calibration" in robot.document or any(sigma is not None for sigma in sigmas)

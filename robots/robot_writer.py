@@ -29,6 +29,8 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     document = copy.deepcopy(robot.document)
     document["urdf"] = urdf_reference(robot.tree.urdf, folder)
     _write_locked(document, (robot.as_filed or robot.tree).locked)
+    if robot.command.held is not None:
+        document["command"]["held"] = robot.command.held
     for name, parameter in robot.parameters.items():
         if parameter.fixed:
             continue

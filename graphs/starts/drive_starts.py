@@ -59,7 +59,7 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
         stream = recording.streams[encoder.name]
         positions = replace(stream, values=stream.values - encoder.zero)
         driven.append(Driven(positions, recording.command, recording.left_out))
-    held = bool(getattr(robot.command, "held", True))
+    held = bool(robot.command_held)
     sharpness = robot.choices.friction_sharpness
     equations = drive_equations(robot.tree, driven, np.asarray(encoder.sigmas), held=held, sharpness=sharpness)
     found: dict[str, list[Value]] = {}

@@ -66,7 +66,8 @@ MISTAKES = [
     ("form: full", "form: relative\n    reference: imu1",
      "my.yaml: sensors.imu1.reference: expected another gyro (imu2), got 'imu1'"),
     (R1, "value: [[1, 0, 0], [0, 0, -1], [0, -1, 0]]",
-     "my.yaml: sensors.imu1.R_imu_body: not a rotation matrix (determinant -1.000); expected R R^T = 1"),
+     "my.yaml: sensors.imu1.R_imu_body: not a rotation matrix (determinant -1.000); expected R R^T = 1; axes that are "
+     "left-handed: negate the first row and set `left_handed: true`"),
     (R1, "value: [[-2, 0, 0], [0, 0, -1], [0, -1, 0]]",
      "my.yaml: sensors.imu1.R_imu_body: not a rotation matrix (determinant 2.000); expected R R^T = 1"),
     (R1, "value: [-1, 0, 0]", "my.yaml: sensors.imu1.R_imu_body.value: expected 3 x 3 finite numbers, got [-1, 0, 0]"),

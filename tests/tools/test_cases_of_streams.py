@@ -64,7 +64,9 @@ def test_one_odd_message_costs_no_other(doggy, clean, name, lost, said):
         assert len(values) == len(clean) - 1 and {*map(tuple, values)} <= {*map(tuple, clean.values)}
     else:
         assert values.tobytes() == np.delete(clean.values, lost, axis=0).tobytes()
-    assert describe_bag(CASES / f"{name}.mcap", doggy).usable
+    problem = describe_bag(CASES / f"{name}.mcap", doggy).problem
+    # nothing of the streams stands in the way; a recording of a second in which a joint rests is short of motion
+    assert problem is None or "joint3 does not move" in problem or "joint3 never moves" in problem, problem
 
 
 def test_glitch_and_second_publisher_leave_the_same_motion(doggy):

@@ -77,12 +77,14 @@ class Drives:
         joints: one drive for each joint.
         gravity: in the base frame, shape (3,) [m/s^2].
         gravity_reason: why it is not the usual one; empty where it is.
+        held: whether each value of the command acts until the next one; else it was measured.
     """
 
     unit: tuple[str, str]
     joints: list[DriveValues]
     gravity: Array
     gravity_reason: str = ""
+    held: bool = True
 
 
 def find_drives(
@@ -129,7 +131,7 @@ def find_drives(
         _drive(equation, known, direction, link, joint in elastic)
         for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
     ]
-    return Drives(unit, drives, tree.gravity, reason)
+    return Drives(unit, drives, tree.gravity, reason, held)
 
 
 def _needs_more_than_newton_metres(equation: DriveEquation, sign: float, link: float) -> bool:

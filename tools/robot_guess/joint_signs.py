@@ -41,27 +41,30 @@ class SignGuess:
     mirrored: bool = True
 
 
-def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Callable[[], Sequence[float]]) -> SignGuess:
+def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Callable[[Signs], Sequence[float]]) -> SignGuess:
     """Signs of the joints by gyroscopes and drives.
 
-    A joint that counts backwards also seems to move against its command; a gyroscope whose frame is left-handed looks
-    as if an odd number of joints counted backwards, while all move with their commands.
+    Among the patterns with which the gyroscopes agree, the one under which all joints move with their commands is
+    right: the equations of motion hold for the mirrored robots, too, but some of their motors turn backwards. A
+    gyroscope whose frame is left-handed looks as if an odd number of joints counted backwards, while all move with
+    their commands.
 
     Args:
         tree: the robot.
         gyros: what they and the encoders saw.
-        drives: finds -1 for each joint that moves against its command, as the encoders count, else 1.
+        drives: finds -1 for each joint that moves against its command, else 1, if the encoders count with some signs.
     """
     found = joint_signs(tree, gyros)
     if all(sign > 0 for sign in found.signs):
         return found
-    by_command = tuple(float(sign) for sign in drives())
-    if by_command in (found.signs, *found.others):
-        return SignGuess(by_command, (), mirrored=False)
+    forward = [signs for signs in (found.signs, *found.others) if min(drives(signs)) > 0]
+    if len(forward) == 1:
+        return SignGuess(forward[0], (), mirrored=False)
     mounts = [find_mount(tree, gyro, mirrored=True) for gyro in gyros]
     left = float(np.mean([1.0 if mount is None else mount.left for mount in mounts]))
-    if min(by_command) > 0 and left < joint_left(tree, gyros, found.signs) + ALIKE:
-        return SignGuess((1.0,) * tree.n, (found.signs, *found.others), mirrored=True)
+    straight = (1.0,) * tree.n
+    if not forward and min(drives(straight)) > 0 and left < joint_left(tree, gyros, found.signs) + ALIKE:
+        return SignGuess(straight, (found.signs, *found.others), mirrored=True)
     return replace(found, mirrored=False)
 
 

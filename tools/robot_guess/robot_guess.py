@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.starts.drive_regression import Driven
+from jointscope.graphs.starts.drive_signal import acts_until_the_next
 from jointscope.robots.joint_motion import joint_motion
 from jointscope.robots.recording import Stream
 from jointscope.robots.rigid_tree import RigidTree
@@ -66,6 +68,7 @@ class RobotGuess:
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
+        held_command: whether each value of the command acts until the next one; else it was measured.
     """
 
     name: str
@@ -89,6 +92,7 @@ class RobotGuess:
     following: tuple[str, ...] = ()
     gravity: tuple[float, ...] = GRAVITY
     gravity_reason: str = ""
+    held_command: bool = True
 
     @property
     def free_links(self) -> bool:
@@ -119,7 +123,12 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
 
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = robot.encoder, robot.links or robot.encoder
-    signs = encoder_signs(tree, seen_rates(seen, robot.gyros), lambda: [d.sign for d in drives(encoder).joints])
+
+    def motors(signs: tuple[float, ...]) -> list[float]:
+        turned = replace(encoder, values=encoder.values * np.array(signs))
+        return [drive.sign for drive in drives(turned, roles.joints).joints]
+
+    signs = encoder_signs(tree, seen_rates(seen, robot.gyros), motors)
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     elastic = _seen(tree, gyros) if masses else ()
@@ -137,6 +146,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         drives=drive.joints,
         gravity=tuple(drive.gravity.tolist()),
         gravity_reason=drive.gravity_reason,
+        held_command=drive.held,
         encoder_noise=noises,
         link_noise=None if roles.link_encoder is None else robot.noise(roles.link_encoder),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
@@ -164,8 +174,9 @@ def _drives(
     command = role_stream(roles.command, roles.joints)
     if not robot.masses:
         return find_signs(encoder, command, sigmas, torque, tree.gravity)
+    told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
-    return find_drives(tree, encoder, command, sigmas, held=not measured, elastic=elastic)
+    return find_drives(tree, encoder, command, sigmas, held=not measured if told is None else told, elastic=elastic)
 
 
 def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:

@@ -128,7 +128,7 @@ def _wraps(chosen: Chosen) -> list[str]:
 def _stamps(chosen: Chosen, guess: RobotGuess) -> list[str]:
     """Whose stamps the samples have, where the messages are one for one with those of the gyroscopes."""
     gyros = [gyro for gyro in guess.gyros if gyro.name in guess.stamped_by]
-    if not gyros or any(len(gyro.signal.times) != len(chosen.signal.times) for gyro in gyros):
+    if not gyros or any(len(gyro.signal.as_sent.times) != len(chosen.signal.as_sent.times) for gyro in gyros):
         return []
     reason = "positions are smoother at the stamps of these gyroscopes than at those of their messages"
     return [_line(f"stamped_by: {_list(guess.stamped_by)}", reason, False, 4)]
@@ -158,10 +158,14 @@ def _command(guess: RobotGuess) -> list[str]:
 
 
 def _measured(guess: RobotGuess) -> list[str]:
-    """A drive signal beside the positions was measured with them."""
-    if guess.roles.command.signal.topic != guess.roles.motor_encoder.signal.topic:
+    """Whether the drive signal is held, where its place, or the motion against its place, makes that a question."""
+    beside = guess.roles.command.signal.topic == guess.roles.motor_encoder.signal.topic
+    if not beside and guess.held_command:
         return []
-    return [_line("held: false", "measured beside the positions; true: a command that acts until the next", False, 2)]
+    if guess.held_command:
+        return [_line("held: true", "the motion says so, although it stands beside the positions", False, 2)]
+    where = "measured beside the positions" if beside else "the motion says that it was measured"
+    return [_line("held: false", f"{where}; true: a command that acts until the next one", False, 2)]
 
 
 def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:

@@ -31,6 +31,7 @@ def guess_sample_times(positions: Signal, names: Sequence[str], gyros: Mapping[s
         names: of the joints in the messages.
         gyros: gyroscopes by name.
     """
+    positions, gyros = positions.as_sent, {name: gyro.as_sent for name, gyro in gyros.items()}
     alike = {name: gyro for name, gyro in gyros.items() if len(gyro.times) == len(positions.times)}
     found = tuple(_stamps_of(positions.times, column, alike) for column in positions.columns(tuple(names)).T)
     return found if any(name != BY_MESSAGE for name in found) else ()

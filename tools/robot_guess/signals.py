@@ -40,6 +40,7 @@ class Signal:
         values: shape (n, m), in the unit of the bag.
         stamped: whether the messages carry a stamp.
         quantity: what its field says it is: "position", "effort", "rate" or "numbers".
+        sent: the same with all messages, where some were left out; streams are compared one for one by it.
     """
 
     topic: str
@@ -50,6 +51,12 @@ class Signal:
     values: Array
     stamped: bool
     quantity: str = ""
+    sent: Signal | None = None
+
+    @property
+    def as_sent(self) -> Signal:
+        """With all messages."""
+        return self.sent or self
 
     @property
     def timing(self) -> Timing:
@@ -124,11 +131,16 @@ def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) 
         return None
     received = columns.of(raw.received_ns)
     stamps = received if columns.stamps is None else columns.stamps
-    samples = TimedSamples(stamps, received, columns.values)
+    stamped = columns.stamps is not None
+    everything = TimedSamples(stamps, received, columns.values)
+
+    def signal(samples: TimedSamples, sent: Signal | None = None) -> Signal:
+        times = (samples.stamps - start_ns) / 1e9
+        return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity, sent)
+
     try:
-        samples = tidy_samples(raw.name, samples, columns.stamps is not None, sensor=known.quantity in MEASURED)
+        samples = tidy_samples(raw.name, everything, stamped, sensor=known.quantity in MEASURED)
+        plain = tidy_samples(raw.name, everything, stamped, sensor=False)
     except RecordingError:  # what nobody can tell the time of is no use; a robot file may still need other topics
         return None
-    times = (samples.stamps - start_ns) / 1e9
-    stamped = columns.stamps is not None
-    return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity)
+    return signal(samples, signal(plain) if len(plain) > len(samples) else None)
