@@ -167,7 +167,9 @@ def test_an_impossible_inertia_is_one_line(capsys):
     Path("doggy.urdf").write_text(urdf)
     Path("my.yaml").write_text((folder / "doggy.yaml").read_text())
     text = complaint(capsys, "calibrate", "my.yaml", "a.mcap", "-o", "out.yaml")
-    assert text.startswith("doggy.urdf: link link1, moved by joint1, has a negative inertia: principal moments -2, 2, 2 ")
+    assert text.startswith(
+        "doggy.urdf: link link1, moved by joint1, has a negative inertia: principal moments -2, 2, 2 "
+    )
     assert "the mass matrix is not positive definite, so joint1 has no equation of motion" in text
 
 
