@@ -193,8 +193,9 @@ def equation_names(result: CalibrationResult) -> list[str]:
 
 
 def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
-    """The dynamic parameter with the largest sigma relative to its value, and that share."""
-    shares = {p.name: p.sigma / abs(p.value) for p in result.parameters if not is_mounting_or_bias(p) and p.value}
+    """The dynamic parameter with the largest sigma relative to its value, and that share; times have none."""
+    told = [p for p in result.parameters if p.value and p.unit != "s" and not is_mounting_or_bias(p)]
+    shares = {p.name: p.sigma / abs(p.value) for p in told}
     if not shares:
         return "", float("nan")
     worst = max(shares, key=lambda name: shares[name])

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from jointscope.robots.units import joined, si_factor, si_unit
-from jointscope.tools.robot_guess.drive_text import effect_lines, parameter_lines
+from jointscope.tools.robot_guess.drive_text import effect_lines, is_measured, parameter_lines
 from jointscope.tools.robot_guess.gyro_text import gyro_lines
 from jointscope.tools.robot_guess.held_text import held_lines
 from jointscope.tools.robot_guess.joint_signs import SignGuess
@@ -159,7 +159,7 @@ def _command(guess: RobotGuess) -> list[str]:
 
 def _measured(guess: RobotGuess) -> list[str]:
     """A drive signal beside the positions was measured with them."""
-    if guess.roles.command.signal.topic != guess.roles.motor_encoder.signal.topic:
+    if not is_measured(guess):
         return []
     return [_line("held: false", "measured beside the positions; true: a command that acts until the next", False, 2)]
 
