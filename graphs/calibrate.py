@@ -19,6 +19,7 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Progress, solve
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.graphs.calibration_summary import summarize
+from jointscope.graphs.drive_timing import drive_timing
 from jointscope.graphs.encoder_noise import with_visible_noise
 from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
@@ -105,7 +106,11 @@ def _calibrated(
     solved = stage.solve(problems, noise, calibrations)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
-    return summarize(robot, solved, tuple(history.records), notices, hold)
+    result = summarize(robot, solved, tuple(history.records), notices, hold)
+    if near is not None or biases_only:
+        return result
+    estimate = solved.solution.estimate
+    return replace(result, timing=drive_timing(solved.problems, estimate.states, estimate.calibrations))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

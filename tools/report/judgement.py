@@ -25,6 +25,8 @@ UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open af
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
+EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
+MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -55,6 +57,7 @@ def judge(result: CalibrationResult) -> Judgement:
         _determined(result),
         _held(result),
         _honest_sigmas(result),
+        _same_time(result),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
@@ -184,6 +187,31 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
         f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
         f"would ({worst}); the sigmas shown include it.",
     )
+
+
+def _same_time(result: CalibrationResult) -> Check:
+    """A delay of a fraction of a millisecond is friction that is not there, and no residual shows it."""
+    name, timing = "Drive signal and sensors at the same time", result.timing
+    if timing is None:
+        return Check("info", name, "The model has times of its own, or this was not looked at.")
+    size = f"({significant(1e3 * timing.delay, 2)} ± {significant(1e3 * timing.sigma, 1)}) ms"
+    moved = [p for p in result.parameters if _matters(p, timing.changes.get(p.name, 0.0))]
+    if abs(timing.delay) < EARLY_OR_LATE * timing.sigma or not moved:
+        return Check("good", name, f"A delay of the drive signal would be {size}; no value would change much.")
+    worst = max(moved, key=lambda p: abs(timing.changes[p.name]) / p.sigma)
+    other = worst.value + timing.changes[worst.name]
+    return Check(
+        "warn",
+        name,
+        f"The drive signal seems to act {size} after its stamp, with which {worst.name} would be {significant(other)} "
+        f"instead of {significant(worst.value)} {worst.unit}: `jointscope add ROBOT {timing.label} -o OUT.yaml`, then "
+        "calibrate again.",
+    )
+
+
+def _matters(parameter: ParameterEstimate, change: float) -> bool:
+    sigmas, share = MOVES
+    return abs(change) > sigmas * parameter.sigma and abs(change) > share * abs(parameter.value)
 
 
 def equation_names(result: CalibrationResult) -> list[str]:
