@@ -194,18 +194,20 @@ def _same_time(result: CalibrationResult) -> Check:
     name, timing = "Drive signal and sensors at the same time", result.timing
     if timing is None:
         return Check("info", name, "The model has times of its own, or this was not looked at.")
-    size = f"({significant(1e3 * timing.delay, 2)} ± {significant(1e3 * timing.sigma, 1)}) ms"
+    delay, sigma = abs(timing.delay), timing.sigma
     moved = [p for p in result.parameters if _matters(p, timing.changes.get(p.name, 0.0))]
-    if abs(timing.delay) < EARLY_OR_LATE * timing.sigma or not moved:
-        return Check("good", name, f"A delay of the drive signal would be {size}; no value would change much.")
+    if delay < EARLY_OR_LATE * sigma or not moved:
+        text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+        return Check("good", name, text)
     worst = max(moved, key=lambda p: abs(timing.changes[p.name]) / p.sigma)
     other = worst.value + timing.changes[worst.name]
     return Check(
         "warn",
         name,
-        f"The drive signal seems to act {size} after its stamp, with which {worst.name} would be {significant(other)} "
-        f"instead of {significant(worst.value)} {worst.unit}: `jointscope add ROBOT {timing.label} -o OUT.yaml`, then "
-        "calibrate again.",
+        f"The drive signal seems to act {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms "
+        f"{'after' if timing.delay > 0.0 else 'before'} its stamp, with which {worst.name} would be "
+        f"{significant(other)} instead of {significant(worst.value)} {worst.unit}: `jointscope add "
+        f"{result.start.path.name} {timing.label} -o OUT.yaml`, then calibrate again.",
     )
 
 
