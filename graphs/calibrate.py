@@ -25,6 +25,7 @@ from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.graphs.suspicions import names_suspicions
 from jointscope.graphs.time_shift_start import with_best_shifts
 from jointscope.graphs.turned_mounting import held, released, turned_without_reason
@@ -110,7 +111,8 @@ def _calibrated(
     if near is not None or biases_only:
         return result
     estimate = solved.solution.estimate
-    return replace(result, timing=drive_timing(solved.problems, estimate.states, estimate.calibrations))
+    timing = drive_timing(solved.problems, estimate.states, estimate.calibrations)
+    return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -27,6 +27,7 @@ INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
 EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
 MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
+APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -58,6 +59,7 @@ def judge(result: CalibrationResult) -> Judgement:
         _held(result),
         _honest_sigmas(result),
         _same_time(result),
+        _two_ways(result),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
@@ -209,6 +211,34 @@ def _same_time(result: CalibrationResult) -> Check:
         f"{significant(other)} instead of {significant(worst.value)} {worst.unit}: `jointscope add "
         f"{result.start.path.name} {timing.label} -o OUT.yaml`, then calibrate again.",
     )
+
+
+def _two_ways(result: CalibrationResult) -> Check:
+    """Regression needs no states and no process noise; where both disagree one of them is wrong."""
+    name = "Regression says the same"
+    if not result.regressed:
+        return Check("info", name, "Regression knows rigid joints with dry and viscous friction only.")
+    table = {p.name: p for p in result.parameters}
+    apart = {n: _apart(table[n], other.value, other.sigma) for n, other in result.regressed.items() if n in table}
+    worst = max(apart, key=lambda n: apart[n], default="")
+    if not worst or apart[worst] <= APART[0]:
+        return Check("good", name, f"So it does of {len(apart)} values, each within its uncertainty or a few percent.")
+    found, other = table[worst], result.regressed[worst]
+    return Check(
+        "warn",
+        name,
+        f"{worst} is {significant(found.value)} ± {significant(found.sigma, 1)} {found.unit} here and "
+        f"{significant(other.value)} ± {significant(other.sigma, 1)} {found.unit} by regression on the same "
+        f"recordings, {significant(apart[worst], 2)} sigma apart: one of the two is wrong.",
+    )
+
+
+def _apart(found: ParameterEstimate, value: float, sigma: float) -> float:
+    """Distance of two values of a parameter in their sigmas; zero where it is a small share of it."""
+    distance = abs(found.value - value)
+    if distance <= APART[1] * max(abs(found.value), abs(value)):
+        return 0.0
+    return float(distance / max(np.hypot(found.sigma, sigma), 1e-300))
 
 
 def _matters(parameter: ParameterEstimate, change: float) -> bool:
