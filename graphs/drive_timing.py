@@ -69,12 +69,12 @@ def drive_timing(
     effect = catalogue()[EFFECT]
     trial = Trial(EffectAt(effect, OWNER), effect.parameters_at(robot, OWNER))
     segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
-    step = ScoreTest(segments).step(trial)
-    delay, sigma = float(step.estimate[0]), float(step.sigma[0])
+    estimate, sigmas, response = ScoreTest(segments).step(trial)
+    delay, sigma = float(estimate[0]), float(sigmas[0])
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
     found = calibrations[0]
-    moved = replace(found, dynamics=found.dynamics + step.response[: len(found.names), 0] * delay)
+    moved = replace(found, dynamics=found.dynamics + response[: len(found.names), 0] * delay)
     changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
     return DriveTiming(delay, sigma, changes)
 

@@ -102,21 +102,6 @@ class JointScores:
         return float(np.linalg.svd(Q_a.T @ S[A, B] @ Q_b, compute_uv=False)[0])
 
 
-@dataclass(frozen=True)
-class LinearStep:
-    """One linear step with a trial in the model.
-
-    Attributes:
-        estimate: of the sizes, shape (k,).
-        sigma: their standard deviations, those from blocks where these scatter more, shape (k,).
-        response: of the shared values to each size, shape (shared, k).
-    """
-
-    estimate: Array
-    sigma: Array
-    response: Array
-
-
 class ScoreTest:
     """Scores for recordings that were solved with the base model.
 
@@ -143,15 +128,18 @@ class ScoreTest:
         p = [_robust_p(score, blocks[:, c], own) for score, c, own in zip(scores, columns, information, strict=True)]
         return JointScores(scores, np.array(p), S, s, columns)
 
-    def step(self, trial: Trial) -> LinearStep:
-        """What one linear step with a trial would change."""
+    def step(self, trial: Trial) -> tuple[Array, Array, Array]:
+        """One linear step with a trial: sizes, their sigmas, and the response of the shared values, shape (shared, k).
+
+        The sigmas are those from blocks where these scatter more.
+        """
         S, s, _, response, (blocks, information) = self._profiled([trial], with_blocks=True)
         score = _score(trial, S, s)
         at_estimate = blocks + information[0] @ score.estimate
         count = max(len(at_estimate), 2)
         inverse = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
         robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
-        return LinearStep(score.estimate, np.maximum(score.sigma, np.sqrt(np.diag(robust))), response)
+        return score.estimate, np.maximum(score.sigma, np.sqrt(np.diag(robust))), response
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""
