@@ -19,12 +19,14 @@ from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.batch_solver import Progress, solve
 from jointscope.graphs.calibration_result import CalibrationResult
 from jointscope.graphs.calibration_summary import summarize
+from jointscope.graphs.drive_timing import drive_timing
 from jointscope.graphs.encoder_noise import with_visible_noise
 from jointscope.graphs.estimate import Estimate
 from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
+from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.graphs.suspicions import names_suspicions
 from jointscope.graphs.time_shift_start import with_best_shifts
 from jointscope.graphs.turned_mounting import held, released, turned_without_reason
@@ -110,7 +112,12 @@ def _calibrated(
     solved = stage.solve(problems, noise, calibrations)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
-    return summarize(robot, solved, tuple(history.records), notices, hold)
+    result = summarize(robot, solved, tuple(history.records), notices, hold)
+    if near is not None or biases_only:
+        return result
+    estimate = solved.solution.estimate
+    timing = drive_timing(solved.problems, estimate.states, estimate.calibrations)
+    return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

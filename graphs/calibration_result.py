@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.drive_timing import DriveTiming
 from jointscope.graphs.isolated_torque import IsolatedTorque
+from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.recording import Recording
 from jointscope.robots.robot import ProcessNoise, Robot
 
@@ -159,6 +162,8 @@ class CalibrationResult:
         findings: sentences for the user, most important first.
         converged: False where the model contradicts the recordings so much that the values never came to rest.
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
+        timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
+        regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
     robot: Robot
@@ -179,6 +184,8 @@ class CalibrationResult:
     findings: tuple[str, ...] = field(default_factory=tuple)
     converged: bool = True
     unsettled: float = 0.0
+    timing: DriveTiming | None = None
+    regressed: Mapping[str, Value] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""

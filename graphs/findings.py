@@ -79,13 +79,16 @@ def _isolated(result: CalibrationResult) -> list[str]:
 
 def _verdict(result: CalibrationResult) -> str:
     dynamics = [p for p in result.parameters if p.name in result.robot.parameters]
-    relative = [p.sigma / abs(p.value) for p in dynamics if p.value]
+    count = len(dynamics)
+    # how well a time is known shows in seconds, not in shares of a delay that may be none
+    dynamics = [p for p in dynamics if p.value and p.unit != "s"]
+    relative = [p.sigma / abs(p.value) for p in dynamics]
     if not relative:
         return "no parameter was free"
     worst = dynamics[int(np.argmax(relative))]
     typical = float(np.median(relative))
     return (
-        f"{len(dynamics)} parameters from {result.samples:,} samples: typically +-{100 * typical:.2g} %, "
+        f"{count} parameters from {result.samples:,} samples: typically +-{100 * typical:.2g} %, "
         f"worst {worst.name} with +-{100 * max(relative):.2g} %"
     )
 

@@ -117,16 +117,29 @@ class ScoreTest:
         """Scores one by one, in batches."""
         found: list[TrialScore] = []
         for batch in _batches(trials):
-            S, s, columns, _ = self._profiled(batch)
+            S, s, columns, _, _ = self._profiled(batch)
             found += [_score(trial, S[c, c], s[c]) for trial, c in zip(batch, columns, strict=True)]
         return found
 
     def together(self, trials: Sequence[Trial]) -> JointScores:
         """Scores with confusions and robust p-values."""
-        S, s, columns, (blocks, information) = self._profiled(trials, with_blocks=True)
+        S, s, columns, _, (blocks, information) = self._profiled(trials, with_blocks=True)
         scores = [_score(trial, S[c, c], s[c]) for trial, c in zip(trials, columns, strict=True)]
         p = [_robust_p(score, blocks[:, c], own) for score, c, own in zip(scores, columns, information, strict=True)]
         return JointScores(scores, np.array(p), S, s, columns)
+
+    def step(self, trial: Trial) -> tuple[Array, Array, Array]:
+        """One linear step with a trial: sizes, their sigmas, and the response of the shared values, shape (shared, k).
+
+        The sigmas are those from blocks where these scatter more.
+        """
+        S, s, _, response, (blocks, information) = self._profiled([trial], with_blocks=True)
+        score = _score(trial, S, s)
+        at_estimate = blocks + information[0] @ score.estimate
+        count = max(len(at_estimate), 2)
+        inverse = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
+        robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
+        return score.estimate, np.maximum(score.sigma, np.sqrt(np.diag(robust))), response
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""
@@ -143,7 +156,7 @@ class ScoreTest:
 
     def _profiled(
         self, trials: Sequence[Trial], with_blocks: bool = False
-    ) -> tuple[Array, Array, list[slice], tuple[Array, list[Array]]]:
+    ) -> tuple[Array, Array, list[slice], Array, tuple[Array, list[Array]]]:
         parts, columns, k = [], [], 0
         for trial in trials:
             columns.append(slice(k, k + len(trial.sizes)))
@@ -155,7 +168,7 @@ class ScoreTest:
         S, s, response = self._profile(H, g, k)
         S = S + np.diag([1.0 / size.prior_sigma**2 for trial in trials for size in trial.sizes])
         blocks = self._blocks(parts, W, response, columns) if with_blocks else (np.zeros((0, k)), [])
-        return S, s, columns, blocks
+        return S, s, columns, response, blocks
 
     def _assembled(self, parts: Sequence[Sequence[TrialRows]], k: int) -> tuple[Array, Array, list[Array]]:
         """Hessian and gradient on all shared values and the trials, over all segments, with priors."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import GAIN, DriveEquation, Driven, drive_equations
+from jointscope.graphs.starts.drive_starts import driven_joints
 from jointscope.robots.recording import Recording
 from jointscope.robots.rigid_tree import RigidTree
 from jointscope.robots.robot import Robot
@@ -35,14 +36,10 @@ def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Ro
     own_motors = set(robot.layout.motors)
     if robot.command.held is not None or own_motors or robot.free_links or not recordings:
         return robot
-    encoder = robot.motor_encoder
-    driven = []
-    for recording in recordings:
-        stream = recording.streams[encoder.name]
-        positions = replace(stream, values=stream.values - encoder.zero)
-        driven.append(Driven(positions, recording.command, recording.left_out))
     tree = robot.in_posture(recordings[0].posture).tree
-    told = acts_until_the_next(tree, driven, encoder.sigmas, robot.choices.friction_sharpness)
+    told = acts_until_the_next(
+        tree, driven_joints(robot, recordings), robot.motor_encoder.sigmas, robot.choices.friction_sharpness
+    )
     if told is None or told == robot.command_held:
         return robot
     return replace(robot, command=replace(robot.command, held=told))

@@ -28,6 +28,7 @@ from jointscope.graphs.starts.drive_regression import (
 )
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.parameter import Parameter
+from jointscope.robots.recording import Recording
 from jointscope.robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -53,15 +54,7 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
     rigid = [joint for joint in robot.joints if joint not in robot.layout.motors]
     if not rigid:
         return calibration
-    encoder = robot.motor_encoder
-    driven = []
-    for recording in (problem.recording for problem in problems):
-        stream = recording.streams[encoder.name]
-        positions = replace(stream, values=stream.values - encoder.zero)
-        driven.append(Driven(positions, recording.command, recording.left_out))
-    held = bool(robot.command_held)
-    sharpness = robot.choices.friction_sharpness
-    equations = drive_equations(robot.tree, driven, np.asarray(encoder.sigmas), held=held, sharpness=sharpness)
+    equations = equations_of(robot, [problem.recording for problem in problems])
     found: dict[str, list[Value]] = {}
     for joint, equation in zip(robot.joints, equations, strict=True):
         if joint in rigid:
@@ -71,9 +64,25 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
     return _with_values(calibration, {name: _mean(values) for name, values in found.items()})
 
 
+def equations_of(robot: Robot, recordings: Sequence[Recording], delay: float = 0.0) -> list[DriveEquation]:
+    """The windowed equation of every joint; commands act a time `delay` [s] after their stamps."""
+    held, sharpness, sigmas = robot.command_held, robot.choices.friction_sharpness, robot.motor_encoder.sigmas
+    return drive_equations(robot.tree, driven_joints(robot, recordings, delay), sigmas, held=held, sharpness=sharpness)
+
+
+def driven_joints(robot: Robot, recordings: Sequence[Recording], delay: float = 0.0) -> list[Driven]:
+    """What of each recording tells about drives; commands act a time `delay` [s] after their stamps."""
+    encoder, driven = robot.motor_encoder, []
+    for recording in recordings:
+        stream, command = recording.streams[encoder.name], recording.command
+        positions = replace(stream, values=stream.values - encoder.zero)
+        driven.append(Driven(positions, replace(command, times=command.times + delay), recording.left_out))
+    return driven
+
+
 def _joint_starts(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:
     """Values by the name of the parameter; empty where the file explains the motion as well."""
-    parts = _parts(robot, joint)
+    parts = parts_of(robot, joint)
     file = {GAIN: 1.0, **{law: sum(factor * p.value for p, factor in some) for law, some in parts.items()}}
     known = {law: value for law, value in file.items() if all(p.fixed for p, _ in parts.get(law, ()))}
     if VISCOUS not in parts:
@@ -95,7 +104,7 @@ def _joint_starts(robot: Robot, joint: str, equation: DriveEquation) -> dict[str
     return starts
 
 
-def _parts(robot: Robot, joint: str) -> dict[str, list[tuple[Parameter, float]]]:
+def parts_of(robot: Robot, joint: str) -> dict[str, list[tuple[Parameter, float]]]:
     """For each value of the regression the parameters that it is the sum of, each with a factor."""
     parts = {DRY: [(robot.drive_parameter(joint, "coulomb_torque"), 1.0)]}
     parts[INERTIA] = [(robot.drive_parameter(joint, "inertia"), 1.0)]

@@ -25,6 +25,9 @@ UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open af
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
+EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
+MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
+APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -55,6 +58,8 @@ def judge(result: CalibrationResult) -> Judgement:
         _determined(result),
         _held(result),
         _honest_sigmas(result),
+        _same_time(result),
+        _two_ways(result),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
@@ -186,6 +191,61 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
     )
 
 
+def _same_time(result: CalibrationResult) -> Check:
+    """A delay of a fraction of a millisecond is friction that is not there, and no residual shows it."""
+    name, timing = "Drive signal and sensors at the same time", result.timing
+    if timing is None:
+        return Check("info", name, "The model has times of its own, or this was not looked at.")
+    delay, sigma = abs(timing.delay), timing.sigma
+    moved = [p for p in result.parameters if _matters(p, timing.changes.get(p.name, 0.0))]
+    if delay < EARLY_OR_LATE * sigma or not moved:
+        text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+        return Check("good", name, text)
+    worst = max(moved, key=lambda p: abs(timing.changes[p.name]) / p.sigma)
+    other = worst.value + timing.changes[worst.name]
+    return Check(
+        "warn",
+        name,
+        f"The drive signal seems to act {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms "
+        f"{'after' if timing.delay > 0.0 else 'before'} its stamp, with which {worst.name} would be "
+        f"{significant(other)} instead of {significant(worst.value)} {worst.unit}: `jointscope add "
+        f"{result.start.path.name} {timing.label} -o OUT.yaml`, then calibrate again.",
+    )
+
+
+def _two_ways(result: CalibrationResult) -> Check:
+    """Regression needs no states and no process noise; where both disagree one of them is wrong."""
+    name = "Regression says the same"
+    if not result.regressed:
+        return Check("info", name, "Regression knows rigid joints with dry and viscous friction only.")
+    table = {p.name: p for p in result.parameters}
+    apart = {n: _apart(table[n], other.value, other.sigma) for n, other in result.regressed.items() if n in table}
+    worst = max(apart, key=lambda n: apart[n], default="")
+    if not worst or apart[worst] <= APART[0]:
+        return Check("good", name, f"So it does of {len(apart)} values, each within its uncertainty or a few percent.")
+    found, other = table[worst], result.regressed[worst]
+    return Check(
+        "warn",
+        name,
+        f"{worst} is {significant(found.value)} ± {significant(found.sigma, 1)} {found.unit} here and "
+        f"{significant(other.value)} ± {significant(other.sigma, 1)} {found.unit} by regression on the same "
+        f"recordings, {significant(apart[worst], 2)} sigma apart: one of the two is wrong.",
+    )
+
+
+def _apart(found: ParameterEstimate, value: float, sigma: float) -> float:
+    """Distance of two values of a parameter in their sigmas; zero where it is a small share of it."""
+    distance = abs(found.value - value)
+    if distance <= APART[1] * max(abs(found.value), abs(value)):
+        return 0.0
+    return float(distance / max(np.hypot(found.sigma, sigma), 1e-300))
+
+
+def _matters(parameter: ParameterEstimate, change: float) -> bool:
+    sigmas, share = MOVES
+    return abs(change) > sigmas * parameter.sigma and abs(change) > share * abs(parameter.value)
+
+
 def equation_names(result: CalibrationResult) -> list[str]:
     """Names of the columns of BagFit.process without those of memories."""
     layout = result.robot.layout
@@ -193,8 +253,9 @@ def equation_names(result: CalibrationResult) -> list[str]:
 
 
 def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
-    """The dynamic parameter with the largest sigma relative to its value, and that share."""
-    shares = {p.name: p.sigma / abs(p.value) for p in result.parameters if not is_mounting_or_bias(p) and p.value}
+    """The dynamic parameter with the largest sigma relative to its value, and that share; times have none."""
+    told = [p for p in result.parameters if p.value and p.unit != "s" and not is_mounting_or_bias(p)]
+    shares = {p.name: p.sigma / abs(p.value) for p in told}
     if not shares:
         return "", float("nan")
     worst = max(shares, key=lambda name: shares[name])

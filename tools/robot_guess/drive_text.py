@@ -15,6 +15,8 @@ from jointscope.tools.robot_guess.robot_line import GUESS, as_list, line, number
 
 RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
 VISCOUS_EFFECT = ("N m", "A")  # units of commands whose viscous friction is an effect
+DELAY_EFFECT = "command_delay@robot"
+DELAY_PRIOR = 0.01  # [s] filters of currents and cycles of buses take milliseconds
 ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
 SPREAD, LOST_SPREAD = 2.0, 5.0  # [value] priors of logarithms: a factor 7, or 150, either way
 NO_PULL = 10.0  # times wider, about zero
@@ -32,14 +34,24 @@ class _Row:
 
 
 def effect_lines(guess: RobotGuess) -> list[str]:
-    """Viscous friction of drives whose command is a torque or a current; that of a voltage is in the back-EMF."""
-    if guess.free_links or guess.command_unit[0] not in VISCOUS_EFFECT:
+    """Viscous friction of drives whose command is a torque or a current; that of a voltage is in the back-EMF.
+
+    A drive signal that was measured was so some time before or after the positions in its message.
+    """
+    if guess.free_links:
         return []
-    labels = [f"motor_viscous@{joint}" for joint in guess.roles.joints]
-    return [
-        line(f"effects: {as_list(labels)}", "friction that grows with speed, as drives with gears have it", False),
-        "",
-    ]
+    viscous = guess.command_unit[0] in VISCOUS_EFFECT
+    labels = [f"motor_viscous@{joint}" for joint in guess.roles.joints] if viscous else []
+    reasons = ["friction that grows with speed, as drives with gears have it"] if viscous else []
+    if is_measured(guess):
+        labels.append(DELAY_EFFECT)
+        reasons.append("time between the measured drive signal and the positions in its message")
+    return [line(f"effects: {as_list(labels)}", "; ".join(reasons), False), ""] if labels else []
+
+
+def is_measured(guess: RobotGuess) -> bool:
+    """Whether the drive signal was measured, and so belongs to an instant that its stamp may miss."""
+    return not guess.held_command
 
 
 def parameter_lines(guess: RobotGuess) -> list[str]:
@@ -60,7 +72,15 @@ def parameter_lines(guess: RobotGuess) -> list[str]:
                 prior = f"prior: 0.0, prior_sigma: {spread}, positive: false, 'null': 0.0"
             text = f"{joint}.{row.name}: {{value: {number(row.value, 5)}, unit: {unit}, {prior}}}"
             lines.append(line(text, row.comment, indent=2) if row.comment else f"  {text}")
-    return lines
+    return [*lines, *_delay_lines(guess)]
+
+
+def _delay_lines(guess: RobotGuess) -> list[str]:
+    """How much later than measured a drive signal acts; below zero where it was filtered or sent late."""
+    if not is_measured(guess):
+        return []
+    prior = f"prior: 0.0, prior_sigma: {DELAY_PRIOR}, positive: false, 'null': 0.0"
+    return [f"  robot.command_delay.delay: {{value: 0.0, unit: s, {prior}}}"]
 
 
 def _unexplained(guess: RobotGuess) -> list[str]:

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Values of drives by regression, beside those of a calibration: two ways that should end at the same place.
+
+Regression knows rigid joints with dry and viscous friction. Where the model of a robot has more than that, or
+where little of the torque is explained, it says nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from jointscope.graphs.starts.drive_regression import GAIN, VISCOUS, DriveEquation, Value
+from jointscope.graphs.starts.drive_starts import PLAIN, equations_of, parts_of
+from jointscope.robots.recording import Recording
+from jointscope.robots.robot import Robot
+
+DELAY = "command_delay@robot"
+EXPLAINED = 0.99  # of the mean square of the driving torque, below which the model of the regression is another one
+
+
+def regressed_values(robot: Robot, recordings: Sequence[Recording]) -> dict[str, Value]:
+    """Values with sigmas by the name of the parameter; empty where regression does not apply.
+
+    Args:
+        robot: the calibrated robot; a delay of its commands is taken from it.
+        recordings: those of the calibration.
+    """
+    labels = {here.label for here in robot.effects if here.effect.id != PLAIN}
+    if robot.layout.motors or robot.choices.link_dynamics != "model" or labels - {DELAY}:
+        return {}
+    robot = robot.in_posture(recordings[0].posture)
+    delay = robot.parameter("robot.command_delay.delay").value if labels else 0.0
+    found: dict[str, Value] = {}
+    for joint, equation in zip(robot.joints, equations_of(robot, recordings, delay), strict=True):
+        found |= _of_joint(robot, joint, equation)
+    return found
+
+
+def _of_joint(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:
+    """What one equation says about parameters that no other joint shares."""
+    parts = parts_of(robot, joint)
+    known = {law: sum(f * p.value for p, f in some) for law, some in parts.items() if all(p.fixed for p, _ in some)}
+    if GAIN not in parts:
+        known[GAIN] = 1.0
+    if VISCOUS not in parts:
+        known[VISCOUS] = 0.0
+    values = equation.solve(known)
+    full = {**known, **{law: value.value for law, value in values.items()}}
+    if not values or not _explains(equation, full):
+        return {}
+    found = {}
+    for law, value in values.items():
+        free = [(p, f) for p, f in parts[law] if not p.fixed]
+        held = sum(f * p.value for p, f in parts[law] if p.fixed)
+        if len(free) == 1 and free[0][0].name.startswith(f"{joint}."):
+            parameter, factor = free[0]
+            found[parameter.name] = Value((value.value - held) / factor, value.sigma / abs(factor))
+    return found
+
+
+def _explains(equation: DriveEquation, values: dict[str, float]) -> bool:
+    driving = equation.torque(values[GAIN])
+    return driving > 0.0 and equation.missing(values) ** 2 < (1.0 - EXPLAINED) * driving**2
