@@ -16,6 +16,12 @@ FEW = 5  # or so many
 LARGEST = 1e12  # [unit of the bag]
 
 
+def numbers_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same values with NaN for what is none, so that nobody's squares overflow; the same array if all are."""
+    some = np.abs(values) < LARGEST  # NaN compares false
+    return values if some.all() else np.where(some, values, np.nan)
+
+
 def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
     """The samples in which every channel is a number.
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Stream
+from jointscope.tools.bags.long_holes import LongHoles
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
@@ -92,6 +93,8 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
         for known in known_fields(kind, raw[topic].data[0])
     ]
     signals = [signal for signal in found if signal is not None]
+    holes = LongHoles.of([signal.times for signal in signals])
+    signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
     if not signals:
         raise RecordingError(
             f"{path} holds no messages with positions or efforts of joints (sensor_msgs/msg/JointState, states of "
