@@ -18,7 +18,7 @@ from jointscope.tools.bags.durations import duration
 
 Array = NDArray[np.float64]
 
-LONGEST = 10.0  # [s] of a hole that stays as it is
+LONGEST = 5.0  # [s] of a hole that stays as it is
 LEFT = 1.0  # [s] of a longer one
 PERIODS = 20.0  # of the slowest stream: what comes this seldom has no hole
 SAID = 5  # holes listed
@@ -37,7 +37,7 @@ class LongHoles:
 
     @staticmethod
     def of(streams: Sequence[Array]) -> LongHoles:
-        """Those that have samples of every stream on both sides.
+        """Those with samples of at least two streams on both sides; else the streams are of different times.
 
         Args:
             streams: times of each, increasing [s]; empty ones say nothing.
@@ -47,10 +47,11 @@ class LongHoles:
             return LongHoles(np.empty(0), np.empty(0))
         every = np.unique(np.concatenate(streams))
         slowest = max((float(np.median(np.diff(times))) for times in streams if len(times) > 1), default=0.0)
-        long = np.flatnonzero(np.diff(every) > max(LONGEST, PERIODS * slowest))
-        first, last = max(float(times[0]) for times in streams), min(float(times[-1]) for times in streams)
-        long = long[(every[long] >= first) & (every[long + 1] <= last)]
-        return LongHoles(every[long], every[long + 1])
+        far = np.flatnonzero(np.diff(every) > max(LONGEST, PERIODS * slowest))
+        begins, ends = every[far], every[far + 1]
+        across = sum(((times[0] <= begins) & (times[-1] >= ends)).astype(int) for times in streams)
+        long = across >= min(2, len(streams))
+        return LongHoles(begins[long], ends[long])
 
     def __len__(self) -> int:
         return len(self.begins)
@@ -79,7 +80,7 @@ def with_short_holes(recording: Recording) -> Recording:
         f"nothing at all was recorded for {said}{more}; {LEFT:g} s of it is kept, all later times are earlier by the "
         "rest, and both sides are used"
     )
-    notice = Notice("recording", "gap", len(holes), text)
+    notice = Notice("recording", "clock", len(holes), text)
     return replace(recording, streams=streams, goal=goal, left_out=left_out, notices=[*recording.notices, notice])
 
 

@@ -87,12 +87,15 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
+    troubles: list[RecordingError] = []
     found = [
-        _signal(raw[topic], kind, known, start)
+        _signal(raw[topic], kind, known, start, troubles)
         for topic, kind in filled.items()
         for known in known_fields(kind, raw[topic].data[0])
     ]
     signals = [signal for signal in found if signal is not None]
+    if troubles and not signals:
+        raise troubles[0]
     holes = LongHoles.of([signal.times for signal in signals])
     signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
     if not signals:
@@ -115,8 +118,10 @@ def _useful_type(bag: Bag, topic: str) -> MessageType | None:
     return kind if interfaces or known_fields(kind, None) else None
 
 
-def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) -> Signal | None:
-    """One field; None where it is empty in some messages or changes its length."""
+def _signal(
+    raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int, troubles: list[RecordingError]
+) -> Signal | None:
+    """One field; None where it is empty in some messages or changes its length, or its times cannot be told."""
     try:
         columns = read_columns(raw, kind, known.path)
     except RecordingError:
@@ -130,7 +135,8 @@ def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) 
     samples = TimedSamples(stamps, received, columns.values)
     try:
         samples = tidy_samples(raw.name, samples, columns.stamps is not None, sensor=known.quantity in MEASURED)
-    except RecordingError:  # what nobody can tell the time of is no use; a robot file may still need other topics
+    except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
+        troubles.append(err)
         return None
     times = (samples.stamps - start_ns) / 1e9
     stamped = columns.stamps is not None
