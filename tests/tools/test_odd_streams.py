@@ -17,6 +17,7 @@ from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.staircase import without_repetitions
+from jointscope.tools.bags.tidy_samples import tidy_samples
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
@@ -232,3 +233,16 @@ def test_commands_that_come_only_when_they_change_are_never_silent():
 )  # fmt: skip
 def test_times_are_said_as_people_say_them(seconds, said):
     assert duration(seconds) == said
+
+
+@pytest.mark.parametrize("wild", (1e308, -1e308, np.inf, np.nan))
+def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
+    samples = motion()
+    values = samples.values.copy()
+    values[700, 1] = wild
+    with np.errstate(all="raise"):
+        one = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+        values[::2] = wild
+        half = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+    assert len(one) == 1499
+    assert len(half) == 1500 and np.isnan(half.values[::2]).all() and np.isfinite(half.values[1::2]).all()
