@@ -14,6 +14,7 @@ from fuzz_messages import FORMATS, sound_messages, write_messages
 from fuzz_mutations import OF_BYTES, OF_MESSAGES
 from fuzz_trial import damaged_bag, run_trial, sound_robot_file
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # which a user would see
 TRIALS, DEEP, STRETCH = 200, 8, 25
 HANG = 60  # [s] of computing
 

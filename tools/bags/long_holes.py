@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Long stretches in which nothing at all was recorded are made short: how long they were says nothing about the robot.
 
-A recorder that was stopped and started again, or a clock that jumped, leaves a hole of minutes or hours. States would
-have to be estimated all through it, and pictures would show little else. Every stream keeps its place beside the others.
+A recorder that was stopped and started again leaves a hole of minutes or hours. States would have to be estimated all
+through it, and pictures would show little else. Every stream keeps its place beside the others.
 """
 
 from __future__ import annotations

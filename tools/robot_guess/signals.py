@@ -139,5 +139,6 @@ def _signal(
         troubles.append(err)
         return None
     times = (samples.stamps - start_ns) / 1e9
+    later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
     stamped = columns.stamps is not None
-    return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity)
+    return Signal(raw.name, kind.name, known.path, names, times[later], samples.values[later], stamped, known.quantity)
