@@ -83,6 +83,7 @@ class Recording:
         left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
             motion do not hold there, and no model is judged by them.
         posture: positions [rad] or [m] of joints that are not the robot's and stand still, by name.
+        shortened: whether long holes were made short, so that times behind them are not those of the stamps.
     """
 
     path: str
@@ -93,6 +94,7 @@ class Recording:
     goal: Stream | None = None
     left_out: tuple[tuple[float, float], ...] = ()
     posture: Mapping[str, float] = field(default_factory=dict)
+    shortened: bool = False
 
     @property
     def command(self) -> Stream:

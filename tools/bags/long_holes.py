@@ -81,7 +81,8 @@ def with_short_holes(recording: Recording) -> Recording:
         "rest, and both sides are used"
     )
     notice = Notice("recording", "clock", len(holes), text)
-    return replace(recording, streams=streams, goal=goal, left_out=left_out, notices=[*recording.notices, notice])
+    notices = [*recording.notices, notice]
+    return replace(recording, streams=streams, goal=goal, left_out=left_out, notices=notices, shortened=True)
 
 
 def _moved(stream: Stream, holes: LongHoles) -> Stream:
