@@ -18,6 +18,7 @@ from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.staircase import without_repetitions
 from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
@@ -190,6 +191,14 @@ def test_a_few_samples_without_numbers_are_left_out_and_many_refused():
     values[::3, 1] = np.inf
     with pytest.raises(RecordingError, match=r"b.motor_position is no number .* in 500 of 1500 messages \(33.3 %\)"):
         without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
+
+
+def test_a_stream_of_which_nothing_is_a_number_is_refused_however_short():
+    few = dataclasses.replace(motion().take(np.arange(4)), values=np.full((4, 2), np.nan))
+    with pytest.raises(RecordingError, match=r"in 4 of 4 messages \(100 %\)"):
+        without_gibberish("motor_encoder", CHANNELS, few)
+    with pytest.raises(RecordingError, match="motor_encoder is empty"):
+        in_time_order("motor_encoder", few.take(np.arange(0)))
 
 
 def recording(gaps):

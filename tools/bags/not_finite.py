@@ -37,7 +37,7 @@ def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSample
     share = float(bad[:, worst].mean())
     first = int(np.argmax(rows))
     since = (samples.stamps[first] - samples.stamps.min()) / 1e9
-    if count > max(FEW, MOST * len(samples)):
+    if count > max(FEW, MOST * len(samples)) or count == len(samples):
         raise RecordingError(
             f"{channels[worst]} is no number (NaN or infinite) in {np.count_nonzero(bad[:, worst])} of "
             f"{len(samples)} messages ({100 * share:.3g} %), the first at {since:.3f} s; expected at most "

@@ -27,15 +27,17 @@ def in_time_order(name: str, samples: TimedSamples) -> tuple[TimedSamples, list[
 
     Args:
         name: name of the stream.
-        samples: as they lie in the bag; at least one.
+        samples: as they lie in the bag.
 
     Returns:
         The samples in order, and what was done to them.
 
     Raises:
-        RecordingError: all stamps are the same, or the clock jumps.
+        RecordingError: there is none, all stamps are the same, or the clock jumps.
     """
     stamps = samples.stamps
+    if not len(stamps):
+        raise RecordingError(f"{name} is empty: it holds no sample that can be used")
     if len(stamps) > 1 and np.all(stamps == stamps[0]):
         raise RecordingError(
             f"{name}: all {len(stamps)} messages have the same stamp {stamps[0] / 1e9:.9f} s; expected the time of "
