@@ -112,7 +112,7 @@ class Bag:
         try:
             # without connections the reader would deliver everything
             for connection, time, data in self._reader.messages(connections=connections) if connections else ():
-                if not isinstance(time, int) or not isinstance(data, bytes | bytearray | memoryview):
+                if not isinstance(time, int) or isinstance(data, str | int | float | None):
                     raise TypeError("a message without time or content")  # a damaged database gives None
                 found[connection.topic] += 1
                 k += 1
