@@ -134,6 +134,8 @@ def _type(line: Sequence[str], folder: Path, before: set[str]) -> tuple[list[str
         broken.append(f"the error is not one line: {err[:300]!r}")
     if "bug in jointscope" in err or "out of memory" in err or "Traceback" in err:
         broken.append(err.strip()[-400:])
+    if "Warning: " in err:
+        broken.append(f"a library warns: {err.strip()[-300:]}")
     made = {path.name for path in folder.iterdir()} - before
     if code and made:
         broken.append(f"left {', '.join(sorted(made))} after an error")

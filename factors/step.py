@@ -24,6 +24,9 @@ from jointscope.robots.state_layout import StateLayout
 Array = NDArray[np.float64]
 
 
+FREE = 20.0  # [rad/s / sqrt(s)] least density of velocities where nothing is asked to hold, however small the noise
+
+
 @dataclass(frozen=True)
 class Steps:
     """Steps between consecutive ticks.
@@ -37,7 +40,7 @@ class Steps:
         path: how the commands act, where effects change them; None where they act as logged.
         index: place of each step in the path, shape (m,).
         slack: factor on the standard deviations of each step, shape (m,); None for 1. Large where something acts that
-            does not belong to the robot.
+            does not belong to the robot; velocities are then nearly free.
     """
 
     h: Array
@@ -82,7 +85,8 @@ class Steps:
         root = np.sqrt(self.h)[:, None]
         rates, k = density * root, len(self.layout.velocities)
         if self.slack is not None:  # memories follow the motion, which the sensors see
-            rates[:, :k] *= self.slack[:, None]
+            free = np.where(self.slack > 1.0, FREE, 0.0)[:, None] * root
+            rates[:, :k] = np.maximum(rates[:, :k] * self.slack[:, None], free)
             root = root * self.slack[:, None]
         velocity = rates[:, :k]
         if self.integrated:

@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 LONGEST_STEP = 2.5e-3  # [s] friction changes sign within a few milliseconds
 SHORTEST_STEP = 2e-5  # [s] below this two commands are one; the later one counts
+MOST_TICKS, MOST_PER_SAMPLE = 20_000, 100  # states that no sample tells anything of take memory and time
+CUT = "with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`"
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ class Timeline:
         u = u[: len(edges) - 1]
         wanted = min(period, LONGEST_STEP)
         parts = np.maximum(np.round(np.diff(edges) / wanted - 0.3), 1).astype(int)
+        if parts.sum() > MOST_TICKS + MOST_PER_SAMPLE * recording.sample_count:
+            raise RecordingError(
+                f"{recording.path}: {recording.sample_count} samples in {end - times[0]:.0f} s are too few to follow a "
+                f"motion; expected several in a second: cut out the part in which the robot was recorded, {CUT}"
+            )
         if np.all(parts == 1):
             return Timeline(edges, u if held else _means(command, edges))
         fraction = np.concatenate([np.arange(p) / p for p in parts])

@@ -18,7 +18,7 @@ from jointscope.robots.errors import RecordingError
 Array = NDArray[np.float64]
 
 GRID = 1000  # instants at which a recording is looked at
-SMALLEST_SHARE = 0.2  # of a recording that has to be left
+SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ class Recording:
         left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
             motion do not hold there, and no model is judged by them.
         posture: positions [rad] or [m] of joints that are not the robot's and stand still, by name.
+        shortened: whether long holes were made short, so that times behind them are not those of the stamps.
     """
 
     path: str
@@ -93,6 +94,7 @@ class Recording:
     goal: Stream | None = None
     left_out: tuple[tuple[float, float], ...] = ()
     posture: Mapping[str, float] = field(default_factory=dict)
+    shortened: bool = False
 
     @property
     def command(self) -> Stream:
@@ -145,7 +147,7 @@ class Recording:
                 )
         both = (*self.left_out, *((max(t0, first), min(t1, last)) for t0, t1 in stretches))
         without = replace(self, left_out=both)
-        left = without.judged_share(first, last)
+        left = float(np.mean(np.concatenate([without.are_judged(s.times) for s in self.streams.values()])))
         if left < SMALLEST_SHARE:
             raise RecordingError(
                 f"{self.path}: only {100 * left:.0f} % would be left, expected at least {100 * SMALLEST_SHARE:.0f} %; "

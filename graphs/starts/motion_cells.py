@@ -24,6 +24,7 @@ Flags = NDArray[np.bool_]
 
 CELLS_PER_SAMPLE = 4  # of the encoders; the command changes between their samples
 SHORTEST_CELL = 1.5e-3  # [s] motion is smooth within it
+SHORTEST_SPAN = 0.1  # [s] hardly anything moves in less
 MOST_CELLS = 40_000
 GAP = 4.5  # [sample periods] between two samples from which nobody knows what happened there
 MEMORY = 0.03  # [s] over which accelerations are alike
@@ -77,7 +78,7 @@ def motion_cells(
         left_out: stretches of time in which something else acted [s].
 
     Raises:
-        RecordingError: the two do not overlap.
+        RecordingError: the two do not overlap, or hardly.
     """
     period = float(np.median(np.diff(encoder.times)))
     t0 = float(max(encoder.times[0], command.times[0]))
@@ -86,6 +87,11 @@ def motion_cells(
         raise RecordingError(
             f"positions ({encoder.times[0]:.3f} to {encoder.times[-1]:.3f} s) and commands ({command.times[0]:.3f} to "
             f"{command.times[-1]:.3f} s) do not overlap; check that their stamps come from one clock"
+        )
+    if t1 - t0 < SHORTEST_SPAN:
+        raise RecordingError(
+            f"positions and commands share only {t1 - t0:.3g} s, with a position every {period:.3g} s; expected at "
+            f"least {SHORTEST_SPAN:g} s: record longer, or check the unit of the stamps"
         )
     h = max(period / CELLS_PER_SAMPLE, SHORTEST_CELL, (t1 - t0) / MOST_CELLS)
     edges: Array = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1, dtype=np.float64)

@@ -14,7 +14,9 @@ from fuzz_messages import FORMATS, sound_messages, write_messages
 from fuzz_mutations import OF_BYTES, OF_MESSAGES
 from fuzz_trial import damaged_bag, run_trial, sound_robot_file
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # which a user would see
 TRIALS, DEEP, STRETCH = 200, 8, 25
+FOUND, FOUND_DEEP = (338, 916, 1479, 1562), (15, 116)  # others that found something once
 HANG = 60  # [s] of computing
 
 
@@ -44,6 +46,10 @@ def test_damaged_bags_end_info_and_init_in_one_line(first):
 
 def test_damaged_bags_end_calibrate_and_replay_in_one_line():
     assert findings(range(DEEP), deep=True) == []
+
+
+def test_what_was_found_once_stays_mended():
+    assert findings(FOUND) + findings(FOUND_DEEP, deep=True) == []
 
 
 def test_the_sound_recording_gives_a_robot_file_with_both_joints():

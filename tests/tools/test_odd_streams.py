@@ -17,6 +17,8 @@ from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.staircase import without_repetitions
+from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
 from jointscope.tools.bags.unfilled_stamps import without_unfilled
@@ -191,6 +193,14 @@ def test_a_few_samples_without_numbers_are_left_out_and_many_refused():
         without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
 
 
+def test_a_stream_of_which_nothing_is_a_number_is_refused_however_short():
+    few = dataclasses.replace(motion().take(np.arange(4)), values=np.full((4, 2), np.nan))
+    with pytest.raises(RecordingError, match=r"in 4 of 4 messages \(100 %\)"):
+        without_gibberish("motor_encoder", CHANNELS, few)
+    with pytest.raises(RecordingError, match="motor_encoder is empty"):
+        in_time_order("motor_encoder", few.take(np.arange(0)))
+
+
 def recording(gaps):
     times = np.arange(3000) / 1e3
     streams = {}
@@ -232,3 +242,16 @@ def test_commands_that_come_only_when_they_change_are_never_silent():
 )  # fmt: skip
 def test_times_are_said_as_people_say_them(seconds, said):
     assert duration(seconds) == said
+
+
+@pytest.mark.parametrize("wild", (1e308, -1e308, np.inf, np.nan))
+def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
+    samples = motion()
+    values = samples.values.copy()
+    values[700, 1] = wild
+    with np.errstate(all="raise"):
+        one = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+        values[::2] = wild
+        half = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+    assert len(one) == 1499
+    assert len(half) == 1500 and np.isnan(half.values[::2]).all() and np.isfinite(half.values[1::2]).all()

@@ -22,6 +22,7 @@ from jointscope.tools.bags.bag_description import (
 from jointscope.tools.bags.clock_steps import on_one_clock
 from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.message_type import MessageType, inner_type
+from jointscope.tools.bags.not_finite import numbers_only
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
 from jointscope.tools.bags.read_recording import (
     check_topic,
@@ -164,7 +165,7 @@ def _field(field: str, columns: Columns) -> FieldDescription:
     low = np.where(finite, values, np.inf).min(axis=0)
     high = np.where(finite, values, -np.inf).max(axis=0)
     some = finite.any(axis=0)
-    clipping = clipping_notices(field, np.where(finite, values, np.nan), labels, "1")
+    clipping = clipping_notices(field, numbers_only(values), labels, "1")
     return FieldDescription(
         field=field,
         columns=tuple(labels),

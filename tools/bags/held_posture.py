@@ -16,6 +16,7 @@ from jointscope.robots.recording import Notice
 from jointscope.robots.robot import Robot
 from jointscope.robots.units import si_factor, si_unit
 from jointscope.tools.bags.message_parts import MessageParts
+from jointscope.tools.bags.not_finite import LARGEST
 
 STILL = {"rad": 0.03, "m": 0.005}  # a joint that spans less is held; its weight then moves as little
 OUTLYING = 0.005  # share of the samples on either side that does not count: glitches, foreign messages
@@ -77,7 +78,7 @@ def _range(found: Sequence[MessageParts], name: str) -> tuple[float, float, floa
         if part.names and name in part.names and len(part.names) == part.values.shape[1]
     ]
     every = np.concatenate(values) if values else np.empty(0)
-    every = every[np.isfinite(every)]
+    every = every[np.abs(every) < LARGEST]
     if len(every) < FEWEST:
         return None
     low, middle, high = np.quantile(every, [OUTLYING, 0.5, 1.0 - OUTLYING])

@@ -125,6 +125,7 @@ def known_message_type(name: str, ros2: bool) -> MessageType:
     return MessageType(name, typestore, ros2)
 
 
+@functools.lru_cache(maxsize=64)  # rosbags compiles a decoder for every type store
 def defined_message_type(name: str, definition: Any, ros2: bool) -> MessageType:
     """A type from the definition that a bag carries.
 

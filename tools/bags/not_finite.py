@@ -16,6 +16,12 @@ FEW = 5  # or so many
 LARGEST = 1e12  # [unit of the bag]
 
 
+def numbers_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same values with NaN for what is none, so that nobody's squares overflow; the same array if all are."""
+    some = np.abs(values) < LARGEST  # NaN compares false
+    return values if some.all() else np.where(some, values, np.nan)
+
+
 def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
     """The samples in which every channel is a number.
 
@@ -31,7 +37,7 @@ def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSample
     share = float(bad[:, worst].mean())
     first = int(np.argmax(rows))
     since = (samples.stamps[first] - samples.stamps.min()) / 1e9
-    if count > max(FEW, MOST * len(samples)):
+    if count > max(FEW, MOST * len(samples)) or count == len(samples):
         raise RecordingError(
             f"{channels[worst]} is no number (NaN or infinite) in {np.count_nonzero(bad[:, worst])} of "
             f"{len(samples)} messages ({100 * share:.3g} %), the first at {since:.3f} s; expected at most "

@@ -112,6 +112,8 @@ class Bag:
         try:
             # without connections the reader would deliver everything
             for connection, time, data in self._reader.messages(connections=connections) if connections else ():
+                if not isinstance(time, int) or isinstance(data, str | int | float | None):
+                    raise TypeError("a message without time or content")  # a damaged database gives None
                 found[connection.topic] += 1
                 k += 1
                 if progress and k % PROGRESS_STEP == 0:

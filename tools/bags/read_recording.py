@@ -21,6 +21,7 @@ from jointscope.tools.bags.columns import Columns
 from jointscope.tools.bags.durations import counted
 from jointscope.tools.bags.fitting_messages import fitting_messages
 from jointscope.tools.bags.held_posture import held_posture
+from jointscope.tools.bags.long_holes import with_short_holes
 from jointscope.tools.bags.message_parts import message_parts
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.needed_streams import StreamSource as StreamSource
@@ -90,7 +91,7 @@ def read_recording(
     recording = Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal, posture=posture)
     if seams:
         recording = recording.leaving_out([((a - start_ns) / 1e9, (b - start_ns) / 1e9) for a, b in seams])
-    recording = with_silences_left_out(recording, robot.motor_encoder.name)
+    recording = with_silences_left_out(with_short_holes(recording), robot.motor_encoder.name)
     return replace(recording, notices=by_importance(recording.notices))
 
 

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from jointscope.robots.recording import Notice
 from jointscope.tools.bags.clock_steps import on_one_clock
 from jointscope.tools.bags.glitches import without_glitches
+from jointscope.tools.bags.not_finite import numbers_only
 from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.staircase import without_repetitions
 from jointscope.tools.bags.time_order import in_time_order
@@ -34,6 +37,7 @@ def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) 
         samples, _ = without_unfilled(name, samples)
         samples = on_one_clock({name: samples})[0][name]
     samples, _ = in_time_order(name, samples)
+    samples = replace(samples, values=numbers_only(samples.values))
     finite = np.asarray(np.isfinite(samples.values).all(axis=1))
     if not sensor or finite.mean() < MOSTLY:
         return samples

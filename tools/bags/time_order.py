@@ -12,7 +12,7 @@ from jointscope.tools.bags.durations import counted, duration
 from jointscope.tools.bags.timed_samples import TimedSamples as TimedSamples
 
 LATE_ALLOWED = 0.5  # [s] messages overtake each other by less than this; more is a clock that was set back
-FORWARD_ALLOWED = 3600.0  # [s] a longer pause inside one stream is a clock that was set
+FORWARD_ALLOWED = 3600.0  # [s] more than between the times of reception is a clock that was set
 CUT = (
     "use the part before or after it, cut out with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`, "
     "or record again"
@@ -27,21 +27,23 @@ def in_time_order(name: str, samples: TimedSamples) -> tuple[TimedSamples, list[
 
     Args:
         name: name of the stream.
-        samples: as they lie in the bag; at least one.
+        samples: as they lie in the bag.
 
     Returns:
         The samples in order, and what was done to them.
 
     Raises:
-        RecordingError: all stamps are the same, or the clock jumps.
+        RecordingError: there is none, all stamps are the same, or the clock jumps.
     """
     stamps = samples.stamps
+    if not len(stamps):
+        raise RecordingError(f"{name} is empty: it holds no sample that can be used")
     if len(stamps) > 1 and np.all(stamps == stamps[0]):
         raise RecordingError(
             f"{name}: all {len(stamps)} messages have the same stamp {stamps[0] / 1e9:.9f} s; expected the time of "
             "measurement in header.stamp: the driver does not fill it"
         )
-    _check_clock(name, stamps)
+    _check_clock(name, samples)
     notices = []
     late = int(np.count_nonzero(stamps < np.maximum.accumulate(stamps)))
     if late:
@@ -60,10 +62,12 @@ def in_time_order(name: str, samples: TimedSamples) -> tuple[TimedSamples, list[
     return samples, notices
 
 
-def _check_clock(name: str, stamps: NDArray[np.int64]) -> None:
+def _check_clock(name: str, samples: TimedSamples) -> None:
+    stamps = samples.stamps
     newest = np.maximum.accumulate(stamps)
     late = newest - stamps
-    ahead = np.diff(np.sort(stamps))
+    order = np.argsort(stamps, kind="stable")
+    ahead = np.diff(stamps[order]) - np.maximum(np.diff(samples.received[order]), 0)  # a pause is none
     if len(ahead) and ahead.max() > FORWARD_ALLOWED * 1e9:
         k = int(np.argmax(np.diff(newest))) + 1
         raise RecordingError(

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recording import Stream
+from jointscope.tools.bags.long_holes import LongHoles
 from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
@@ -93,12 +94,17 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
+    troubles: list[RecordingError] = []
     found = [
-        _signal(raw[topic], kind, known, start)
+        _signal(raw[topic], kind, known, start, troubles)
         for topic, kind in filled.items()
         for known in known_fields(kind, raw[topic].data[0])
     ]
     signals = [signal for signal in found if signal is not None]
+    if troubles and not signals:
+        raise troubles[0]
+    holes = LongHoles.of([signal.times for signal in signals])
+    signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
     if not signals:
         raise RecordingError(
             f"{path} holds no messages with positions or efforts of joints (sensor_msgs/msg/JointState, states of "
@@ -119,8 +125,10 @@ def _useful_type(bag: Bag, topic: str) -> MessageType | None:
     return kind if interfaces or known_fields(kind, None) else None
 
 
-def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) -> Signal | None:
-    """One field; None where it is empty in some messages or changes its length."""
+def _signal(
+    raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int, troubles: list[RecordingError]
+) -> Signal | None:
+    """One field; None where it is empty in some messages or changes its length, or its times cannot be told."""
     try:
         columns = read_columns(raw, kind, known.path)
     except RecordingError:
@@ -136,11 +144,14 @@ def _signal(raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int) 
 
     def signal(samples: TimedSamples, sent: Signal | None = None) -> Signal:
         times = (samples.stamps - start_ns) / 1e9
-        return Signal(raw.name, kind.name, known.path, names, times, samples.values, stamped, known.quantity, sent)
+        later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
+        values = samples.values[later]
+        return Signal(raw.name, kind.name, known.path, names, times[later], values, stamped, known.quantity, sent)
 
     try:
         samples = tidy_samples(raw.name, everything, stamped, sensor=known.quantity in MEASURED)
         plain = tidy_samples(raw.name, everything, stamped, sensor=False)
-    except RecordingError:  # what nobody can tell the time of is no use; a robot file may still need other topics
+    except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
+        troubles.append(err)
         return None
     return signal(samples, signal(plain) if len(plain) > len(samples) else None)

@@ -152,6 +152,8 @@ def _with_source(
     lagged, robot = result.lagged, result.robot
     try:
         recording = read_recording(args.bag, robot)
+        if recording.shortened:
+            return replace(result, no_agreement="behind a long hole in the recording the estimator begins anew")
         later = arrivals.seconds_later(recording)
         found = batch_agreement(robot, recording, lagged.times, lagged.mean, lagged.sigma, later)
     except (RecordingError, SolveError) as err:

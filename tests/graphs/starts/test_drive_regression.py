@@ -126,6 +126,9 @@ def test_clocks_that_share_no_time_are_said(streams):
     late = replace(command, times=command.times + 1000.0)
     with pytest.raises(RecordingError, match=r"commands \(1000\.000 to 1007\.\d+ s\) do not overlap; check that their"):
         motion_cells(encoder, late, np.full(3, NOISE))
+    fast = [replace(stream, times=1e-6 * stream.times) for stream in (encoder, command)]
+    with pytest.raises(RecordingError, match=r"share only \S+e-06 s, with .* at least 0.1 s: record longer, or check"):
+        motion_cells(*fast, np.full(3, NOISE))
 
 
 @pytest.mark.parametrize("held", [True, False])
