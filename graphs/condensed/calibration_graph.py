@@ -57,7 +57,7 @@ class CalibrationGraph:
         else:
             condensed, values = CondensedGraph.of(problems, estimate)
             graph = condensed.graph
-        keys = _block_keys(estimate.calibrations) | _state_keys(problems, values)
+        keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
         return CalibrationGraph(graph, values, keys, estimate.calibrations[0])
 
     def coordinate(self, parameter: str) -> int:
@@ -147,12 +147,12 @@ class CalibrationGraph:
                 )
 
 
-def _block_keys(calibrations: Sequence[Calibration]) -> dict[str, int]:
+def _block_keys(calibrations: Sequence[Calibration], values: gtsam.Values) -> dict[str, int]:
     keys: dict[str, int] = {}
     for bag, calibration in enumerate(calibrations):
         for block in calibration.blocks:
             key = block_key(block, calibration, bag)
-            if key not in keys.values():
+            if key not in keys.values() and values.exists(key):
                 keys[block if bag == 0 else f"{block} (bag {bag + 1})"] = key
     return keys
 

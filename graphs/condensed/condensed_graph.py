@@ -77,7 +77,9 @@ class CondensedGraph:
         """
         owners = BagProblem.owners(problems)
         length = length or max(STRETCH, sum(len(p.dynamics) for p in problems) // MOST_STRETCHES)
-        blocks = tuple(block for block in start.calibrations[0].blocks if block not in hold)
+        like = start.calibrations[0]
+        # nothing is no variable: a robot may have no free parameter
+        blocks = tuple(block for block in like.blocks if block not in hold and like.block_size(block))
         values = _shared_values(start, owners, blocks)
         likes = tuple(
             extract_calibration(values, calibration, blocks, owner)

@@ -12,6 +12,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.robot_file import load_robot
 from jointscope.robots.units import of_slide
 from jointscope.tools.bags import read_recording, write_bag
+from jointscope.tools.robot_guess.other_joints import Typed
 from jointscope.tools.robot_guess.robot_guess import guess_robot
 from jointscope.tools.robot_guess.robot_text import robot_text
 from jointscope.tools.simulator import simulate
@@ -154,7 +155,7 @@ def test_mistakes_are_named(folder, before, after, message):
 
 def test_init_writes_a_unit_for_each_joint(telescope, clean, folder):
     write_bag(folder / "guess.mcap", clean, telescope)
-    text = robot_text(guess_robot(folder / "telescope.urdf", folder / "guess.mcap"), "telescope.urdf")
+    text = robot_text(guess_robot(Typed(folder / "telescope.urdf", folder / "guess.mcap")), "telescope.urdf")
     (folder / "guess.yaml").write_text(text)
     guessed = load_robot(folder / "guess.yaml")
     assert guessed.motor_encoder.source.units == ("rad", "mm")
