@@ -80,21 +80,24 @@ def custom_factor(
 
 
 def stacked_factor(factor: Factor, calibration: Calibration, bag: int = 0) -> gtsam.CustomFactor:
-    """All samples of a factor that touches no state as one; arguments as in `custom_factor`."""
+    """All samples of a factor that touches no state as one; arguments as in `custom_factor`.
+
+    It whitens itself: GTSAM takes a very small sigma, as that of a mounting that is held, for an exact constraint.
+    """
     keys = [block_key(block, calibration, bag) for block in factor.blocks]
     sigmas = np.broadcast_to(factor.sigmas, (len(factor), len(factor.rows))).ravel().copy()
 
     def error(this: gtsam.CustomFactor, values: gtsam.Values, H: list | None) -> np.ndarray:
         here = extract_calibration(values, calibration, factor.blocks, bag)
         if H is None:
-            return factor.residual((), here).ravel()
+            return factor.residual((), here).ravel() / sigmas
         linear = factor.linearize((), here)
         for i, block in enumerate(factor.blocks):
             J = linear.by_block[block]
-            H[i] = np.asfortranarray(J.reshape(-1, J.shape[2]))
-        return linear.residual.ravel()
+            H[i] = np.asfortranarray(J.reshape(len(sigmas), J.shape[2]) / sigmas[:, None])
+        return linear.residual.ravel() / sigmas
 
-    return gtsam.CustomFactor(gtsam.noiseModel.Diagonal.Sigmas(sigmas), keys, error)
+    return gtsam.CustomFactor(gtsam.noiseModel.Unit.Create(len(sigmas)), keys, error)
 
 
 def _callback(one: Factor, n_states: int, like: Calibration, bag: int) -> Callable:

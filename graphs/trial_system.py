@@ -170,7 +170,7 @@ def trial_system(segment: Segment, rows: Sequence[TrialRows], k: int) -> TrialSy
         C_kk += flat.T @ flat
         g_k += flat.T @ part.residual.ravel()
         for block, J in part.by_block.items():
-            C_pk[columns[block]] += J.reshape(-1, J.shape[2]).T @ flat
+            C_pk[columns[block]] += J.reshape(len(flat), J.shape[2]).T @ flat
         for i, J in enumerate(part.by_state):
             add_at(B, part.ticks + i, J.transpose(0, 2, 1) @ part.by_trial)
     W, info = lapack.dtbtrs(base.L, B.reshape(m * d, k), uplo="L", overwrite_b=1)
