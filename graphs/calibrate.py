@@ -130,9 +130,11 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
         raise RecordingError("no recording given; pass at least one bag")
     seen: dict[str, str] = {}
     for recording in recordings:
-        if recording.sha256 and seen.setdefault(recording.sha256, recording.path) is not recording.path:
+        before = seen.get(recording.sha256) if recording.sha256 else None
+        seen[recording.sha256] = recording.path
+        if before is not None:
             raise RecordingError(
-                f"{recording.path} is the same recording as {seen[recording.sha256]}; give every recording once, "
+                f"{recording.path} is the same recording as {before}; give every recording once, "
                 "or its samples count twice"
             )
     notices = [notice for recording in recordings for notice in screen(recording, robot)]

@@ -95,6 +95,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         document=document,
         controller=controller,
     )
+    robot = replace(robot, held_at_mean=_held_at_mean(top, locked))
     robot = with_effects(robot, top.texts("effects", ()))
     robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
@@ -143,6 +144,10 @@ def read_document(path: Path) -> Any:
     except UnicodeDecodeError as err:
         raise RobotError(f"{path} is not a robot file: it is not text; a robot comes first, then the bag") from err
     except YAMLError as err:
+        if path.suffix == ".urdf" or "<robot" in path.read_text(encoding="utf-8")[:2000]:
+            raise RobotError(
+                f"{path.name} is a URDF and no robot file; make one with: jointscope init {path} BAG -o ROBOT.yaml"
+            ) from err
         raise RobotError(f"{path.name} is not YAML: {_yaml_trouble(err)}") from err
     return document
 
@@ -211,6 +216,17 @@ def _rigid_joints(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
     if unknown:
         raise RobotError(f"{section.place}.rigid_joints: no joint {unknown[0]!r}{did_you_mean(unknown[0], joints)}")
     return rigid
+
+
+def _held_at_mean(top: Section, locked: dict[str, float]) -> tuple[str, ...]:
+    """Joints that the user wants to be held although they move."""
+    joints = top.texts("held_at_mean", ())
+    unknown = [joint for joint in joints if joint not in locked]
+    if unknown:
+        raise RobotError(
+            f"{top.place}: held_at_mean: {unknown[0]!r} is not in `locked`{did_you_mean(unknown[0], [*locked])}"
+        )
+    return joints
 
 
 def _locked(section: Section) -> dict[str, float]:

@@ -21,6 +21,7 @@ from typing import Any
 import jointscope
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.outside_modules import trouble_with_modules
+from jointscope.tools.protected_files import check_protected
 
 VERBS = Path(__file__).parent / "verbs"
 TRACEBACK = "JOINTSCOPE_TRACEBACK"
@@ -49,6 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal without ± still shows the number
     try:
         args = _parser(arguments).parse_args(arguments)
+        check_protected(args)
         code = int(args.run(args))
         sys.stdout.flush()  # a full disk or a closed pipe shows here, not when Python shuts down
         return code

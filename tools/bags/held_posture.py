@@ -55,9 +55,18 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     units = {joint: "m" if robot.tree.is_slide(joint) else "rad" for joint in middle}
     spans = {joint: abs(high[joint] - low[joint]) for joint in middle}
     moving = {joint: (spans[joint], units[joint]) for joint in middle if spans[joint] > STILL[units[joint]]}
-    if moving:
-        _refuse(moving, robot, bag)
-    return middle, [_notice(middle, units, robot)]
+    on_word = {joint: size for joint, size in moving.items() if joint in robot.held_at_mean}
+    if len(moving) > len(on_word):
+        _refuse({joint: size for joint, size in moving.items() if joint not in on_word}, robot, bag)
+    notices = [_notice(middle, units, robot)]
+    if on_word:
+        said = ", ".join(f"{joint} moves by {span:.2g} {unit}" for joint, (span, unit) in on_word.items())
+        text = (
+            f"{said}, and is held at its mean on the word of the robot file (`held_at_mean`): values of joints that feel "
+            "it are wrong by that"
+        )
+        notices.append(Notice("motor_encoder", "unit", len(on_word), text))
+    return middle, notices
 
 
 def _other_names(found: Sequence[MessageParts], robot: Robot) -> dict[str, str]:

@@ -28,6 +28,7 @@ HELD = 0.7  # a sigma of more than this share of the prior's tells that the data
 EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
 MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
+UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -153,12 +154,26 @@ def _even(result: CalibrationResult) -> Check:
 
 def _determined(result: CalibrationResult) -> Check:
     name = "Every parameter determined by the motion"
+    open_by = _typically_open(result)
+    if open_by > UNDETERMINED:
+        return Check(
+            "bad",
+            name,
+            f"Typical values are only known to ±{significant(100 * open_by, 2)} %: the recording tells their ratios at "
+            "best. Hold one that you know with `fixed: true` in the robot file, or record more.",
+        )
     weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]
     if weak:
         return Check("warn" if weak[0].sigma > WEAK else "info", name, weak[0].text)
     if result.weak_directions:
         return Check("info", name, f"All dynamic parameters are, but: {result.weak_directions[0].text}")
     return Check("good", name, "No combination of parameters is weakly determined.")
+
+
+def _typically_open(result: CalibrationResult) -> float:
+    """Median relative sigma of the dynamic parameters."""
+    free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit != "s" and p.value]
+    return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
 
 
 def _held(result: CalibrationResult) -> Check:

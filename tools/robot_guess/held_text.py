@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from jointscope.tools.robot_guess.other_joints import NOT_THERE, HeldJoint
-from jointscope.tools.robot_guess.robot_line import line, plain
+from jointscope.tools.robot_guess.robot_line import as_list, line, plain
 
 
 def held_lines(held: Sequence[HeldJoint]) -> list[str]:
@@ -14,7 +14,9 @@ def held_lines(held: Sequence[HeldJoint]) -> list[str]:
     if not held:
         return []
     lines = [line("locked:", "other joints that matter, [rad] or [m]")]
-    return lines + [line(f"{plain(h.joint)}: {_position(h.position)}", h.reason, False, 2) for h in held]
+    lines += [line(f"{plain(h.joint)}: {_position(h.position)}", h.reason, False, 2) for h in held]
+    on_word = [h.joint for h in held if h.on_word]
+    return lines + [line(f"held_at_mean: {as_list(on_word)}", "these move; held on your word")] * bool(on_word)
 
 
 def locked_line(held: Sequence[HeldJoint]) -> str:

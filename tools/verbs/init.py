@@ -56,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
     from jointscope.tools.robot_guess.drive_table import drive_content, drive_table
+    from jointscope.tools.robot_guess.drive_values import EXPLAINED
     from jointscope.tools.robot_guess.held_text import locked_line
     from jointscope.tools.robot_guess.other_joints import Typed
     from jointscope.tools.robot_guess.robot_guess import guess_robot
@@ -89,9 +90,15 @@ def run(args: argparse.Namespace) -> int:
     verdict = "can" if description.usable else "cannot"
     reason = "" if description.usable else f": {description.problem}"
     print(f"\nWrote {args.output}; the recording {verdict} be used with it{reason}")
+    if not description.usable:
+        return 0
+    poor = [joint for joint, drive in zip(guess.roles.joints, guess.drives, strict=True) if drive.explained < EXPLAINED]
+    if poor and not guess.free_links:
+        lost = ", ".join(poor)
+        print(f"The regression does not explain {lost} (table above): something is wrong there; look at it first.")
     calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
-    print("`jointscope discover` with --holdout-share 0.33 and the same arguments finds what the model lacks.")
+    print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {calibrated}")
     return 0
 
 
