@@ -62,8 +62,8 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     if on_word:
         said = ", ".join(f"{joint} moves by {span:.2g} {unit}" for joint, (span, unit) in on_word.items())
         text = (
-            f"{said}, and is held at its mean on the word of the robot file (`held_at_mean`): values of joints that feel "
-            "it are wrong by that"
+            f"{said}, and is held at its mean on the word of the robot file (`held_at_mean`): values of joints that "
+            "feel it are wrong by that"
         )
         notices.append(Notice("motor_encoder", "unit", len(on_word), text))
     return middle, notices
