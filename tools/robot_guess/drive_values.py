@@ -35,6 +35,7 @@ TOLD = 2.0  # [sigma] above zero from which a value is one
 SMALLEST = 0.02  # of the rms torque that a start value explains at least: it must be above zero
 MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least where springs hide it, or nothing tells
 HEAVY = 0.25  # of the link's inertia; as much below zero the rotor's may be where masses are wrong
+TRUSTED = 0.95  # of the driving torque that must be explained before a unit is concluded from its constant
 EXPLAINED = 0.9  # of the driving torque that must be explained before anything is concluded from it
 SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
 SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
@@ -179,8 +180,15 @@ def _direction(pull: Value, gain: Value | None = None) -> tuple[float, float]:
 
 
 def _gain(equation: DriveEquation, sign: float) -> Value | None:
-    gain = equation.solve().get(GAIN)
-    return None if gain is None else Value(sign * gain.value, gain.sigma)
+    """Torque per unit of the command; None where too much torque stays unexplained to conclude a unit from it."""
+    values = equation.solve()
+    gain = values.get(GAIN)
+    if gain is None:
+        return None
+    missing = equation.missing({name: value.value for name, value in values.items()})
+    if missing**2 > (1.0 - TRUSTED) * equation.torque(gain.value) ** 2:
+        return None
+    return Value(sign * gain.value, gain.sigma)
 
 
 def _drive(
