@@ -33,7 +33,7 @@ def check_protected(args: argparse.Namespace) -> None:
             if urdf is not None and target.resolve() == urdf.resolve():
                 raise JointscopeError(f"cannot write {target}: it is the URDF of {robot}; give it another name")
             if option in RESULTS and target.resolve() == robot.resolve():
-                raise JointscopeError(f"cannot write {target}: it is the robot file; give the {option} another name")
+                raise JointscopeError(f"cannot write {target}: it is also an input; give it another name")
 
 
 def _robot_files(args: argparse.Namespace) -> Iterator[Path]:

@@ -39,7 +39,7 @@ def test_the_urdf_of_a_robot_is_not_overwritten(own, arguments, capsys):
 
 def test_a_robot_file_is_not_replaced_by_json(own, capsys):
     assert main(["info", "a.mcap", "--robot", "doggy.yaml", "--json", "doggy.yaml"]) == 1
-    assert "cannot write doggy.yaml: it is the robot file; give the json another name" in capsys.readouterr().err
+    assert "cannot write doggy.yaml: it is also an input; give it another name" in capsys.readouterr().err
 
 
 def test_a_urdf_in_the_place_of_a_robot_file_is_told_what_to_type(own, capsys):
