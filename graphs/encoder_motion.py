@@ -43,9 +43,19 @@ def encoder_motion(stream: Stream, encoder: MotorEncoder | LinkEncoder, ticks: A
 
 def hides_reversals(stream: Stream, encoder: MotorEncoder | LinkEncoder) -> bool:
     """Whether slopes over SMOOTHING, or over three samples where these take longer, are lost in noise."""
-    period = float(np.median(np.diff(stream.times)))
+    return bool(np.any(slope_noise(stream.times, encoder.sigmas) > ROUGH))
+
+
+def slope_noise(times: Array, sigmas: Array) -> Array:
+    """Noise of slopes over SMOOTHING, or over three samples where these take longer, shape (n,) [rad/s].
+
+    Args:
+        times: stamps of the encoder, shape (m,) [s].
+        sigmas: of the encoder, shape (n,) [rad].
+    """
+    period = float(np.median(np.diff(times)))
     window = max(SMOOTHING, 2.0 * period)
-    return bool(np.any(encoder.sigmas * np.sqrt(12.0 * period / window) / window > ROUGH))
+    return np.asarray(sigmas * np.sqrt(12.0 * period / window) / window)
 
 
 def smooth_slope(values: Array, ticks: Array) -> Array:

@@ -118,7 +118,7 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
         "deflection_rate": v_link - v_motor,
         "drive": robot.command_volts * u,
         "minus_v_motor": -v_motor,
-        "minus_sign": -np.tanh(robot.choices.friction_sharpness * v_friction),
+        "minus_sign": -np.tanh(robot.friction_sharpness() * v_friction),
         "minus_a_motor": -np.gradient(v_motor, ticks, axis=0),
     }
     band = butter(2, [BAND[0], min(BAND[1], 0.4 / h)], btype="band", fs=1.0 / h, output="sos")

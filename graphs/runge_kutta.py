@@ -63,7 +63,7 @@ class StepCuts:
         self._columns = np.unique(np.r_[layout.joint_v, layout.motor_v]).astype(np.intp)
         # where the slope of tanh has fallen so far that coarse steps do
         fallen = max(h * steep / self.coarse / FLAT, 1.0)
-        self._band = float(np.arccosh(np.sqrt(fallen))) / robot.choices.friction_sharpness
+        self._band = float(np.arccosh(np.sqrt(fallen))) / float(np.min(robot.friction_sharpness()))
 
     def fine_ones(self, x: Array, rate: Array, h: Array | float) -> NDArray[np.bool_]:
         """Whether states need fine steps, shape (...,), for states and their rates of shape (..., d)."""

@@ -133,7 +133,7 @@ def blunt_sharpness(robot: Robot, recordings: Sequence[Recording]) -> tuple[floa
     encoder = robot.motor_encoder
     if not any(hides_reversals(recording.streams[encoder.name], encoder) for recording in recordings):
         return ()
-    return tuple(sharpness for sharpness in BLUNT if sharpness < robot.choices.friction_sharpness)
+    return tuple(sharpness for sharpness in BLUNT if sharpness < float(np.min(robot.friction_sharpness())))
 
 
 def blunted(problem: BagProblem, sharpness: float) -> BagProblem:

@@ -7,7 +7,7 @@ depend on is found once, when the robot is built, and costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -34,7 +34,7 @@ class EffectTorques:
         joints: names of the joints.
         layout: of the state.
         names: names of the free parameters.
-        sharpness: of the base model's friction [s/rad].
+        sharpness: of the base model's friction for given parameters, shape (n,) [s/rad].
         weight: what rigid joints carry, for laws that ask for their load.
     """
 
@@ -44,7 +44,7 @@ class EffectTorques:
         joints: tuple[str, ...],
         layout: StateLayout,
         names: tuple[str, ...],
-        sharpness: float,
+        sharpness: Callable[[Mapping[str, float]], Array],
         weight: CarriedWeight,
     ):
         self._layout, self._names, self._joints, self._sharpness = layout, names, joints, sharpness
@@ -63,7 +63,7 @@ class EffectTorques:
             values: all parameters of the robot by full name.
         """
         for law in self._local:
-            law.add(terms, x, springs, values, self._sharpness)
+            law.add(terms, x, springs, values, float(self._sharpness(values)[law.joint]))
         for here in self._global:
             self._add_global(terms, here, x, springs, values)
 
@@ -72,7 +72,7 @@ class EffectTorques:
     ) -> None:
         effect = here.effect
         assert isinstance(effect, RobotTorque)
-        signals, p = self._signals(here, x, springs), here.own(values)
+        signals, p = self._signals(here, x, springs, self._sharpness(values)), here.own(values)
         self._put(terms.value, effect.law(signals, p))
         if terms.by_state is None or terms.by_parameter is None:
             return
@@ -107,7 +107,7 @@ class EffectTorques:
         }
         return {name: columns.tolist() for name, columns in places.items()}
 
-    def _signals(self, here: EffectAt, x: Array, springs: Springs) -> RobotSignals:
+    def _signals(self, here: EffectAt, x: Array, springs: Springs, sharpness: Array) -> RobotSignals:
         layout = self._layout
         return RobotSignals(
             q_link=x[:, layout.joint_q],
@@ -118,7 +118,7 @@ class EffectTorques:
             damping=springs.damping,
             joints=self._joints,
             owner=self._joints.index(here.owner) if here.owner in self._joints else 0,
-            sharpness=self._sharpness,
+            sharpness=sharpness,
         )
 
     def _put(self, target: Array, torques: tuple[Any, Any]) -> None:

@@ -52,9 +52,8 @@ class ElasticJoints:
         self.names = parameters.names
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
         self._bearings = BearingSprings(robot.effects, layout, self.names)
-        sharpness = robot.choices.friction_sharpness
         weight = CarriedWeight(robot)
-        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, sharpness, weight)
+        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, robot.friction_sharpness, weight)
         self._elastic = list(layout.elastic_joints)
         self._own_motor = layout.motor_row[self._elastic].tolist()
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
+from jointscope.robots.robot import SHARPNESS, Robot
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,8 @@ class JointParameters:
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
         drives = ("coulomb_torque", "inertia", *robot.drive_laws)
         self._sources = {law: [robot.drive_parameter(joint, law).name for joint in robot.joints] for law in drives}
+        own = [f"{joint}.{SHARPNESS}" for joint in robot.joints]
+        self._sources[SHARPNESS] = [name if name in robot.parameters else "" for name in own]
         springs = [_spring_of(robot, joint) for joint in robot.joints]
         self._sources["stiffness"] = [stiffness for stiffness, _ in springs]
         self._sources["damping"] = [damping for _, damping in springs]

@@ -50,7 +50,7 @@ class JointLawAtOneState:
     def __init__(self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float]):
         assert isinstance(here.effect, JointTorque)
         layout, j = robot.layout, robot.joints.index(here.owner)
-        self._p, self._sharpness = here.own(values), robot.choices.friction_sharpness
+        self._p, self._sharpness = here.own(values), float(robot.friction_sharpness(values)[j])
         columns = [layout.joint_q[j], layout.joint_v[j], layout.motor_q[j], layout.motor_v[j]]
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
@@ -122,7 +122,7 @@ class CoupledLawAtOneState:
             "damping": springs.damping,
             "joints": robot.joints,
             "owner": robot.joints.index(here.owner) if here.owner in robot.joints else 0,
-            "sharpness": robot.choices.friction_sharpness,
+            "sharpness": robot.friction_sharpness(values),
         }
         k = len(self._columns)
         self._moves = 1j * STEP * np.vstack([np.zeros((1, k)), np.eye(k)])

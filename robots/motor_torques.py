@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.joint_parameters import JointParameters
-from jointscope.robots.robot import Robot
+from jointscope.robots.robot import SHARPNESS, Robot
 from jointscope.robots.torque_terms import TorqueTerms
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ class MotorTorques:
         self._volts = robot.command_volts
         self._gain, self._has_back_emf = robot.drive_gain, "k_mi" in robot.drive_laws
         self._friction_on_link = robot.choices.friction_velocity == "link"
-        self._sharpness = robot.choices.friction_sharpness
+        self._sharpness = robot.friction_sharpness
 
     def of_command(self, u: Array, values: Mapping[str, float]) -> Array:
         """Torque of commands in their SI unit, shape (m, n) [N m]."""
@@ -60,7 +60,8 @@ class MotorTorques:
         layout, parameters = self._layout, self._parameters
         mu = parameters.of(values, "coulomb_torque")
         friction_v = layout.joint_v if self._friction_on_link else layout.motor_v
-        smooth_sign = np.tanh(self._sharpness * x[:, friction_v])
+        sharpness = self._sharpness(values)
+        smooth_sign = np.tanh(sharpness * x[:, friction_v])
         k_mi = parameters.of(values, "k_mi") if self._has_back_emf else np.zeros(len(mu))
         v_motor = x[:, layout.motor_v]
         torque = -mu * smooth_sign - k_mi * v_motor
@@ -68,7 +69,9 @@ class MotorTorques:
             terms.value[:, row] += torque[:, i]
             if terms.by_state is None or terms.by_parameter is None:
                 continue
-            terms.by_state[:, row, friction_v[i]] -= mu[i] * self._sharpness * (1.0 - smooth_sign[:, i] ** 2)
+            slope = mu[i] * (1.0 - smooth_sign[:, i] ** 2)
+            terms.by_state[:, row, friction_v[i]] -= slope * sharpness[i]
+            parameters.add(terms.by_parameter, SHARPNESS, i, row, -slope * x[:, friction_v[i]])
             terms.by_state[:, row, layout.motor_v[i]] -= k_mi[i]
             parameters.add(terms.by_parameter, "coulomb_torque", i, row, -smooth_sign[:, i])
             if self._has_back_emf:

@@ -46,7 +46,7 @@ class RatesOfMany:
         springs, motors = JointSprings(layout, parameters), MotorTorques(robot, parameters)
         self._linear = linear_torques(robot, parameters, springs, motors, values).T
         self._gain = motors.of_command(np.ones((1, robot.n)), values)[0]
-        self._coulomb, self._sharpness = parameters.of(values, "coulomb_torque"), robot.choices.friction_sharpness
+        self._coulomb, self._sharpness = parameters.of(values, "coulomb_torque"), robot.friction_sharpness(values)
         self._friction = layout.joint_v if robot.choices.friction_velocity == "link" else layout.motor_v
         own = [robot.joints.index(joint) for joint in layout.motors]
         n, m = layout.n_link, layout.n_motor
@@ -111,7 +111,7 @@ class _LawOfMany:
         layout, effect = robot.layout, here.effect
         self._layout, self._effect, self._p = layout, effect, here.own(values)
         self._joint = j = robot.joints.index(here.owner) if here.owner in robot.joints else 0
-        self._joints, self._springs, self._sharpness = robot.joints, springs, robot.choices.friction_sharpness
+        self._joints, self._springs, self._sharpness = robot.joints, springs, robot.friction_sharpness(values)
         self.needs_weight = False
         if isinstance(effect, JointTorque):
             link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
@@ -156,7 +156,14 @@ class _LawOfMany:
             tau = springs.stiffness[j] * (q_link - q_motor) + springs.damping[j] * (v_link - v_motor)
         memory = x[:, layout.memory.start + self._memory] if self._memory >= 0 else 0.0
         return JointSignals(
-            q_link, v_link, q_motor, v_motor, tau, springs.stiffness[j], sharpness=self._sharpness, memory=memory
+            q_link,
+            v_link,
+            q_motor,
+            v_motor,
+            tau,
+            springs.stiffness[j],
+            sharpness=float(self._sharpness[j]),
+            memory=memory,
         )
 
     def _of_robot(self, x: Array) -> RobotSignals:

@@ -28,6 +28,8 @@ from jointscope.robots.state_layout import StateLayout
 from jointscope.robots.structured_tree import bearing_names, with_bearings
 from jointscope.robots.units import joined, of_slide
 
+SHARPNESS = "friction_sharpness"  # of a joint whose dry friction turns over as its own parameter says
+
 Array = NDArray[np.float64]
 
 
@@ -39,7 +41,7 @@ class ModelChoices:
         integrator: "euler" (eq. 31), "midpoint" or "simpson".
         coriolis: whether c(q, v) is part of the model.
         friction_velocity: "motor", or "link" as eq. (12) is printed.
-        friction_sharpness: k in tanh(k v) [s/rad].
+        friction_sharpness: k in tanh(k v) [s/rad] of joints that have no parameter of that name.
         bias_at_rest: whether gyro samples before the first command measure the bias directly (eq. 32).
         rigid_joints: joints whose link follows the motor without a spring.
         link_dynamics: "model" (equations of motion of the links), or "free": their masses are not known, and only
@@ -233,6 +235,16 @@ class Robot:
     def drive_gain(self) -> str | None:
         """Law that turns commands into torques: of a voltage, of a current; None where the command is a torque."""
         return {"N m": None, "A": "torque_constant"}.get(self.command.unit, "k_pwm")
+
+    def friction_sharpness(self, values: Mapping[str, float] | None = None) -> Array:
+        """Sharpness k in tanh(k v) of the dry friction of every joint, shape (n,) [s/rad, of joints that slide s/m].
+
+        Args:
+            values: parameters by full name that count before the robot's own.
+        """
+        named = {name: parameter.value for name, parameter in self.parameters.items()} | dict(values or {})
+        usual = self.choices.friction_sharpness
+        return np.array([named.get(f"{joint}.{SHARPNESS}", usual) for joint in self.joints])
 
     @property
     def drive_laws(self) -> tuple[str, ...]:

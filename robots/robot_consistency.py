@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.needed_spring import needed_spring
-from jointscope.robots.robot import Robot
+from jointscope.robots.robot import SHARPNESS, Robot
 from jointscope.robots.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
 
 DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "torque_constant": "N m/A", "inertia": "kg m2"}
 JOINT_PARAMETERS = {"coulomb_torque": "N m", "stiffness": "N m/rad", "damping": "N m s/rad"}
+MAY_HAVE = {SHARPNESS: "s/rad"}  # beside what the model says for all joints
 
 
 def check_robot(robot: Robot) -> None:
@@ -145,7 +146,7 @@ def _check_parameters(robot: Robot, place: str) -> None:
     turning = next((joint for joint in robot.joints if joint not in robot.tree.slides), robot.joints[0])
     units = {f"motor.{name}": robot.unit_at(turning, unit) for name, unit in DRIVE_PARAMETERS.items()}
     for joint in robot.joints:
-        for name, unit in (DRIVE_PARAMETERS | JOINT_PARAMETERS).items():
+        for name, unit in (DRIVE_PARAMETERS | JOINT_PARAMETERS | MAY_HAVE).items():
             units[f"{joint}.{name}"] = robot.unit_at(joint, unit)
     of_effects = {
         here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_at(robot, here.owner)

@@ -36,7 +36,7 @@ class StateRates:
     Attributes:
         layout: of the state.
         friction_columns: columns of the velocities that the friction of each joint depends on, shape (n,).
-        sharpness: k of the friction law [s/rad].
+        sharpness: k of the friction law of each joint, shape (n,) [s/rad].
     """
 
     def __init__(self, robot: Robot, values: Mapping[str, float] | None = None):
@@ -52,7 +52,7 @@ class StateRates:
         self._linear = linear_torques(robot, parameters, springs, motors, named)
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
         self._coulomb = parameters.of(named, "coulomb_torque")
-        self.sharpness = robot.choices.friction_sharpness
+        self.sharpness = robot.friction_sharpness(named)
         on_link = robot.choices.friction_velocity == "link"
         self.friction_columns = layout.joint_v if on_link else layout.motor_v
         self._rows = layout.motor_row

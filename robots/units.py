@@ -36,6 +36,7 @@ OF_SLIDES: dict[str, str] = {
     "N m/rad^3": "N/m^3",
     "N m s/rad": "N s/m",
     "kg m2": "kg",
+    "s/rad": "s/m",
 }
 """Units of a turning joint's quantities and what they are for a sliding one; all others are the same."""
 

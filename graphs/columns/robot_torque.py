@@ -24,7 +24,7 @@ def robot_torque_columns(trial: Trial, s: TrialSignals) -> list[Column]:
         damping=s.damping,
         joints=joints,
         owner=joints.index(trial.here.owner) if trial.here.owner in joints else 0,
-        sharpness=s.robot.choices.friction_sharpness,
+        sharpness=s.robot.friction_sharpness(),
     )
     p, found = null_values(trial), []
     for size in trial.sizes:

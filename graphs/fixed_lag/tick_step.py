@@ -56,8 +56,9 @@ class RatesAt:
 
     def near(self, model: StateRates, x: Array, torque: Array) -> RatesAt:
         """At a state so near that derivatives stay; evaluated anew where friction says that it is not."""
-        columns, k = model.friction_columns, model.sharpness
-        for before, after in zip(self.x[columns].tolist(), x[columns].tolist(), strict=True):
+        columns = model.friction_columns
+        speeds = zip(model.sharpness.tolist(), self.x[columns].tolist(), x[columns].tolist(), strict=True)
+        for k, before, after in speeds:
             was = math.tanh(k * before)
             straight = (1.0 - was * was) * k * (after - before)
             if abs(math.tanh(k * after) - was - straight) > SAME_FRICTION:
@@ -116,7 +117,7 @@ def take_step(
         inverse = lapack.dgesv(R1, eye)[2]
         change = inverse @ r
         x1 = x1 - change
-        if np.abs(change[columns]).max() * model.sharpness < SMALL_TURN:
+        if np.abs(model.sharpness * change[columns]).max() < SMALL_TURN:
             break
     return TickStep(x1, R0, R1, inverse, h * start.C, end)
 

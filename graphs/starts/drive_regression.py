@@ -137,7 +137,7 @@ def drive_equations(
     sigmas: Array,
     *,
     held: bool = True,
-    sharpness: float = 1e4,
+    sharpness: float | Array = 1e4,
 ) -> list[DriveEquation]:
     """The equation of each joint, each with the windows that suit it.
 
@@ -146,7 +146,7 @@ def drive_equations(
         recordings: what drove the joints, and how they moved.
         sigmas: noise of the encoders, shape (n,) [rad].
         held: whether a command acts until the next one.
-        sharpness: k in tanh(k v), which stands for sign(v) [s/rad].
+        sharpness: k in tanh(k v), which stands for sign(v), of all joints or of each, shape (n,) [s/rad].
     """
     found: list[dict[float, DriveEquation]] = []
     for encoder, command, left_out in recordings:
@@ -166,7 +166,7 @@ def load_of(tree: RigidTree, cells: MotionCells) -> Array:
 
 
 def equations_by_width(
-    cells: MotionCells, load: Array, M: Array, sigmas: Array, sharpness: float
+    cells: MotionCells, load: Array, M: Array, sigmas: Array, sharpness: float | Array
 ) -> list[dict[float, DriveEquation]]:
     """For each joint its equation by width of the windows [s].
 

@@ -38,7 +38,7 @@ def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Ro
         return robot
     tree = robot.in_posture(recordings[0].posture).tree
     told = acts_until_the_next(
-        tree, driven_joints(robot, recordings), robot.motor_encoder.sigmas, robot.choices.friction_sharpness
+        tree, driven_joints(robot, recordings), robot.motor_encoder.sigmas, robot.friction_sharpness()
     )
     if told is None or told == robot.command_held:
         return robot
@@ -46,7 +46,7 @@ def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Ro
 
 
 def acts_until_the_next(
-    tree: RigidTree, recordings: Sequence[Driven], sigmas: Array, sharpness: float = 1e4
+    tree: RigidTree, recordings: Sequence[Driven], sigmas: Array, sharpness: float | Array = 1e4
 ) -> bool | None:
     """Whether the motion says that a drive signal is held; None where it does not tell.
 
@@ -54,7 +54,7 @@ def acts_until_the_next(
         tree: rigid bodies with masses.
         recordings: what drove the joints, and how they moved.
         sigmas: noise of the encoders, shape (n,) [rad].
-        sharpness: k in tanh(k v), which stands for sign(v) [s/rad].
+        sharpness: k in tanh(k v), which stands for sign(v), of all joints or of each, shape (n,) [s/rad].
     """
     held, linear = (
         [_missing(equation) for equation in drive_equations(tree, recordings, sigmas, held=way, sharpness=sharpness)]

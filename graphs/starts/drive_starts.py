@@ -66,7 +66,7 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
 
 def equations_of(robot: Robot, recordings: Sequence[Recording], delay: float = 0.0) -> list[DriveEquation]:
     """The windowed equation of every joint; commands act a time `delay` [s] after their stamps."""
-    held, sharpness, sigmas = robot.command_held, robot.choices.friction_sharpness, robot.motor_encoder.sigmas
+    held, sharpness, sigmas = robot.command_held, robot.friction_sharpness(), robot.motor_encoder.sigmas
     return drive_equations(robot.tree, driven_joints(robot, recordings, delay), sigmas, held=held, sharpness=sharpness)
 
 

@@ -54,7 +54,7 @@ class WindowedSums:
         return np.asarray(self.products.sum(axis=0))
 
 
-def joint_signals(cells: MotionCells, load: Array, sharpness: float) -> Array:
+def joint_signals(cells: MotionCells, load: Array, sharpness: float | Array) -> Array:
     """The signals of all cells and joints, shape (m, n, 5).
 
     Args:
@@ -114,7 +114,7 @@ def _noise_gains(period: float, width: float) -> tuple[float, float]:
     return period * omega**2 / (2.0 * width), period * omega**4 / (2.0 * width)
 
 
-def _mean_sign(v: Array, sharpness: float) -> Array:
+def _mean_sign(v: Array, sharpness: float | Array) -> Array:
     """Mean of tanh(k v) over cells in which v goes from one edge's value to the next one's, shape (m, n)."""
     x = sharpness * v
     log_cosh = np.abs(x) + np.log1p(np.exp(-2.0 * np.abs(x)))

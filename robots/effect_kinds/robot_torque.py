@@ -20,7 +20,7 @@ class RobotSignals:
         stiffness, damping: K [N m/rad] and D [N m s/rad] of every joint, shape (n,).
         joints: names of the joints.
         owner: index of the owner.
-        sharpness: k of the base model's friction law [s/rad].
+        sharpness: k of the base model's friction law of every joint, shape (n,) [s/rad].
     """
 
     q_link: Any
@@ -31,7 +31,7 @@ class RobotSignals:
     damping: Any
     joints: tuple[str, ...]
     owner: int
-    sharpness: float
+    sharpness: Any
 
 
 @dataclass(frozen=True, kw_only=True)

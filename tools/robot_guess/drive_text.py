@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.robot import SHARPNESS
 from jointscope.robots.units import of_slide
 from jointscope.tools.robot_guess.drive_values import EXPLAINED, DriveValues
 from jointscope.tools.robot_guess.robot_guess import SUPPLY, RobotGuess
@@ -100,6 +101,8 @@ def _drive_rows(unit: str, drive: DriveValues) -> list[_Row]:
     """Parameters of a drive; the gain of a duty cycle is per volt."""
     volts = SUPPLY if unit == "duty" else 1.0
     rows = [_row("coulomb_torque", "N m", drive, "dry"), _row("inertia", "kg m2", drive, "inertia")]
+    if drive.sharpness is not None:
+        rows.append(_Row(SHARPNESS, drive.sharpness, "s/rad", "k in tanh(k v) of dry friction", False))
     if unit == "A":
         rows.append(_row("torque_constant", "N m/A", drive, "gain"))
     if unit in VISCOUS_EFFECT:

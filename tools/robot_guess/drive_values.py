@@ -7,15 +7,17 @@ What the regression cannot tell from zero gets a small start above zero, and is 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.encoder_motion import slope_noise
 from jointscope.graphs.starts.drive_regression import (
     GAIN,
     INERTIA,
     PLACES,
+    VISCOUS,
     DriveEquation,
     Value,
     best_width,
@@ -38,6 +40,9 @@ HEAVY = 0.25  # of the link's inertia; as much below zero the rotor's may be whe
 TRUSTED = 0.95  # of the driving torque that must be explained before a unit is concluded from its constant
 EXPLAINED = 0.9  # of the driving torque that must be explained before anything is concluded from it
 SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
+USUAL = 0.005  # [rad/s] within which the dry friction of a joint that turns is thought to turn over
+MATTERS = 0.02  # of the rms speed, from which that is a good part of the motion
+TURNS_OVER = 0.1  # of the rms speed at most, for a start
 SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
 
 
@@ -53,6 +58,8 @@ class DriveValues:
         confidence: how far the sign is from the other one [sigma].
         link: inertia of everything behind the joint at the first posture [kg m2]; 1 where masses are not known.
         unknown_scale: whether all values are relative to a guessed rotor inertia, as the recording gives ratios only.
+        sharpness: k in tanh(k v) of dry friction, from which a calibration may look for it [s/rad]; None where the
+            encoder does not show how the joint turns over, or the joint is so fast that it does not matter.
     """
 
     start: Mapping[str, float]
@@ -62,6 +69,7 @@ class DriveValues:
     confidence: float = 0.0
     link: float = 1.0
     unknown_scale: bool = False
+    sharpness: float | None = None
 
     def is_lost(self, name: str) -> bool:
         """Whether the regression cannot tell a value from zero."""
@@ -132,7 +140,22 @@ def find_drives(
         _drive(equation, known, direction, link, joint in elastic)
         for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
     ]
+    shown = _turn_over(tree, equations, slope_noise(encoder.times, sigmas), elastic)
+    drives = [replace(drive, sharpness=k) for drive, k in zip(drives, shown, strict=True)]
     return Drives(unit, drives, tree.gravity, reason, held)
+
+
+def _turn_over(
+    tree: RigidTree, equations: Sequence[DriveEquation], noise: Array, elastic: Sequence[str]
+) -> list[float | None]:
+    """First guess of k in tanh(k v) where it matters and can be seen; see `DriveValues.sharpness`."""
+    found: list[float | None] = []
+    for joint, equation, rough in zip(tree.joints, equations, noise.tolist(), strict=True):
+        speed = float(equation.rms[PLACES[VISCOUS]])
+        width = min(TURNS_OVER * speed, USUAL)
+        matters = joint in tree.slides or speed < USUAL / MATTERS
+        found.append(1.0 / width if matters and joint not in elastic and 0.0 <= rough < width else None)
+    return found
 
 
 def _needs_more_than_newton_metres(equation: DriveEquation, sign: float, link: float) -> bool:

@@ -222,14 +222,15 @@ class Engine:
 
     def _smooth_friction(self, robot: Robot) -> Callable[[], None]:
         """Torque -mu tanh(sharpness v) on each rotor; scalar code, because it runs four times per fine step."""
-        sharpness, tanh = robot.choices.friction_sharpness, math.tanh
+        tanh = math.tanh
         passive, qvel = self.data.qfrc_passive, self.data.qvel
         rotors = [
-            (self.address.motor[joint], robot.parameter(f"{joint}.coulomb_torque").value) for joint in robot.joints
+            (self.address.motor[joint], robot.parameter(f"{joint}.coulomb_torque").value, float(sharpness))
+            for joint, sharpness in zip(robot.joints, robot.friction_sharpness(), strict=True)
         ]
 
         def torque() -> None:
-            for dof, mu in rotors:
+            for dof, mu, sharpness in rotors:
                 passive[dof] -= mu * tanh(sharpness * qvel[dof])
 
         return torque
