@@ -37,7 +37,8 @@ def weak_directions(
         covariance: of the shared values, shape (s, s).
     """
     columns = shared.columns[DYNAMICS]
-    found = _weak_dynamics(calibration, covariance[columns, columns])
+    size = _sizes(robot, calibration)
+    found = _weak_dynamics(calibration, covariance[columns, columns] / np.outer(size, size))
     for gyro in robot.gyros:
         columns = shared.columns[rotation_block(gyro.name)]
         names = [f"{gyro.name}.R_imu_body.{axis}" for axis in AXES]
@@ -46,6 +47,15 @@ def weak_directions(
         names = [f"{gyro.name}.bias.{axis}" for axis in AXES]
         found += _weak_block(names, covariance[columns, columns], gyro.bias_prior_sigma, "", "rad/s")
     return tuple(found)
+
+
+def _sizes(robot: Robot, calibration: Calibration) -> Array:
+    """What the standard deviations are relative to, shape (p,): one for logarithms, and for small values.
+
+    Parameters of any sign are estimated in their unit; a large one is determined well if it is so for its size.
+    """
+    signed = np.array([not robot.parameters[name].positive for name in calibration.names], dtype=bool)
+    return np.where(signed, np.maximum(np.abs(calibration.values), 1.0), 1.0)
 
 
 def _weak_dynamics(calibration: Calibration, covariance: Array) -> list[WeakDirection]:

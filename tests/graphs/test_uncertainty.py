@@ -12,6 +12,7 @@ from jointscope.graphs.prediction import Predictor
 from jointscope.graphs.robust_sigma import BlockScores, inflation
 from jointscope.graphs.shared_layout import SharedLayout
 from jointscope.graphs.timeline import Timeline
+from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.recording import Recording, Stream
 
 
@@ -35,6 +36,19 @@ def test_opposite_changes_trade_off(doggy):
     direction[[6, 9]] = 0.1, -0.1
     (found,) = weak_directions(doggy, calibration, shared, np.outer(direction, direction))
     assert "joint1.stiffness and joint1.damping trade off against each other, +-10 %" in found.text
+
+def test_a_large_value_of_any_sign_is_as_weak_as_its_relative_sigma(doggy):
+    robot = add_effect(doggy, "motor_viscous@joint1")
+    name = "joint1.motor_viscous.coefficient"
+    robot = robot.with_values({name: 300.0})
+    calibration = Calibration.of(robot)
+    shared = SharedLayout.of(calibration, 1)
+    k = calibration.names.index(name)
+    for sigma, weak in ((0.06, []), (9.0, [f"{name} is weakly determined, +-3 %"])):
+        covariance = np.zeros((shared.size, shared.size))
+        covariance[k, k] = sigma**2
+        assert [d.text for d in weak_directions(robot, calibration, shared, covariance)] == weak
+
 
 
 def _parts(residual, design):
