@@ -37,6 +37,7 @@ def test_opposite_changes_trade_off(doggy):
     (found,) = weak_directions(doggy, calibration, shared, np.outer(direction, direction))
     assert "joint1.stiffness and joint1.damping trade off against each other, +-10 %" in found.text
 
+
 def test_a_large_value_of_any_sign_is_as_weak_as_its_relative_sigma(doggy):
     robot = add_effect(doggy, "motor_viscous@joint1")
     name = "joint1.motor_viscous.coefficient"
@@ -48,7 +49,6 @@ def test_a_large_value_of_any_sign_is_as_weak_as_its_relative_sigma(doggy):
         covariance = np.zeros((shared.size, shared.size))
         covariance[k, k] = sigma**2
         assert [d.text for d in weak_directions(robot, calibration, shared, covariance)] == weak
-
 
 
 def _parts(residual, design):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How sharply dry friction turns over is found where a joint is slow, and spoils the other values where it is assumed."""
+"""How sharply dry friction turns over: found where a joint is slow; assumed, it spoils the other values."""
 
 from __future__ import annotations
 
