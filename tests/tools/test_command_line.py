@@ -349,3 +349,23 @@ def test_robots_lists_and_prints_files_that_work_elsewhere(capsys):
     assert main(["robots", "doggy"]) == 0
     Path("mine.yaml").write_text(capsys.readouterr().out)
     assert load_robot("mine.yaml").name == "doggy"
+
+
+def test_a_missing_urdf_and_files_in_the_wrong_order_are_said_with_the_command(capsys):
+    Path("arm.urdf").write_text("<robot/>")
+    Path("a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    Path("arm.yaml").write_text("name: arm")
+    for told, arguments in (
+        ("there is no URDF arn.urdf; did you mean 'arm.urdf'?", ("init", "arn.urdf", "a.mcap", "-o", "x.yaml")),
+        (
+            "a.mcap is no URDF; the URDF comes first: jointscope init arm.urdf a.mcap -o ROBOT.yaml",
+            ("init", "a.mcap", "arm.urdf", "-o", "x.yaml"),
+        ),
+        (
+            "arm.yaml is a robot file and no recording; the recording comes first: "
+            "jointscope info a.mcap --robot arm.yaml",
+            ("info", "arm.yaml", "--robot", "a.mcap"),
+        ),
+    ):
+        assert complaint(capsys, *arguments) == told
+    assert files() == {"arm.urdf", "a.mcap", "arm.yaml"}

@@ -37,9 +37,16 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
     check_outputs([args.json], inputs=[args.bag, *args.effects])
+    from jointscope.robots.errors import RecordingError
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags.describe_bag import describe_bag
 
+    if args.bag.suffix in (".yaml", ".yml"):
+        recording = args.robot if args.robot and Path(args.robot).suffix in (".mcap", ".db3", ".bag") else "BAG"
+        raise RecordingError(
+            f"{args.bag} is a robot file and no recording; the recording comes first: "
+            f"jointscope info {recording} --robot {args.bag}"
+        )
     load_user_effects(args.effects)
     robot = load_robot(args.robot) if args.robot else None
     with progress_bar() as progress:

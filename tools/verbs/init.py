@@ -13,6 +13,7 @@ from jointscope.tools.whole_file import check_outputs, whole_file, write_json
 if TYPE_CHECKING:
     from jointscope.tools.robot_guess.named_signal import Wish
 
+BAGS = (".mcap", ".db3", ".bag")
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
   jointscope info moves.mcap --robot arm.yaml
@@ -62,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.robot_guess.robot_guess import guess_robot
     from jointscope.tools.robot_guess.robot_text import guesses, robot_text
 
+    _check_order(args.urdf, args.bag)
     typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name)
     with progress_bar() as progress:
         guess = guess_robot(typed, reading(args.bag, progress))
@@ -81,7 +83,10 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
     held = {h.joint for h in guess.held}
-    print("\n".join(f"  {line}" for line in guesses(text) if line.partition(":")[0].strip("'") not in held))
+    for line in guesses(text):
+        key, _, rest = line.partition(":")
+        if key.strip("'") not in held and not rest.lstrip().startswith("("):  # a section of its own has no value
+            print(f"  {_plain(line)}")
     print("\n".join(drive_table(guess)))
     lines = [*([locked_line(guess.held)] if held else []), *guess.following]
     lines += [f"not used: {text}" for text in guess.left_out]
@@ -100,6 +105,26 @@ def run(args: argparse.Namespace) -> int:
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
     print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {calibrated}")
     return 0
+
+
+def _check_order(urdf: Path, bag: Path) -> None:
+    """Says at once that a URDF is missing, or that bag and URDF have changed places."""
+    from jointscope.robots.errors import RobotError
+    from jointscope.robots.yaml_section import did_you_mean
+
+    if bag.suffix == ".urdf" or urdf.suffix in BAGS:
+        raise RobotError(f"{urdf} is no URDF; the URDF comes first: jointscope init {bag} {urdf} -o ROBOT.yaml")
+    if not urdf.is_file():
+        others = sorted(path.name for path in urdf.parent.glob("*.urdf")) if urdf.parent.is_dir() else []
+        raise RobotError(f"there is no URDF {urdf}{did_you_mean(urdf.name, others) if others else ''}")
+
+
+def _plain(line: str) -> str:
+    """A guess without the brackets and quotes of its file."""
+    value, bracket, reason = line.partition("  (")
+    return value.replace("['", "").replace("']", "").replace("', '", ", ").replace("[", "").replace("]", "") + (
+        bracket + reason
+    )
 
 
 def _wish(joints: str, locked: str) -> Wish:
