@@ -84,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
     held = {h.joint for h in guess.held}
     for line in guesses(text):
-        key, _, rest = line.partition(":")
-        if key.strip("'") not in held and not rest.lstrip().startswith("("):  # a section of its own has no value
+        key = line.partition(":")[0].strip("'")
+        if key not in held and key != "parameters":  # these stand in the table that follows
             print(f"  {_plain(line)}")
     print("\n".join(drive_table(guess)))
     lines = [*([locked_line(guess.held)] if held else []), *guess.following]
