@@ -141,7 +141,7 @@ def _in_time(result: ReplayResult) -> Check:
     period = result.recording_seconds / max(result.updates, 1)
     text = (
         f"An update took {significant(1e3 * latency.p50)} ms in the median, {significant(1e3 * latency.p99)} ms in 99 "
-        f"of 100, {significant(1e3 * latency.max)} ms at most; a command came every {significant(1e3 * period)} ms."
+        f"of 100, {significant(1e3 * latency.max)} ms at most; one was due every {significant(1e3 * period)} ms."
     )
     level = "good" if latency.p99 <= period else "info" if latency.mean <= period else "warn"
     return Check(level, name, text)
