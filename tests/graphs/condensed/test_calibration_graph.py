@@ -45,8 +45,9 @@ def test_gtsams_optimizer_stays_where_the_calibration_ended(calibrated):
             assert found[parameter.name] == pytest.approx(parameter.value, abs=1e-3 * parameter.sigma)
 
 
-def test_gtsams_marginals_are_the_sigmas_of_the_calibration(calibrated):
-    graph = CalibrationGraph.of(calibrated)
+@pytest.mark.parametrize("per_sample", [False, True], ids=["condensed", "a factor per sample"])
+def test_gtsams_marginals_are_the_sigmas_of_the_calibration(calibrated, per_sample):
+    graph = CalibrationGraph.of(calibrated, per_sample)
     sigmas = graph.sigmas(graph.values)
     for parameter in calibrated.parameters:
         if parameter.name in sigmas:
