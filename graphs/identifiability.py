@@ -37,7 +37,7 @@ def weak_directions(
         covariance: of the shared values, shape (s, s).
     """
     columns = shared.columns[DYNAMICS]
-    size = _sizes(robot, calibration)
+    size = _sizes(calibration)
     found = _weak_dynamics(calibration, covariance[columns, columns] / np.outer(size, size))
     for gyro in robot.gyros:
         columns = shared.columns[rotation_block(gyro.name)]
@@ -49,13 +49,12 @@ def weak_directions(
     return tuple(found)
 
 
-def _sizes(robot: Robot, calibration: Calibration) -> Array:
+def _sizes(calibration: Calibration) -> Array:
     """What the standard deviations are relative to, shape (p,): one for logarithms, and for small values.
 
     Parameters of any sign are estimated in their unit; a large one is determined well if it is so for its size.
     """
-    signed = np.array([not robot.parameters[name].positive for name in calibration.names], dtype=bool)
-    return np.where(signed, np.maximum(np.abs(calibration.values), 1.0), 1.0)
+    return np.where(calibration.positive, 1.0, np.maximum(np.abs(calibration.values), 1.0))
 
 
 def _weak_dynamics(calibration: Calibration, covariance: Array) -> list[WeakDirection]:

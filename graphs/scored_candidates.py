@@ -157,7 +157,7 @@ def _placebos(s: TrialSignals) -> Array:
         moved = np.roll(np.arange(len(s.ticks)), int(shift * len(s.ticks)))
         v = s.x[moved][:, layout.motor_v[j]]
         tau = np.zeros((len(s.ticks), layout.n_rates))
-        tau[:, row] = (v, np.tanh(s.robot.friction_sharpness()[j] * v), s.tau_spring[moved][:, j])[kind]
+        tau[:, row] = (v, np.tanh(s.robot.sharpness_of(layout.joints[j]) * v), s.tau_spring[moved][:, j])[kind]
         found.append(s.accelerations(tau))
     return np.stack(found, axis=2)
 

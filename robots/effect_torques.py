@@ -62,17 +62,17 @@ class EffectTorques:
             springs: springs of the base model.
             values: all parameters of the robot by full name.
         """
+        sharpness = self._sharpness(values)
         for law in self._local:
-            law.add(terms, x, springs, values, float(self._sharpness(values)[law.joint]))
+            law.add(terms, x, springs, values, float(sharpness[law.joint]))
         for here in self._global:
-            self._add_global(terms, here, x, springs, values)
+            self._add_global(terms, here, here.own(values), self._signals(here, x, springs, sharpness), springs)
 
     def _add_global(
-        self, terms: TorqueTerms, here: EffectAt, x: Array, springs: Springs, values: Mapping[str, float]
+        self, terms: TorqueTerms, here: EffectAt, p: dict[str, float], signals: RobotSignals, springs: Springs
     ) -> None:
         effect = here.effect
         assert isinstance(effect, RobotTorque)
-        signals, p = self._signals(here, x, springs, self._sharpness(values)), here.own(values)
         self._put(terms.value, effect.law(signals, p))
         if terms.by_state is None or terms.by_parameter is None:
             return

@@ -50,7 +50,7 @@ class JointLawAtOneState:
     def __init__(self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float]):
         assert isinstance(here.effect, JointTorque)
         layout, j = robot.layout, robot.joints.index(here.owner)
-        self._p, self._sharpness = here.own(values), float(robot.friction_sharpness(values)[j])
+        self._p, self._sharpness = here.own(values), robot.sharpness_of(here.owner, values)
         columns = [layout.joint_q[j], layout.joint_v[j], layout.motor_q[j], layout.motor_v[j]]
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}

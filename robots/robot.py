@@ -242,9 +242,15 @@ class Robot:
         Args:
             values: parameters by full name that count before the robot's own.
         """
-        named = {name: parameter.value for name, parameter in self.parameters.items()} | dict(values or {})
-        usual = self.choices.friction_sharpness
-        return np.array([named.get(f"{joint}.{SHARPNESS}", usual) for joint in self.joints])
+        return np.array([self.sharpness_of(joint, values) for joint in self.joints])
+
+    def sharpness_of(self, joint: str, values: Mapping[str, float] | None = None) -> float:
+        """The same of one joint: its own parameter if it has one, else that of the model's choices."""
+        name = f"{joint}.{SHARPNESS}"
+        if values is not None and name in values:
+            return values[name]
+        own = self.parameters.get(name)
+        return self.choices.friction_sharpness if own is None else own.value
 
     @property
     def drive_laws(self) -> tuple[str, ...]:

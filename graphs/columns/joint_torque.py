@@ -49,7 +49,7 @@ def joint_signals(s: TrialSignals, j: int) -> JointSignals:
         v_motor=s.x[:, layout.motor_v[j]],
         tau_spring=s.tau_spring[:, j],
         stiffness=float(s.stiffness[j]),
-        sharpness=float(s.robot.friction_sharpness()[j]),
+        sharpness=s.robot.sharpness_of(s.robot.joints[j]),
     )
 
 

@@ -102,7 +102,7 @@ def gear_equation(s: JointSignals, robot: Robot, j: int) -> Equation:
         }
         if robot.torque_sensor is None:  # friction stays on the motor's side of the gear
             columns[f"{joint}.motor_viscous.coefficient"] = -v
-            columns[f"{joint}.coulomb_torque"] = -np.tanh(robot.friction_sharpness()[j] * v)
+            columns[f"{joint}.coulomb_torque"] = -np.tanh(robot.sharpness_of(joint) * v)
     sigma = float(np.hypot(robot.motor_encoder.sigmas[j], encoder.sigmas[j]))
     constants = np.ones((len(q), 1, 1))
     shaped = {name: column[:, None] for name, column in columns.items()}

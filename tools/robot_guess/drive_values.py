@@ -154,7 +154,7 @@ def _turn_over(
         speed = float(equation.rms[PLACES[VISCOUS]])
         width = min(TURNS_OVER * speed, USUAL)
         matters = joint in tree.slides or speed < USUAL / MATTERS
-        found.append(1.0 / width if matters and joint not in elastic and 0.0 <= rough < width else None)
+        found.append(1.0 / width if matters and joint not in elastic and rough < width else None)
     return found
 
 

@@ -225,8 +225,8 @@ class Engine:
         tanh = math.tanh
         passive, qvel = self.data.qfrc_passive, self.data.qvel
         rotors = [
-            (self.address.motor[joint], robot.parameter(f"{joint}.coulomb_torque").value, float(sharpness))
-            for joint, sharpness in zip(robot.joints, robot.friction_sharpness(), strict=True)
+            (self.address.motor[joint], robot.parameter(f"{joint}.coulomb_torque").value, robot.sharpness_of(joint))
+            for joint in robot.joints
         ]
 
         def torque() -> None:

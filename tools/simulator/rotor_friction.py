@@ -42,10 +42,7 @@ class RotorFriction(SimulatedEffect):
 
     def bind(self, model: Any, data: Any, address: Address) -> None:
         """Remembers the rotor's state and its row among the friction losses, which come first of all constraints."""
-        self.dof, self.sharpness = (
-            address.motor[self.owner],
-            float(self.robot.friction_sharpness()[self.robot.joints.index(self.owner)]),
-        )
+        self.dof, self.sharpness = address.motor[self.owner], self.robot.sharpness_of(self.owner)
         self._data, self._qpos, self._qvel, self._passive = data, data.qpos, data.qvel, data.qfrc_passive
         self._row = int(np.count_nonzero(model.dof_frictionloss[: self.dof] > 0))
 

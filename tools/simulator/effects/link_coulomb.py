@@ -32,7 +32,7 @@ class LinkCoulomb(SimulatedEffect):
         """Remembers the link's velocity."""
         self._dof, self._qvel, self._passive = address.link[self.owner], data.qvel, data.qfrc_passive
         self._smooth = self.parameters["torque"] if self.friction == "smooth" else 0.0
-        self._sharpness = float(self.robot.friction_sharpness()[self.robot.joints.index(self.owner)])
+        self._sharpness = self.robot.sharpness_of(self.owner)
 
     def torque(self) -> None:
         """Adds the smooth friction."""
