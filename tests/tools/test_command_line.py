@@ -369,3 +369,21 @@ def test_a_missing_urdf_and_files_in_the_wrong_order_are_said_with_the_command(c
     ):
         assert complaint(capsys, *arguments) == told
     assert files() == {"arm.urdf", "a.mcap", "arm.yaml"}
+
+
+def test_files_that_no_other_order_would_mend_are_not_told_to_change_places(capsys):
+    for name in ("arm.urdf", "arm2.urdf"):
+        Path(name).write_text("<robot/>")
+    Path("a.mcap").write_bytes(b"\x89MCAP0\r\n")
+    Path("bag").mkdir()
+    Path("bag/metadata.yaml").write_text("rosbag2_bagfile_information: {}")
+    Path("arm.yaml").write_text("name: arm")
+    for arguments in (
+        ("init", "arm.urdf", "arm2.urdf", "-o", "x.yaml"),
+        ("init", "a.mcap", "a.mcap", "-o", "x.yaml"),
+        ("info", "bag/metadata.yaml"),
+        ("info", "arm.yaml"),
+    ):
+        assert "comes first" not in complaint(capsys, *arguments), arguments
+    told = "arm.yaml is a robot file and no recording; the recording comes first: jointscope info bag --robot arm.yaml"
+    assert complaint(capsys, "info", "arm.yaml", "--robot", "bag") == told

@@ -18,6 +18,7 @@ from jointscope.tools.bags.message_type import MessageType, defined_message_type
 
 Progress = Callable[[int, int], None]
 
+BAG_SUFFIXES = (".bag", ".mcap", ".db3")  # of files that are bags by themselves
 STORAGE_SUFFIXES = (".mcap", ".db3", ".zstd")
 REPAIR = {
     ".bag": "try `rosbag reindex`, or record it again",
@@ -233,7 +234,7 @@ def _storage(path: Path) -> Path:
 def _reader(storage: Path, path: Path) -> tuple[Any, bool]:
     from rosbags import rosbag1, rosbag2
 
-    if storage.is_file() and storage.suffix not in (".bag", ".mcap", ".db3"):
+    if storage.is_file() and storage.suffix not in BAG_SUFFIXES:
         raise RecordingError(
             f"{path} is not a bag: unknown suffix {storage.suffix!r}; expected .bag, .mcap, .db3 or a ROS 2 bag folder"
         )

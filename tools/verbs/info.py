@@ -40,12 +40,13 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.errors import RecordingError
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.bags.open_bag import BAG_SUFFIXES
 
-    if args.bag.suffix in (".yaml", ".yml"):
-        recording = args.robot if args.robot and Path(args.robot).suffix in (".mcap", ".db3", ".bag") else "BAG"
+    other = Path(args.robot or "")
+    if args.robot and args.bag.suffix in (".yaml", ".yml") and (other.is_dir() or other.suffix in BAG_SUFFIXES):
         raise RecordingError(
             f"{args.bag} is a robot file and no recording; the recording comes first: "
-            f"jointscope info {recording} --robot {args.bag}"
+            f"jointscope info {other} --robot {args.bag}"
         )
     load_user_effects(args.effects)
     robot = load_robot(args.robot) if args.robot else None

@@ -13,7 +13,6 @@ from jointscope.tools.whole_file import check_outputs, whole_file, write_json
 if TYPE_CHECKING:
     from jointscope.tools.robot_guess.named_signal import Wish
 
-BAGS = (".mcap", ".db3", ".bag")
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
   jointscope info moves.mcap --robot arm.yaml
@@ -111,8 +110,9 @@ def _check_order(urdf: Path, bag: Path) -> None:
     """Says at once that a URDF is missing, or that bag and URDF have changed places."""
     from jointscope.robots.errors import RobotError
     from jointscope.robots.yaml_section import did_you_mean
+    from jointscope.tools.bags.open_bag import BAG_SUFFIXES
 
-    if bag.suffix == ".urdf" or urdf.suffix in BAGS:
+    if bag.suffix == ".urdf" and (urdf.is_dir() or urdf.suffix in BAG_SUFFIXES):
         raise RobotError(f"{urdf} is no URDF; the URDF comes first: jointscope init {bag} {urdf} -o ROBOT.yaml")
     if not urdf.is_file():
         others = sorted(path.name for path in urdf.parent.glob("*.urdf")) if urdf.parent.is_dir() else []
