@@ -28,6 +28,7 @@ from arm_row import BROKEN, ArmRow, judge
 from arm_table import section
 from arm_verbs import THREADS, first_contact
 from bench import environment
+from kept_rows import keep, known_rows
 from patience import say
 
 import jointscope.graphs
@@ -43,11 +44,11 @@ def main() -> None:
         print("\n".join(f"{case.name}: {case.variant}" for case in wanted))
         return
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    known = known_rows(arguments.results)
+    known = {name: ArmRow(**row) for name, row in known_rows(arguments.results, code()).items()}
     missing = [case for case in wanted if case.name not in known and not arguments.table]
     say(f"{len(wanted)} robots, {len(wanted) - len(missing)} of them in {arguments.results} already")
     for row in measure(missing, arguments):
-        keep(arguments.results, row)
+        keep(arguments.results, code(), row.to_json())
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)})"
@@ -89,25 +90,6 @@ def run_case(case: ArmCase, folder: Path, limit: float) -> ArmRow:
     except Exception as err:  # a mistake of the benchmark shall not end a run of an hour; it stands in the table
         message = f"the benchmark itself: {type(err).__name__}: {err}"
         return ArmRow(case.name, case.variant, BROKEN, message=message)
-
-
-def keep(path: Path, row: ArmRow) -> None:
-    """Appends a row to the results file."""
-    with path.open("a", encoding="utf-8") as lines:
-        lines.write(json.dumps({"code": code(), **row.to_json()}) + "\n")
-
-
-def known_rows(path: Path) -> dict[str, ArmRow]:
-    """Rows of an earlier run with the same code, by name."""
-    found: dict[str, ArmRow] = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
-        try:
-            content = json.loads(line)
-        except json.JSONDecodeError:
-            continue  # the run was interrupted here
-        if content.pop("code") == code():
-            found[content["name"]] = ArmRow(**content)
-    return found
 
 
 @cache

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import hashlib
-import json
 import multiprocessing
 import os
 import random
@@ -26,6 +25,7 @@ from discovery import section
 from discovery_case import run_case
 from discovery_row import Row
 from hidden_effects import Case, cases, tenth
+from kept_rows import keep, known_rows
 from patience import say
 
 import jointscope.graphs
@@ -42,13 +42,13 @@ def main() -> None:
         print("\n".join(f"{case.kind}: {case.name}" for case in wanted))
         return
     results: Path = arguments.results
-    known = known_rows(results)
+    known = {name: Row.of_json(row) for name, row in known_rows(results, code()).items()}
     missing = [case for case in wanted if case.name not in known and not arguments.table]
     say(f"{len(wanted)} cases, {sum(case.name in known for case in wanted)} of them in {results} already")
     # in a random order, so that an interrupted table is a fair part of every kind
     random.Random(ORDER).shuffle(missing)
     for row in measure(missing, arguments.jobs):
-        keep(results, row)
+        keep(results, code(), row.to_json())
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)} cases)"
@@ -76,25 +76,6 @@ def measure(missing: list[Case], jobs: int) -> Iterator[Row]:
                 f"{done} of {len(missing)}, {left / 60:.0f} min left; {row.name}: {row.error or row.accepted or 'none'}"
             )
             yield row
-
-
-def keep(path: Path, row: Row) -> None:
-    """Appends a row to the results file."""
-    with path.open("a", encoding="utf-8") as lines:
-        lines.write(json.dumps({"code": code(), **row.to_json()}) + "\n")
-
-
-def known_rows(path: Path) -> dict[str, Row]:
-    """Rows of an earlier run with the same code, by name."""
-    found: dict[str, Row] = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
-        try:
-            content = json.loads(line)
-        except json.JSONDecodeError:
-            continue  # the run was interrupted here
-        if content.pop("code") == code():
-            found[content["name"]] = Row.of_json(content)
-    return found
 
 
 @cache
