@@ -17,7 +17,7 @@ from jointscope.tools.bags.not_finite import without_gibberish
 from jointscope.tools.bags.second_publisher import without_second_publisher
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.staircase import without_repetitions
-from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.tidy_samples import ordered_samples, plausible_samples
 from jointscope.tools.bags.time_order import in_time_order
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.bags.two_clocks import brought_together
@@ -250,8 +250,12 @@ def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
     values = samples.values.copy()
     values[700, 1] = wild
     with np.errstate(all="raise"):
-        one = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+        one = plausible_samples(
+            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True)
+        )
         values[::2] = wild
-        half = tidy_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True, sensor=True)
+        half = plausible_samples(
+            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True)
+        )
     assert len(one) == 1499
     assert len(half) == 1500 and np.isnan(half.values[::2]).all() and np.isfinite(half.values[1::2]).all()

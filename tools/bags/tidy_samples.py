@@ -21,14 +21,13 @@ MOSTLY = 0.9  # of the samples that must be numbers to tell wild ones
 FEWEST = 30  # samples that tell anything
 
 
-def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) -> TimedSamples:
-    """The samples in the order of their stamps; those of a sensor without what no sensor says.
+def ordered_samples(name: str, samples: TimedSamples, stamped: bool) -> TimedSamples:
+    """The samples in the order of their stamps, whatever is no number as NaN.
 
     Args:
         name: of the stream.
         samples: in the order of the bag; NaN may be among them.
         stamped: whether the messages carry stamps.
-        sensor: whether a sensor says it; commands may jump and repeat themselves.
 
     Raises:
         RecordingError: the clock cannot be trusted, or too much would be left out.
@@ -37,9 +36,21 @@ def tidy_samples(name: str, samples: TimedSamples, stamped: bool, sensor: bool) 
         samples, _ = without_unfilled(name, samples)
         samples = on_one_clock({name: samples})[0][name]
     samples, _ = in_time_order(name, samples)
-    samples = replace(samples, values=numbers_only(samples.values))
+    return replace(samples, values=numbers_only(samples.values))
+
+
+def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
+    """Ordered samples of a sensor of any kind, without what no sensor says; commands may jump and repeat themselves.
+
+    Args:
+        name: of the stream.
+        samples: in the order of their stamps; NaN may be among them.
+
+    Raises:
+        RecordingError: so much would be left out that something else is wrong.
+    """
     finite = np.asarray(np.isfinite(samples.values).all(axis=1))
-    if not sensor or finite.mean() < MOSTLY:
+    if finite.mean() < MOSTLY:
         return samples
     samples = samples.take(finite)
     return cleaned_sensor(name, tuple(map(str, range(samples.values.shape[1]))), samples)[0]

@@ -17,7 +17,7 @@ from jointscope.tools.bags.message_type import MessageType
 from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.stream_notices import Timing, timing
-from jointscope.tools.bags.tidy_samples import tidy_samples
+from jointscope.tools.bags.tidy_samples import ordered_samples, plausible_samples
 from jointscope.tools.bags.timed_samples import TimedSamples
 from jointscope.tools.robot_guess.known_fields import KnownField, known_fields
 
@@ -149,9 +149,9 @@ def _signal(
         return Signal(raw.name, kind.name, known.path, names, times[later], values, stamped, known.quantity, sent)
 
     try:
-        samples = tidy_samples(raw.name, everything, stamped, sensor=known.quantity in MEASURED)
-        plain = tidy_samples(raw.name, everything, stamped, sensor=False)
+        ordered = ordered_samples(raw.name, everything, stamped)
+        samples = plausible_samples(raw.name, ordered) if known.quantity in MEASURED else ordered
     except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
         troubles.append(err)
         return None
-    return signal(samples, signal(plain) if len(plain) > len(samples) else None)
+    return signal(samples, signal(ordered) if len(ordered) > len(samples) else None)
