@@ -17,8 +17,9 @@ TYPES := build/types
 demo: $(VENV)/sim $(VENV)/code
 	$(BIN)/jointscope demo -o demo
 
+# One process a core, each with one thread of linear algebra; a file's tests stay together, as they share recordings.
 test: $(VENV)/dev $(VENV)/code
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: style types
 
