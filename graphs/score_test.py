@@ -18,7 +18,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from jointscope.factors.priors import shared_priors
 from jointscope.graphs.bag_problem import BagProblem
@@ -276,8 +276,8 @@ def _robust_p(score: TrialScore, scores: Array, information: Array) -> float:
     at_estimate = scores + information @ estimate
     spread = at_estimate.T @ at_estimate * b / (b - 1.0)
     pull = total @ estimate
-    statistic = float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull)
-    p = float(fisher.sf(statistic * (b - k) / (k * (b - 1.0)), k, b - k))
+    statistic = max(float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull), 0.0)
+    p = float(fdtrc(k, b - k, statistic * (b - k) / (k * (b - 1.0))))
     return 0.5 * p if len(kept) == 1 and score.trial.sizes[kept[0]].sign == "+" else p
 
 

@@ -10,7 +10,7 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from jointscope.graphs.bag_problem import BagProblem
 from jointscope.graphs.base_model import BaseModel
@@ -105,7 +105,7 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
     everyone = [*joint.scores, *ordered[MOST_TOGETHER:]]
     # the best of several shapes is the best of as many draws
     draws = np.array([tried[score.trial.label] for score in everyone])
-    chances = np.minimum(np.array([chi2.sf(score.plausible[0], score.dof) for score in everyone]) * draws, 1.0)
+    chances = np.minimum(np.array([chdtrc(score.dof, max(score.plausible[0], 0.0)) for score in everyone]) * draws, 1.0)
     robust = np.minimum(np.concatenate([joint.p_values, np.full(len(everyone) - len(trials), np.nan)]) * draws, 1.0)
     p_values, chances = _holm(np.where(np.isfinite(robust), robust, chances)), _holm(chances)
     alike = _confusions(joint)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def whiteness(errors: Array) -> Whiteness:
     if power == 0.0 or np.any(spread == 0.0):
         return Whiteness(float("nan"), float("nan"))
     Q = float(np.sum(sums**2 / spread))
-    return Whiteness(float(sums[0]) / power, float(chi2.sf(Q, lags)))
+    return Whiteness(float(sums[0]) / power, float(chdtrc(lags, Q)))
 
 
 def evenly(times: Array, errors: Array, spacing: float) -> Array:

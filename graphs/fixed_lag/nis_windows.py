@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from jointscope.graphs.fixed_lag.replay_result import InnovationSeries
 
@@ -67,5 +67,5 @@ class NisWindows:
         with np.errstate(invalid="ignore", divide="ignore"):
             sensor = nis / dof
             channels = np.column_stack([summed(column) / count for column in squares.T])
-            low, high = (chi2.ppf(0.5 * (1.0 + s * INSIDE), dof) / dof for s in (-1.0, 1.0))
+            low, high = (chdtri(dof, 0.5 * (1.0 - s * INSIDE)) / dof for s in (-1.0, 1.0))
         return NisWindows(t[0] + (np.arange(w) + 0.5) * window, sensor, channels, low, high)
