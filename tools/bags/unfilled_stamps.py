@@ -55,6 +55,8 @@ def _wild(samples: TimedSamples) -> NDArray[np.bool_]:
     if n < 2 * NEIGHBOURS or not samples.reception_tells:
         return np.zeros(n, bool)
     latency = samples.latency
+    if np.ptp(latency) <= WILD:  # the usual case, without a window around every sample
+        return np.zeros(n, bool)
     suspects = np.flatnonzero(np.abs(latency - _running_median(latency)) > WILD)
     wild = np.zeros(n, bool)
     for k in suspects:
