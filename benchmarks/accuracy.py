@@ -14,13 +14,13 @@ from deviations import UNOBSERVABLE, Deviation, deviations, nearest_rotation
 from patience import say
 from tables import Section, Table, answer
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.graphs.calibration_result import CalibrationResult
-from jointscope.graphs.compare import compare_model
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.comparison.compare import compare_model
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags import read_recording
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "doggy" / "clean"

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import gtsam
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Solution, newton_step, solve
-from jointscope.graphs.estimate import Estimate
-from jointscope.graphs.initial_guess import initial_states
-from jointscope.graphs.normal_equations import build
-from jointscope.graphs.reference_graph import initial_values, nonlinear_graph
-from jointscope.graphs.shared_layout import SharedLayout
-from jointscope.graphs.solver_context import in_solver_context
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.batch_solver import Solution, newton_step, solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import build
+from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
+from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.starts.initial_guess import initial_states
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 
 @dataclass(frozen=True)

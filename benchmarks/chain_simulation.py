@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.bodies.rigid_tree import RigidTree
 
 Array = NDArray[np.float64]
 

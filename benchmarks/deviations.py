@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 AXES = "xyz"

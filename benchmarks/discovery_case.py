@@ -13,17 +13,17 @@ import numpy as np
 from discovery_row import Row
 from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, Case
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.graphs.compare import compare_model
-from jointscope.graphs.diagnose import SUSPICION
-from jointscope.graphs.diagnosis_result import Candidate, Diagnosis
-from jointscope.graphs.discover import discover
-from jointscope.graphs.discovery_result import Discovery
-from jointscope.robots.effect_editing import add_effect
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.comparison.compare import compare_model
+from jointscope.graphs.discovery.diagnose import SUSPICION
+from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.discover import discover
+from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.simulator import Disturbance, simulate
 
 FAR = 3.0  # times the values of the robot file

@@ -13,12 +13,12 @@ import numpy as np
 from jointscope.factors.custom_factor import block_key, state_key
 from jointscope.factors.factor import Factor
 from jointscope.factors.priors import shared_priors
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import NewtonStep, Solution, newton_step
-from jointscope.graphs.estimate import Estimate
-from jointscope.graphs.normal_equations import Linearized, accumulate, linearize_all, whitened
-from jointscope.graphs.shared_layout import SharedLayout
-from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.batch_solver import NewtonStep, Solution, newton_step
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import Linearized, accumulate, linearize_all, whitened
+from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import in_solver_context
 
 REPEATS = 3
 

@@ -16,8 +16,8 @@ from patience import say
 from scipy.signal import butter, sosfilt
 from tables import Section, Table
 
-from jointscope.graphs.compare import smooth
-from jointscope.robots.recording import Stream
+from jointscope.graphs.comparison.compare import smooth
+from jointscope.robots.recordings.recording import Stream
 
 Array = NDArray[np.float64]
 

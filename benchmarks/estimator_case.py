@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.base_model import with_full_gyros
-from jointscope.graphs.calibrate import calibrate
-from jointscope.robots.effect_editing import add_effect
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.graphs.calibration.base_model import with_full_gyros
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.simulator import Disturbance, Simulation, simulate
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from message_feed import in_order
 from patience import say
 from tables import Section, Table, answer
 
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 
 BOUNDS = (0.8, 1.25)  # per degree of freedom
 CORRELATED = 0.02  # [s]

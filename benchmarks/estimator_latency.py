@@ -20,7 +20,7 @@ from plain_smoother import PlainSmoother
 from tables import Section, Table
 
 from jointscope.graphs.fixed_lag import FixedLagEstimator
-from jointscope.robots.recording import Recording
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.fixed_lag import EstimatedState, FixedLagEstimator
 from jointscope.graphs.fixed_lag.tick import Tick
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from fuzz_messages import FORMATS, URDF, sound_messages, write_messages
 from fuzz_mutations import OF_BYTES, OF_MESSAGES
 
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.command_line import TRACEBACK, main
 
 MEMORY = 2 * 2**30  # [B] that a trial may need beside what the modules take

@@ -15,10 +15,10 @@ from deviations import Deviation, deviations
 from patience import say
 from tables import Section, Table
 
-from jointscope.graphs.calibrate import calibrate
+from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator import Disturbance, simulate
 
 SERIES = {

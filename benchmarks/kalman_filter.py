@@ -13,12 +13,12 @@ import numpy as np
 from message_feed import SAME, Message, in_order
 from numpy.typing import NDArray
 
-from jointscope.graphs.bag_problem import DEFLECTION_SIGMA
 from jointscope.graphs.fixed_lag.estimator import BIAS_WALK
-from jointscope.graphs.fixed_lag.sample_checks import SampleChecks
-from jointscope.robots.elastic_joints import ElasticJoints
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.graphs.fixed_lag.messages.sample_checks import SampleChecks
+from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

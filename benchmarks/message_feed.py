@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.recording import Recording
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,13 @@ from arm_row import ACCUSING
 from patience import say
 from tables import Section, Table
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.graphs.compare import compare_model
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.comparison.compare import compare_model
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
-from jointscope.robots.screening import screen
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.screening import screen
 from jointscope.tools.simulator import simulate
 
 # kinds of notices that say that something is wrong with a recording

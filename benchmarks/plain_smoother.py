@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration, bias_block
 from jointscope.factors.custom_factor import block_key, custom_factor, state_key
 from jointscope.factors.factor import Factor, Linearization, Samples
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.initial_guess import initial_states
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.starts.initial_guess import initial_states
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

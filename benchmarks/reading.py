@@ -11,9 +11,9 @@ import numpy as np
 from patience import say
 from tables import Section
 
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags import read_recording, write_bag
 
 SECONDS = 5.0  # [s] for 260,000 messages

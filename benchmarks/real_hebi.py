@@ -8,7 +8,7 @@ from real_recordings import MILLI, halves, left, recording, waterfall
 from tables import Section, Table
 
 from jointscope.graphs.transmission.transmission_search import discover_transmission
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 
 FOLDER = "hebi_arms_mit"
 DELAYS = (8e-3, 15e-3)  # [s]

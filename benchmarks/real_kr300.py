@@ -7,7 +7,7 @@ from real_recordings import left, recording, waterfall
 from tables import Section
 
 from jointscope.graphs.transmission.transmission_search import discover_transmission
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 
 STATED = (8.4, 11.8, 7.5)  # [%]
 DELAY = 3.0e-3  # [s]

@@ -8,8 +8,8 @@ from pathlib import Path
 from tables import Table
 
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags import read_recording
 
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "real"

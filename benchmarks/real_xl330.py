@@ -9,11 +9,11 @@ import numpy as np
 from real_recordings import MILLI, recording
 from tables import Section, Table
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.graphs.discover import discover
-from jointscope.graphs.free_run import free_run
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.comparison.free_run import free_run
+from jointscope.graphs.discovery.discover import discover
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 
 MOTIONS = ("sin_sin", "up_and_down", "sin_time_square", "lift_and_drop")
 TRAINING = [(gain, motion) for gain in (100, 400) for motion in MOTIONS[:3]]  # in lift_and_drop the servo lets go

@@ -13,7 +13,7 @@ from typing import Any
 from patience import say
 
 import jointscope.tools.simulator as simulator
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags import write_bag
 
 SEED = 1

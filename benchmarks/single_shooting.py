@@ -18,11 +18,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.bag_problem import BagProblem, first_command_time
-from jointscope.graphs.initial_guess import initial_biases, initial_dynamics, initial_states
-from jointscope.graphs.windows import windows_of
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

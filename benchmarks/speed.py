@@ -20,9 +20,9 @@ from simulated_bags import largest_error, simulated_bag
 from single_shooting import SingleShooting
 from tables import Section, Table
 
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags import read_recording
 
 SHARE = 0.5  # of the recording's own duration

@@ -12,8 +12,8 @@ import sys
 import time
 from pathlib import Path
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.robots.robot_file import load_robot
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags import read_recording
 
 

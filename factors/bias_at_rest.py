@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block
 from jointscope.factors.factor import Linearization, Samples
-from jointscope.robots.sensors import AXES, Gyro
+from jointscope.robots.parts.sensors import AXES, Gyro
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
-from jointscope.robots.effect_at import EffectAt
+from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.step import Steps, row_names
-from jointscope.robots.accelerations import Accelerations
-from jointscope.robots.elastic_joints import ElasticJoints
-from jointscope.robots.robot import ProcessNoise
+from jointscope.robots.dynamics.accelerations import Accelerations
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.robot import ProcessNoise
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Linearization
 from jointscope.factors.sensor_factor import SensorFactor
-from jointscope.robots.sensors import LinkEncoder, MotorEncoder
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 AnyEncoder = TypeVar("AnyEncoder", LinkEncoder, MotorEncoder)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Linearization
 from jointscope.factors.sensor_factor import SensorFactor
-from jointscope.robots.rigid_tree import RigidTree
-from jointscope.robots.sensors import Gyro
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.parts.sensors import Gyro
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Linearization, Samples
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Factor, Linearization, Samples
-from jointscope.robots.lateness import Lateness
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.model.lateness import Lateness
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

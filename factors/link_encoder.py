@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.encoder import EncoderFactor
-from jointscope.robots.sensors import LinkEncoder
+from jointscope.robots.parts.sensors import LinkEncoder
 
 
 @dataclass(frozen=True)

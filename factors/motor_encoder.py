@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.encoder import EncoderFactor
-from jointscope.robots.sensors import MotorEncoder
+from jointscope.robots.parts.sensors import MotorEncoder
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Factor, Linearization, Samples
 from jointscope.factors.gyro import skew
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import AXES, Gyro
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import AXES, Gyro
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
-from jointscope.robots.sensors import Gyro, LinkEncoder, MotorEncoder
+from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder
 
 Array = NDArray[np.float64]
 AnySensor = TypeVar("AnySensor", Gyro, LinkEncoder, MotorEncoder)

@@ -17,7 +17,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
 from jointscope.factors.step import selectors
-from jointscope.robots.accelerations import Accelerations, RigidDerivatives
+from jointscope.robots.dynamics.accelerations import Accelerations, RigidDerivatives
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
-from jointscope.robots.command_path import CommandPath
-from jointscope.robots.robot import ProcessNoise
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.dynamics.command_path import CommandPath
+from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from jointscope.factors.calibration import Calibration, bias_block, rotation_blo
 from jointscope.factors.factor import Linearization
 from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
-from jointscope.robots.rigid_tree import RigidTree
-from jointscope.robots.sensors import Gyro
-from jointscope.robots.state_layout import StateLayout
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.parts.sensors import Gyro
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ def doggy_data() -> Path:
 @pytest.fixture(scope="session")
 def doggy():
     """The ready robot."""
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.robots.files.robot_file import load_robot
 
     return load_robot("doggy")
 
@@ -29,7 +29,7 @@ def doggy():
 def simulated():
     """Eight seconds of calibration motion with smooth friction, with its truth."""
     pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.simulator import simulate
 
     return simulate(load_robot("doggy"), "calibration", 8.0, seed=5, friction="smooth")

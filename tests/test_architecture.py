@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One way through the house: robots <- factors <- graphs <- tools, read from the sources."""
+"""One way through the house, read from the sources: robots <- factors <- graphs <- tools, and room by room."""
 
 from __future__ import annotations
 
@@ -9,8 +9,26 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("robots", "factors", "graphs", "tools")
-MODULES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+FLOORS = ("robots", "factors", "graphs", "tools")
+MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
+ROOMS = """
+robots robots.bodies robots.parts robots.effect_kinds robots.model robots.effects robots.dynamics robots.recordings
+robots.files robots.ready
+factors
+graphs.problem graphs.solving graphs.noise graphs.starts graphs.scoring.columns graphs.scoring graphs.calibration
+graphs.comparison graphs.discovery graphs.transmission graphs.fixed_lag.window graphs.fixed_lag.messages
+graphs.fixed_lag graphs.fixed_lag.replay
+tools.writing tools.bags.tidying tools.bags.messages tools.bags
+tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator
+tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
+tools.init.streams tools.init.estimates tools.init tools.init.text
+tools.presentation tools.terminal tools.report.page tools.report.sections.calibration tools.report.sections.comparison
+tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
+tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verbs tools
+""".split()
+"""All rooms in the order of their imports: a module imports from its own room and from those before it."""
+MOST_FILES = 16
+ONE_FILE_EACH = {"factors", "robots.effects", "tools.simulator.effects", "tools.verbs"}  # a residual, an effect, a verb
 OUTSIDE = {
     "gtsam": {"factors", "graphs"},
     "pinocchio": {"robots", "tools"},
@@ -44,16 +62,49 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+def room_of(path: Path) -> str:
+    """The room that a file stands in."""
+    return ".".join(path.relative_to(ROOT).parts[:-1])
+
+
+def room_of_import(module: str) -> str:
+    """The room of `jointscope.<module>`, which may end in the name of something in a module or in a room's __init__."""
+    parts = module.split(".")
+    return ".".join(parts[: max(n for n in range(1, len(parts) + 1) if (ROOT / Path(*parts[:n])).is_dir())])
+
+
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_imports_go_one_way(path):
-    room = path.relative_to(ROOT).parts[0]
-    allowed = ROOMS[: ROOMS.index(room) + 1]
+    floor = path.relative_to(ROOT).parts[0]
+    allowed = FLOORS[: FLOORS.index(floor) + 1]
     for module in imported(path):
         first, _, rest = module.partition(".")
-        if first == "jointscope" and rest.split(".")[0] in ROOMS:
-            assert rest.split(".")[0] in allowed, f"{room} must not import {module}"
-        assert first not in ROOMS, f"import jointscope.{module}, not {module}"
-        assert room in OUTSIDE.get(first, set(ROOMS)), f"{room} must not import {first}"
+        if first == "jointscope" and rest.split(".")[0] in FLOORS:
+            assert rest.split(".")[0] in allowed, f"{floor} must not import {module}"
+        assert first not in FLOORS, f"import jointscope.{module}, not {module}"
+        assert floor in OUTSIDE.get(first, set(FLOORS)), f"{floor} must not import {first}"
+
+
+@pytest.mark.parametrize("path", [path for path in MODULES if path.name != "__init__.py"], ids=name_of)
+def test_rooms_stand_in_one_order_of_imports(path):
+    if "facade" in path.parts:
+        return
+    before = ROOMS[: ROOMS.index(room_of(path)) + 1]
+    for module in imported(path):
+        first, _, rest = module.partition(".")
+        if first == "jointscope" and rest.split(".")[0] in FLOORS:
+            assert room_of_import(rest) in before, f"{room_of(path)} stands before {room_of_import(rest)}: {module}"
+
+
+def test_no_room_is_a_hall():
+    for room in ROOMS:
+        files = [path for path in (ROOT / room.replace(".", "/")).glob("*.py") if path.name != "__init__.py"]
+        assert room in ONE_FILE_EACH or len(files) <= MOST_FILES, f"{room} has {len(files)} files"
+
+
+def test_every_room_says_what_goes_in_and_what_comes_out():
+    for path in (path for path in MODULES if path.name == "__init__.py" and "facade" not in path.parts):
+        assert len((ast.get_docstring(tree_of(path)) or "").split()) >= 4, path
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)

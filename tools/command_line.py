@@ -21,7 +21,7 @@ from typing import Any
 import jointscope
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.outside_modules import trouble_with_modules
-from jointscope.tools.protected_files import check_protected
+from jointscope.tools.writing.protected_files import check_protected
 
 VERBS = Path(__file__).parent / "verbs"
 TRACEBACK = "JOINTSCOPE_TRACEBACK"

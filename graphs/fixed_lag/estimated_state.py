@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.fixed_lag.adaptation import prior_sigmas
-from jointscope.graphs.fixed_lag.augmented_layout import AugmentedLayout
-from jointscope.graphs.fixed_lag.newest_state import NewestState
-from jointscope.robots.robot import Robot
-from jointscope.robots.state_layout import StateLayout
+from jointscope.graphs.fixed_lag.window.adaptation import prior_sigmas
+from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
+from jointscope.graphs.fixed_lag.window.newest_state import NewestState
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
 

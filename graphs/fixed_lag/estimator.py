@@ -21,22 +21,22 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jointscope.graphs.base_model import with_full_gyros
-from jointscope.graphs.fixed_lag.adaptation import checked_densities
-from jointscope.graphs.fixed_lag.bookkeeping import Bookkeeping
-from jointscope.graphs.fixed_lag.command_history import CommandHistory
+from jointscope.graphs.calibration.base_model import with_full_gyros
 from jointscope.graphs.fixed_lag.estimated_state import EstimatedState, state_of, unknown_state
-from jointscope.graphs.fixed_lag.event import Event
-from jointscope.graphs.fixed_lag.first_state import FirstSamples, first_state
-from jointscope.graphs.fixed_lag.innovation import Innovation
-from jointscope.graphs.fixed_lag.newest_state import NewestState
-from jointscope.graphs.fixed_lag.observation import AT_TICK
+from jointscope.graphs.fixed_lag.messages.bookkeeping import Bookkeeping
+from jointscope.graphs.fixed_lag.messages.command_history import CommandHistory
+from jointscope.graphs.fixed_lag.messages.event import Event
+from jointscope.graphs.fixed_lag.messages.waiting_messages import WaitingMessages
 from jointscope.graphs.fixed_lag.tick import Listener, Tick
-from jointscope.graphs.fixed_lag.tick_engine import TickEngine
-from jointscope.graphs.fixed_lag.waiting_messages import WaitingMessages
-from jointscope.graphs.timeline import LONGEST_STEP, SHORTEST_STEP
+from jointscope.graphs.fixed_lag.window.adaptation import checked_densities
+from jointscope.graphs.fixed_lag.window.first_state import FirstSamples, first_state
+from jointscope.graphs.fixed_lag.window.innovation import Innovation
+from jointscope.graphs.fixed_lag.window.newest_state import NewestState
+from jointscope.graphs.fixed_lag.window.observation import AT_TICK
+from jointscope.graphs.fixed_lag.window.tick_engine import TickEngine
+from jointscope.graphs.problem.timeline import LONGEST_STEP, SHORTEST_STEP
 from jointscope.robots.errors import EstimatorError
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from jointscope.graphs.fixed_lag.estimated_state import EstimatedState
-from jointscope.graphs.fixed_lag.innovation import Innovation
+from jointscope.graphs.fixed_lag.window.innovation import Innovation
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.starts.motion_cells import MotionCells, motion_cells
 from jointscope.graphs.starts.windowed_sums import WIDTHS, WindowedSums, joint_signals, windowed_sums
-from jointscope.robots.recording import Stream
-from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.recordings.recording import Stream
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import GAIN, DriveEquation, Driven, drive_equations
 from jointscope.graphs.starts.drive_starts import driven_joints
-from jointscope.robots.recording import Recording
-from jointscope.robots.rigid_tree import RigidTree
-from jointscope.robots.robot import Robot
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

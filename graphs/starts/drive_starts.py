@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.bag_problem import BagProblem
+from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.starts.drive_regression import (
     DRY,
     GAIN,
@@ -27,9 +27,9 @@ from jointscope.graphs.starts.drive_regression import (
     drive_equations,
 )
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.parameter import Parameter
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

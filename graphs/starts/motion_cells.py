@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Stream
+from jointscope.robots.recordings.recording import Stream
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

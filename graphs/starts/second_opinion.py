@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 from jointscope.graphs.starts.drive_regression import GAIN, VISCOUS, DriveEquation, Value
 from jointscope.graphs.starts.drive_starts import PLAIN, equations_of, parts_of
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 DELAY = "command_delay@robot"
 EXPLAINED = 0.99  # of the mean square of the driving torque, below which the model of the regression is another one

@@ -1,2 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots whose links' masses are not known: what motors, links and gyros say about each other all the same."""
+"""Robots without equations for their links (`link_dynamics: free`): what lies between motor and joint.
+
+In: motor and joint angles. Out: stiffness, ripples and friction of each transmission.
+"""

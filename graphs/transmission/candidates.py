@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 
 SIZES = {
     "joint_elasticity": ("compliance",),

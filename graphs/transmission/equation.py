@@ -26,9 +26,9 @@ from jointscope.graphs.transmission.joint_signals import (
     mean_at,
     speed_window,
 )
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Gyro
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Gyro
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

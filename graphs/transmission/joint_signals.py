@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.joint_motion import window_mean
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.joint_motion import window_mean
+from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.position_ripple import with_order
 from jointscope.graphs.transmission.regression import fitted, parts, spread
 from jointscope.graphs.transmission.transmission_model import TransmissionModel
-from jointscope.robots.recording import Recording
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from jointscope.graphs.transmission.candidates import Candidate
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, with_found_effects
-from jointscope.robots.effect_catalogue import catalogue
+from jointscope.robots.files.effect_catalogue import catalogue
 
 MILLI = 1e3
 SPRING = "joint_elasticity"

@@ -15,10 +15,10 @@ from jointscope.graphs.transmission.equation import Equation, delay_name, equati
 from jointscope.graphs.transmission.position_ripple import EFFECT as RIPPLE
 from jointscope.graphs.transmission.position_ripple import with_order
 from jointscope.graphs.transmission.regression import Choose, errors, everything, fitted, parts, spread
-from jointscope.robots.effect_editing import add_effect
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Sensor
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Sensor
+from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from jointscope.graphs.transmission.regression import total
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, physical, with_found_effects
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.batch_solver import Progress
-from jointscope.graphs.solver_context import in_solver_context
+from jointscope.graphs.discovery.verdicts import MOST
+from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.transmission.candidates import Candidate, candidates, columns_of, may_be_added
 from jointscope.graphs.transmission.equation import Equation
 from jointscope.graphs.transmission.look_alikes import look_alikes
@@ -24,10 +25,9 @@ from jointscope.graphs.transmission.regression import errors, fitted, one_block,
 from jointscope.graphs.transmission.step_sentences import what_changed
 from jointscope.graphs.transmission.transmission_model import TransmissionModel, fit
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery, TransmissionStep
-from jointscope.graphs.verdicts import MOST
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.robots.screening import screen
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.screening import screen
 
 Array = NDArray[np.float64]
 

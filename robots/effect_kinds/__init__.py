@@ -1,2 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kinds of physical effects there are: each kind says where its law enters the model."""
+"""The ways in which a physical effect can enter a model: torque at a joint, reading, command, inertia, structure, time.
+
+In: nothing of a robot. Out: base classes that a file in `effects/` fills in, and an effect at its owner.
+"""

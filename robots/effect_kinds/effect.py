@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 OWNER_KINDS = ("joint", "gyro", "link_encoder", "robot")
 
@@ -99,12 +99,12 @@ class Effect(ABC):
     turning: bool = False
     example: Mapping[str, float] = field(default_factory=dict)
 
-    def may_act_on(self, robot: Robot, owner: str) -> str:
+    def may_act_on(self, robot: RobotView, owner: str) -> str:
         """Why the effect cannot act on an owner of this robot; empty if it can."""
         known = self.owners_of(robot)
         return "" if owner in known else f"acts on {', '.join(known) or 'nothing in this robot'}"
 
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """Everything in a robot that the effect can act on."""
         on_links = () if robot.link_encoder is None else (robot.link_encoder.name,)
         gyros = tuple(g.name for g in robot.gyros)
@@ -112,10 +112,10 @@ class Effect(ABC):
         by_kind = {"joint": joints, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
         return tuple(owner for kind in self.owners for owner in by_kind[kind])
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Parameters of the instance at one owner, in the units of a joint that turns."""
         return self.parameters
 
-    def parameters_at(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_at(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """The same in the units of the owner."""
         return tuple(replace(p, unit=robot.unit_at(owner, p.unit)) for p in self.parameters_of(robot, owner))

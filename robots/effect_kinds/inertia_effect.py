@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_kinds.effect import Effect
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class InertiaEffect(Effect):
     change: Callable[[Array], dict[str, Array]] = field(repr=False)
     last_only: bool = False
 
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """All joints, or the last one."""
         owners = super().owners_of(robot)
         return tuple(joint for joint in owners if not self.last_only or joint == robot.joints[-1])

@@ -10,10 +10,10 @@ import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.structured_tree import across_axes, hidden_inertias, inertia_about_joint
+from jointscope.robots.model.structured_tree import across_axes, hidden_inertias, inertia_about_joint
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 STIFFER = 10.0  # than the joint's own spring
 DAMPING_RATIO = 0.05
@@ -23,7 +23,7 @@ DAMPING_RATIO = 0.05
 class BearingFlexibility(Structure):
     """Two sprung hinges; natural scales come from the joint's own spring and body."""
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Starts ten times stiffer than the joint's spring, with the inertia of the model's body.
 
         All five entries of the inertia that a rigid bearing hides come along; the sixth is that about the joint.

@@ -13,7 +13,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 ORDERS = tuple(float(n) for n in (*range(1, 21), *range(22, 61, 2), *range(64, 201, 4)))
 TURNS = (1.0, 2.0, 4.0)  # orders of the motor itself: eccentricity, two poles, four poles
@@ -29,7 +29,7 @@ def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
 class Cogging(JointTorque):
     """A ripple whose orders are likely multiples of the gear's ratio."""
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With the orders of one turn of the motor added to the grid."""
         gear = robot.constants.get("motor.gear")
         if gear is None:

@@ -10,20 +10,20 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 
 @dataclass(frozen=True, kw_only=True)
 class Coriolis(Structure):
     """Acts only on a robot whose model leaves c(q, v) out."""
 
-    def may_act_on(self, robot: Robot, owner: str) -> str:
+    def may_act_on(self, robot: RobotView, owner: str) -> str:
         """Why it cannot act; empty if it can."""
         if owner == "robot" and robot.choices.coriolis:
             return "is part of the model already: the robot file says coriolis: true"
         return super().may_act_on(robot, owner)
 
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """The robot, unless its model has the terms."""
         return () if robot.choices.coriolis else ("robot",)
 

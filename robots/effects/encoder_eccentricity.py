@@ -13,7 +13,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 
 def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:
@@ -26,7 +26,7 @@ def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:
 class EncoderEccentricity(ReadingEffect):
     """The encoder turns once with the joint, or once with the motor."""
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With the gear's ratio among the orders."""
         gear = robot.constants.get("motor.gear")
         if gear is None:

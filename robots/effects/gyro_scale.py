@@ -10,7 +10,7 @@ import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
-from jointscope.robots.sensors import AXES
+from jointscope.robots.parts.sensors import AXES
 
 
 def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:

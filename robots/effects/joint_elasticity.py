@@ -12,7 +12,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 RESONANCE = 2.0 * np.pi * 10.0  # [rad/s] of the link on the spring at the start
 DAMPING_RATIO = 0.05
@@ -22,17 +22,17 @@ DAMPING_RATIO = 0.05
 class JointElasticity(Structure):
     """Acts only on joints that the robot file declares rigid."""
 
-    def may_act_on(self, robot: Robot, owner: str) -> str:
+    def may_act_on(self, robot: RobotView, owner: str) -> str:
         """Why it cannot act; empty if it can."""
         if owner in robot.joints and owner not in robot.choices.rigid_joints:
             return f"cannot act on {owner}, which has a spring already; only a joint declared rigid can get one"
         return super().may_act_on(robot, owner)
 
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """The joints declared rigid."""
         return tuple(joint for joint in robot.joints if joint in robot.choices.rigid_joints)
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Starts at a resonance of 10 Hz with the inertia that the joint moves at zero angles."""
         j = robot.joints.index(owner)
         inertia = float(robot.tree.mass_matrix(np.zeros((1, robot.n)))[0, j, j])

@@ -13,7 +13,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 PREFIX = "from_"
 
@@ -45,11 +45,11 @@ def law(s: RobotSignals, p: Mapping[str, Any]) -> tuple[Any, Any]:
 class KinematicCoupling(RobotTorque):
     """One coefficient for each of the other joints."""
 
-    def owners_of(self, robot: Robot) -> tuple[str, ...]:
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """The joints, if there is more than one."""
         return robot.joints if robot.n > 1 else ()
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """from_<joint> of every joint but the owner."""
         (pattern,) = self.parameters
         return tuple(replace(pattern, name=PREFIX + joint) for joint in robot.joints if joint != owner)

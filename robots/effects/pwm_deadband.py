@@ -14,7 +14,7 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 Array = NDArray[np.float64]
 DUTY_START = 0.02  # [1] share of the full command
@@ -32,7 +32,7 @@ def law(edges: Array, commands: Array, p: Mapping[str, float]) -> tuple[Array, d
 class PwmDeadband(CommandEffect):
     """A width in the unit of the robot's command."""
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With unit and start of the robot's command."""
         unit = robot.command.unit
         if unit == "duty":

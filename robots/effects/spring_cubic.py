@@ -11,7 +11,7 @@ from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 
 if TYPE_CHECKING:
-    from jointscope.robots.robot import Robot
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 SMALLEST_BEND = 0.03  # [rad] deflection at which no plausible cubic term reaches the linear one
 
@@ -25,7 +25,7 @@ def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
 class SpringCubic(JointTorque):
     """The cubic term, whose natural scale is the stiffness."""
 
-    def parameters_of(self, robot: Robot, owner: str) -> tuple[EffectParameter, ...]:
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With a prior that is wide beside the joint's own stiffness."""
         linear = robot.parameters.get(f"{owner}.stiffness")
         if linear is None:

@@ -13,8 +13,8 @@ from kalman_filter import filtered
 from message_feed import cycles, disturbed, in_order
 from plain_smoother import PlainSmoother
 
-from jointscope.graphs.causal_filter import filter_around
-from jointscope.graphs.compare import smooth
+from jointscope.graphs.comparison.causal_filter import filter_around
+from jointscope.graphs.comparison.compare import smooth
 from jointscope.graphs.fixed_lag import EstimatedState
 
 SILENT = ("imu2", 0.2, 0.6)

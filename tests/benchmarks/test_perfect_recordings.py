@@ -14,8 +14,8 @@ import perfect_recordings
 from arm_row import ACCUSING
 from perfect_recordings import accusations
 
-from jointscope.robots.recording import Notice
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.simulator import simulate
 
 

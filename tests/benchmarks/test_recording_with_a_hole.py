@@ -12,7 +12,7 @@ pytest.importorskip("mujoco", reason="the recording is simulated")
 
 import fuzz_messages
 
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.command_line import main
 
 HOUR = 3_600_000_000_000  # [ns]

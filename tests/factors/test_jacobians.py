@@ -23,16 +23,16 @@ from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
-from jointscope.graphs.sensor_placement import factor_on_state
-from jointscope.robots.command_path import CommandPath
-from jointscope.robots.effect_catalogue import catalogue
-from jointscope.robots.effect_editing import add_effect, carried_noise
+from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.robots.dynamics.command_path import CommandPath
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.time_shift import TimeShift
-from jointscope.robots.elastic_joints import ElasticJoints
-from jointscope.robots.lateness import Lateness, late_channels
-from jointscope.robots.robot_file import load_robot
-from jointscope.robots.sensors import LinkEncoder
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect, carried_noise
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.parts.sensors import LinkEncoder
 
 ROBOT = load_robot("doggy")
 PAPER = load_robot("doggy_paper")

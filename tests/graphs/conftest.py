@@ -18,7 +18,7 @@ def discovered(doggy):
     The search starts at the true values of all other parameters, so that calibrations are quick.
     """
     pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
-    from jointscope.graphs import discover
+    from jointscope.graphs.discovery import discover
     from jointscope.tools.simulator import simulate
 
     effect = f"{HIDDEN}:coefficient={COEFFICIENT}"

@@ -13,14 +13,14 @@ from functools import cache
 import numpy as np
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.normal_equations import states_of
-from jointscope.graphs.trial_columns import columns_of
-from jointscope.graphs.trial_system import Segment, rows_of
-from jointscope.graphs.trials import trials_of
-from jointscope.robots.effect_editing import add_effect, carried_noise
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot_file import load_robot
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
+from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_system import Segment, rows_of
+from jointscope.graphs.solving.normal_equations import states_of
+from jointscope.robots.files.effect_editing import add_effect, carried_noise
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording, Stream
 
 READY = load_robot("doggy")
 DOGGY = replace(READY, choices=replace(READY.choices, friction_sharpness=20.0))
@@ -104,34 +104,39 @@ def residuals(problem, x, calibration):
     return found
 
 
-def regressors(segment, trial):
-    """Columns of a trial by equation or channel, in the order of `residuals`, one for each size."""
+def regressors(segment, hypothesis):
+    """Columns of a hypothesis by equation or channel, in the order of `residuals`, one for each size."""
     found = {}
-    rows = rows_of(segment, columns_of(trial, segment.signals))
+    rows = rows_of(segment, columns_of(hypothesis, segment.signals))
     touched = [(f, s) for (f, _, _), s in zip(segment.linearized, segment.stamps, strict=True) if f.states]
     touched = [(f, s) for f, s in touched if f.name != "initial_state"]
     touched = touched if len(rows) == len(touched) else [(f, s) for f, s in touched if f.name == "dynamics"]
     for (factor, stamps), part in zip(touched, rows, strict=True):
         for i, row in enumerate(factor.rows):
             if factor.name == "dynamics":
-                signal, where = found.setdefault(row, np.zeros((len(segment.problem.dynamics), dof(trial)))), part.ticks
+                signal, where = (
+                    found.setdefault(row, np.zeros((len(segment.problem.dynamics), dof(hypothesis)))),
+                    part.ticks,
+                )
             else:
                 times = segment.problem.recording.streams[factor.name].times
-                signal = found.setdefault(f"{factor.name} {row}", np.zeros((len(times), dof(trial))))
+                signal = found.setdefault(f"{factor.name} {row}", np.zeros((len(times), dof(hypothesis))))
                 where = np.searchsorted(times, stamps)
-            signal[where] = part.by_trial[:, i]
+            signal[where] = part.by_size[:, i]
     return found
 
 
-def dof(trial):
-    return len(trial.sizes)
+def dof(hypothesis):
+    return len(hypothesis.sizes)
 
 
 def one_trial_each(name, kinds=None):
-    """One trial per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
+    """One hypothesis per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
     found = {}
-    for trial in trials_of(ROBOTS[name]):
-        if kinds is None or trial.here.effect.id in kinds:
-            found.setdefault(trial.label, []).append(trial)
-    middle = {label: trials[-1 if "stribeck" in label else len(trials) // 2] for label, trials in found.items()}
-    return [(name, trial) for trial in middle.values()]
+    for hypothesis in hypotheses_of(ROBOTS[name]):
+        if kinds is None or hypothesis.here.effect.id in kinds:
+            found.setdefault(hypothesis.label, []).append(hypothesis)
+    middle = {
+        label: hypotheses[-1 if "stribeck" in label else len(hypotheses) // 2] for label, hypotheses in found.items()
+    }
+    return [(name, hypothesis) for hypothesis in middle.values()]

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from jointscope.graphs.fixed_lag import EstimatedState, FixedLagEstimator
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 
 DISTURBANCE = 0.3  # [N m sqrt(s)] of every link and motor, at 1 kHz
 ORDER = ("command", "motor_encoder", "imu1", "imu2")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from jointscope.robots.effect_catalogue import catalogue
-from jointscope.robots.effect_editing import add_effect, carried_noise
-from jointscope.robots.rigid_tree import RigidTree
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect, carried_noise
+from jointscope.robots.files.robot_file import load_robot
 
 MIMICKING = Path(__file__).with_name("mimicking_doggy.urdf")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jointscope.robots.recording import Stream
+from jointscope.robots.recordings.recording import Stream
 
 mujoco = pytest.importorskip("mujoco", reason="arms are moved by MuJoCo, which the extra `sim` brings")
 

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording, Stream
 
 URDF = """<robot name="pendulum"><link name="base"/>
 <joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>

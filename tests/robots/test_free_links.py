@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.robots.effect_editing import add_effect
+from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.errors import RobotError
-from jointscope.robots.motor_zero import with_motor_zero
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot_file import load_robot, ready_robots
-from jointscope.robots.robot_writer import robot_text
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.recordings.motor_zero import with_motor_zero
+from jointscope.robots.recordings.recording import Recording, Stream
 
 
 def written(tmp_path, change):

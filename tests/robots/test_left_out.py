@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Recording, Stream
+from jointscope.robots.recordings.recording import Recording, Stream
 
 
 @pytest.fixture

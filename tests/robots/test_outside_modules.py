@@ -11,13 +11,13 @@ from types import ModuleType
 
 import pytest
 
-from jointscope.graphs.fixed_lag.smoother_window import SmootherWindow
+from jointscope.graphs.fixed_lag.window.smoother_window import SmootherWindow
 from jointscope.robots import outside_modules
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.outside_modules import FIXED_LAG, MODULES, need_module
-from jointscope.robots.robot_file import load_robot
 from jointscope.tools.command_line import main
-from jointscope.tools.result_files import ResultFiles
+from jointscope.tools.verb_parts.result_files import ResultFiles
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
@@ -127,6 +127,6 @@ def test_a_bug_stays_a_bug(monkeypatch, capsys):
     def broken(*_):
         raise AttributeError("x has no y")
 
-    monkeypatch.setattr("jointscope.robots.robot_file.load_robot", broken)
+    monkeypatch.setattr("jointscope.robots.files.robot_file.load_robot", broken)
     assert main(["calibrate", "doggy", "no.mcap", "-o", "o.yaml"]) == 1
     assert "this is a bug in jointscope: AttributeError: x has no y" in capsys.readouterr().err

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.bodies.rigid_tree import RigidTree
 
 TYPES = {
     "control_msgs/msg/InterfaceValue": "string[] interface_names\nfloat64[] values",

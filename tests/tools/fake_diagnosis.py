@@ -8,12 +8,12 @@ import dataclasses
 import numpy as np
 from fake_results import fake_model, fake_recording, sinusoids
 
-from jointscope.graphs.diagnosis_result import Candidate, Diagnosis, EffectEstimate
-from jointscope.graphs.discovery_result import Discovery, DiscoveryStep
-from jointscope.graphs.failure_analysis import ChannelFailure, FailureAnalysis
-from jointscope.graphs.missing_torque import MissingTorque
-from jointscope.robots.effect_editing import add_effect
-from jointscope.robots.robot_file import load_robot
+from jointscope.graphs.comparison.failure_analysis import ChannelFailure, FailureAnalysis
+from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis, EffectEstimate
+from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep
+from jointscope.graphs.discovery.missing_torque import MissingTorque
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
 
 BEARING = "bearing_flexibility@joint1"
 REGIMES = ("standstill", "reversal", "fast", "loaded", "other")

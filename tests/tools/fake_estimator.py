@@ -9,10 +9,10 @@ from collections import Counter, deque
 import numpy as np
 
 from jointscope.graphs.fixed_lag.estimated_state import EstimatedState
-from jointscope.graphs.fixed_lag.event import Event
-from jointscope.graphs.fixed_lag.innovation import Innovation
-from jointscope.graphs.fixed_lag.status import EstimatorStatus
+from jointscope.graphs.fixed_lag.messages.event import Event
+from jointscope.graphs.fixed_lag.messages.status import EstimatorStatus
 from jointscope.graphs.fixed_lag.tick import Tick
+from jointscope.graphs.fixed_lag.window.innovation import Innovation
 
 
 class FakeEstimator:

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.calibration_result import (
+from jointscope.graphs.calibration.calibration_result import (
     BagFit,
     CalibrationResult,
     ChannelFit,
@@ -17,17 +17,17 @@ from jointscope.graphs.calibration_result import (
     ResidualSeries,
     WeakDirection,
 )
-from jointscope.graphs.comparison_result import (
+from jointscope.graphs.comparison.comparison_result import (
     ChannelComparison,
     ComparisonResult,
     ModelComparison,
     SensorPrediction,
     WorstWindow,
 )
-from jointscope.robots.effect_editing import add_effect
-from jointscope.robots.recording import Notice, Recording, Stream
-from jointscope.robots.robot import ProcessNoise
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
 
 HORIZONS = ("0.01", "0.1", "1.0", "open_loop")
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot_file import load_robot
-from jointscope.tools.bags.message_type import known_message_type
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.bags.messages.message_type import known_message_type
 from jointscope.tools.bags.read_recording import needed_streams, read_recording
 from jointscope.tools.bags.write_bag import write_bag
 

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.recording import Recording
-from jointscope.tools.calibration_text import calibration_text
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.report import calibration_report, comparison_report, write_report
-from jointscope.tools.report.decimate import min_max
-from jointscope.tools.report.judgement import judge
-from jointscope.tools.report.numbers import prefixed, significant, with_sigma
-from jointscope.tools.report.page import sentence
-from jointscope.tools.report.plot import Axes, Band, Bars, Curve, path, plot
-from jointscope.tools.report.scale import log_ticks, nice_ticks
-from jointscope.tools.report.sparse_series import joined
+from jointscope.tools.report.page.decimate import min_max
+from jointscope.tools.report.page.page import sentence
+from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, path, plot
+from jointscope.tools.report.page.scale import log_ticks, nice_ticks
+from jointscope.tools.report.page.sparse_series import joined
+from jointscope.tools.terminal.calibration_text import calibration_text
 
 FAKES = runpy.run_path(str(Path(__file__).with_name("fake_results.py")))
 VOID = {"meta", "br", "link", "img", "input", "hr"}

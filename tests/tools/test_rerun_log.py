@@ -12,10 +12,10 @@ import pytest
 
 from jointscope.robots.errors import JointscopeError, RecordingError
 from jointscope.tools.rerun_log import log_calibration, log_comparison
-from jointscope.tools.rerun_log.covariance_picture import correlation_picture
-from jointscope.tools.rerun_log.moving_robot import position_covariance
-from jointscope.tools.rerun_log.rrd_file import _check_complete
-from jointscope.tools.rerun_log.viewer_text import viewer_text
+from jointscope.tools.rerun_log.entities.covariance_picture import correlation_picture
+from jointscope.tools.rerun_log.entities.moving_robot import position_covariance
+from jointscope.tools.rerun_log.entities.rrd_file import _check_complete
+from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 from jointscope.tools.verbs import view
 
 FAKES = runpy.run_path(str(Path(__file__).with_name("fake_results.py")))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.resting_joints import must_move
-from jointscope.robots.robot import Robot
-from jointscope.robots.screening import screen
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.resting_joints import must_move
+from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import joined
 from jointscope.tools.bags.bag_description import (
     BagDescription,
@@ -19,11 +19,9 @@ from jointscope.tools.bags.bag_description import (
     NeedDescription,
     TopicDescription,
 )
-from jointscope.tools.bags.clock_steps import on_one_clock
-from jointscope.tools.bags.columns import Columns
-from jointscope.tools.bags.message_type import MessageType, inner_type
-from jointscope.tools.bags.not_finite import numbers_only
-from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
+from jointscope.tools.bags.messages.columns import Columns
+from jointscope.tools.bags.messages.message_type import MessageType, inner_type
+from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
 from jointscope.tools.bags.read_recording import (
     check_topic,
     full_type_name,
@@ -32,10 +30,12 @@ from jointscope.tools.bags.read_recording import (
     read_columns,
     read_recording,
 )
-from jointscope.tools.bags.stream_notices import clipping_notices, timing
-from jointscope.tools.bags.time_order import in_time_order
-from jointscope.tools.bags.timed_samples import TimedSamples
-from jointscope.tools.bags.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.tidying.clock_steps import on_one_clock
+from jointscope.tools.bags.tidying.not_finite import numbers_only
+from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing
+from jointscope.tools.bags.tidying.time_order import in_time_order
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
 
 FLOATS = ("float32", "float64")
 NOT_SHOWN = "covariance"

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.tools.bags.columns import Columns, LeftOut
-from jointscope.tools.bags.message_parts import MessageParts
+from jointscope.tools.bags.messages.columns import Columns, LeftOut
+from jointscope.tools.bags.messages.message_parts import MessageParts
 
 NAMES_SAID = 6
 

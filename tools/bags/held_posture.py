@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Notice
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor, si_unit
-from jointscope.tools.bags.message_parts import MessageParts
-from jointscope.tools.bags.not_finite import LARGEST
+from jointscope.tools.bags.messages.message_parts import MessageParts
+from jointscope.tools.bags.tidying.not_finite import LARGEST
 
 STILL = {"rad": 0.03, "m": 0.005}  # a joint that spans less is held; its weight then moves as little
 OUTLYING = 0.005  # share of the samples on either side that does not count: glitches, foreign messages

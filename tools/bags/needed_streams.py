@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Notice
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Topic
-from jointscope.robots.wrapped_counter import continued
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Topic
+from jointscope.robots.recordings.recording import Notice
+from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
-from jointscope.tools.bags.columns import Columns
-from jointscope.tools.bags.field_path import field_path
-from jointscope.tools.bags.message_type import MessageType
-from jointscope.tools.bags.open_bag import Bag
+from jointscope.tools.bags.messages.columns import Columns
+from jointscope.tools.bags.messages.field_path import field_path
+from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.messages.open_bag import Bag
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from jointscope.graphs.fixed_lag.replay_result import ReplaySource
-from jointscope.robots.arrivals import Arrivals
+from jointscope.graphs.fixed_lag.replay.replay_result import ReplaySource
 from jointscope.robots.errors import RobotError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.tools.bags.columns import Columns
-from jointscope.tools.bags.durations import counted
-from jointscope.tools.bags.message_type import MessageType
-from jointscope.tools.bags.open_bag import Progress, RawTopic, bag_sha256, open_bag
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.arrivals import Arrivals
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.bags.messages.columns import Columns
+from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.messages.open_bag import Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.read_recording import (
     StreamSource,
     check_topic,
@@ -32,6 +31,7 @@ from jointscope.tools.bags.read_recording import (
     read_columns,
     wanted_of,
 )
+from jointscope.tools.bags.tidying.durations import counted
 
 BLOCK = 20_000  # messages
 ONE_SECOND = 1_000_000_000  # [ns]

@@ -11,19 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Notice, Recording, Stream
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
+from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.units import joined
-from jointscope.robots.wrapped_counter import continued
-from jointscope.tools.bags.clock_steps import on_one_clock
-from jointscope.tools.bags.columns import Columns
-from jointscope.tools.bags.durations import counted
 from jointscope.tools.bags.fitting_messages import fitting_messages
 from jointscope.tools.bags.held_posture import held_posture
-from jointscope.tools.bags.long_holes import with_short_holes
-from jointscope.tools.bags.message_parts import message_parts
-from jointscope.tools.bags.message_type import MessageType
+from jointscope.tools.bags.messages.columns import Columns
+from jointscope.tools.bags.messages.message_parts import message_parts
+from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
 from jointscope.tools.bags.needed_streams import StreamSource as StreamSource
 from jointscope.tools.bags.needed_streams import check_topic as check_topic
 from jointscope.tools.bags.needed_streams import column_order as column_order
@@ -31,16 +29,18 @@ from jointscope.tools.bags.needed_streams import full_type_name as full_type_nam
 from jointscope.tools.bags.needed_streams import in_si as in_si
 from jointscope.tools.bags.needed_streams import needed_streams as needed_streams
 from jointscope.tools.bags.needed_streams import wanted_of as wanted_of
-from jointscope.tools.bags.not_finite import without_gibberish
-from jointscope.tools.bags.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
-from jointscope.tools.bags.own_stamps import at_message_stamps
 from jointscope.tools.bags.silences import with_silences_left_out
-from jointscope.tools.bags.stream_notices import by_importance, clipping_notices, timing_notices
-from jointscope.tools.bags.tidy_samples import cleaned_sensor
-from jointscope.tools.bags.time_order import in_time_order
-from jointscope.tools.bags.timed_samples import TimedSamples
-from jointscope.tools.bags.two_clocks import brought_together
-from jointscope.tools.bags.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.tidying.clock_steps import on_one_clock
+from jointscope.tools.bags.tidying.durations import counted
+from jointscope.tools.bags.tidying.long_holes import with_short_holes
+from jointscope.tools.bags.tidying.not_finite import without_gibberish
+from jointscope.tools.bags.tidying.own_stamps import at_message_stamps
+from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, timing_notices
+from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
+from jointscope.tools.bags.tidying.time_order import in_time_order
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.tidying.two_clocks import brought_together
+from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
 from jointscope.tools.bags.unstamped import sent_earlier
 
 

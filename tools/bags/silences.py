@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Notice, Recording, Stream
-from jointscope.tools.bags.durations import duration
-from jointscope.tools.bags.stream_notices import timing
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
+from jointscope.tools.bags.tidying.durations import duration
+from jointscope.tools.bags.tidying.stream_notices import timing
 
 Stretch = tuple[float, float]
 

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from jointscope.robots.recording import Notice
-from jointscope.tools.bags.durations import duration
-from jointscope.tools.bags.timed_samples import TimedSamples
+from jointscope.robots.recordings.recording import Notice
+from jointscope.tools.bags.tidying.durations import duration
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 LONGEST = 0.05  # [s] a longer latency is that of a driver, not of the transport, or of another clock
 

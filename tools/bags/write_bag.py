@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot import Robot
-from jointscope.tools.bags.message_template import fill_messages
-from jointscope.tools.bags.message_type import MessageType, known_message_type
-from jointscope.tools.bags.open_bag import Progress, one_line, storage_files
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.bags.messages.message_template import fill_messages
+from jointscope.tools.bags.messages.message_type import MessageType, known_message_type
+from jointscope.tools.bags.messages.open_bag import Progress, one_line, storage_files
 from jointscope.tools.bags.read_recording import StreamSource, full_type_name, needed_streams
 
 FORMATS = ("bag", "db3", "mcap")

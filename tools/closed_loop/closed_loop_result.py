@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.tools.closed_loop.estimator_account import EstimatorAccount
-from jointscope.tools.closed_loop.plan import Plan
-from jointscope.tools.closed_loop.tracking import Tracking
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.closed_loop.planning.estimator_account import EstimatorAccount
+from jointscope.tools.closed_loop.planning.plan import Plan
+from jointscope.tools.closed_loop.planning.tracking import Tracking
 
 Array = NDArray[np.float64]
 

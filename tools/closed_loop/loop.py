@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.closed_loop.controllers.control_law import ControlLaw
 from jointscope.tools.closed_loop.sources.state_source import StateSource
-from jointscope.tools.simulator.engine import TICK
-from jointscope.tools.simulator.online_sensors import OnlineSensors
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.tools.simulator.loop.online_sensors import OnlineSensors
+from jointscope.tools.simulator.world.engine import TICK
+from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

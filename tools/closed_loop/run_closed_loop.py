@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError, SimulationError
-from jointscope.robots.robot import Robot
-from jointscope.robots.sensors import Sensor
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Sensor
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.closed_loop.controllers.control_law import ControlLaw
 from jointscope.tools.closed_loop.controllers.proportional_control import ProportionalControl
 from jointscope.tools.closed_loop.controllers.state_feedback import StateFeedback
-from jointscope.tools.closed_loop.hitting_plan import hitting_plan
 from jointscope.tools.closed_loop.loop import Loop
-from jointscope.tools.closed_loop.plan import Plan
-from jointscope.tools.closed_loop.reference import model_reference
+from jointscope.tools.closed_loop.planning.hitting_plan import hitting_plan
+from jointscope.tools.closed_loop.planning.plan import Plan
+from jointscope.tools.closed_loop.planning.reference import model_reference
+from jointscope.tools.closed_loop.planning.tracking import tracking
 from jointscope.tools.closed_loop.sources.differentiated_encoders import CUTOFF, DifferentiatedEncoders
 from jointscope.tools.closed_loop.sources.estimated_state import (
     LAG,
@@ -32,13 +33,12 @@ from jointscope.tools.closed_loop.sources.estimated_state import (
 )
 from jointscope.tools.closed_loop.sources.state_source import StateSource
 from jointscope.tools.closed_loop.sources.true_state import TrueState
-from jointscope.tools.closed_loop.tracking import tracking
-from jointscope.tools.simulator.controller import full_command
-from jointscope.tools.simulator.engine import TICK, Engine
+from jointscope.tools.simulator.loop.controller import full_command
+from jointscope.tools.simulator.loop.online_sensors import OnlineSensors
 from jointscope.tools.simulator.occasion import Conditions, Occasion
-from jointscope.tools.simulator.online_sensors import OnlineSensors
-from jointscope.tools.simulator.random_streams import random_stream
 from jointscope.tools.simulator.truth import true_robot
+from jointscope.tools.simulator.world.engine import TICK, Engine
+from jointscope.tools.simulator.world.random_streams import random_stream
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]

@@ -6,7 +6,7 @@ from jointscope.tools.report.closed_loop_report import closed_loop_report
 from jointscope.tools.report.comparison_report import comparison_report
 from jointscope.tools.report.diagnosis_report import diagnosis_report
 from jointscope.tools.report.discovery_report import discovery_report
-from jointscope.tools.report.write_report import write_report
+from jointscope.tools.writing.write_report import write_report
 
 __all__ = [
     "calibration_report",

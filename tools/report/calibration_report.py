@@ -3,21 +3,21 @@
 
 from __future__ import annotations
 
-from jointscope.graphs.calibration_result import CalibrationResult
-from jointscope.tools.report.page import page
-from jointscope.tools.report.sections.commands import commands
-from jointscope.tools.report.sections.convergence import convergence
-from jointscope.tools.report.sections.correlation import correlation
-from jointscope.tools.report.sections.fits import fits
-from jointscope.tools.report.sections.mounting import mounting
-from jointscope.tools.report.sections.noise import noise
-from jointscope.tools.report.sections.notices import notices
-from jointscope.tools.report.sections.parameters import parameters
-from jointscope.tools.report.sections.provenance import provenance
-from jointscope.tools.report.sections.residuals import residuals
-from jointscope.tools.report.sections.states import states
-from jointscope.tools.report.sections.verdict import verdict
-from jointscope.tools.report.sections.weak_directions import weak_directions
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.tools.report.page.notices import notices
+from jointscope.tools.report.page.page import page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.calibration.commands import commands
+from jointscope.tools.report.sections.calibration.convergence import convergence
+from jointscope.tools.report.sections.calibration.correlation import correlation
+from jointscope.tools.report.sections.calibration.fits import fits
+from jointscope.tools.report.sections.calibration.mounting import mounting
+from jointscope.tools.report.sections.calibration.noise import noise
+from jointscope.tools.report.sections.calibration.parameters import parameters
+from jointscope.tools.report.sections.calibration.residuals import residuals
+from jointscope.tools.report.sections.calibration.states import states
+from jointscope.tools.report.sections.calibration.verdict import verdict
+from jointscope.tools.report.sections.calibration.weak_directions import weak_directions
 
 
 def calibration_report(result: CalibrationResult) -> str:

@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 from jointscope.tools.closed_loop.closed_loop_result import ClosedLoopResult
-from jointscope.tools.report.page import page
-from jointscope.tools.report.sections.loop_answer import loop_answer
-from jointscope.tools.report.sections.loop_commands import loop_commands
-from jointscope.tools.report.sections.loop_errors import loop_errors
-from jointscope.tools.report.sections.loop_hits import loop_hits
-from jointscope.tools.report.sections.loop_knowledge import loop_knowledge
-from jointscope.tools.report.sections.loop_scores import loop_scores
-from jointscope.tools.report.sections.loop_setup import loop_setup
-from jointscope.tools.report.sections.provenance import provenance
+from jointscope.tools.report.page.page import page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.closed_loop.loop_answer import loop_answer
+from jointscope.tools.report.sections.closed_loop.loop_commands import loop_commands
+from jointscope.tools.report.sections.closed_loop.loop_errors import loop_errors
+from jointscope.tools.report.sections.closed_loop.loop_hits import loop_hits
+from jointscope.tools.report.sections.closed_loop.loop_knowledge import loop_knowledge
+from jointscope.tools.report.sections.closed_loop.loop_scores import loop_scores
+from jointscope.tools.report.sections.closed_loop.loop_setup import loop_setup
 
 
 def closed_loop_report(result: ClosedLoopResult) -> str:

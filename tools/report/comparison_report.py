@@ -5,15 +5,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jointscope.graphs.comparison_result import ComparisonResult
-from jointscope.tools.report.page import page
-from jointscope.tools.report.sections.horizon_curve import horizon_curve
-from jointscope.tools.report.sections.horizon_table import horizon_table
-from jointscope.tools.report.sections.model_scores import model_scores
-from jointscope.tools.report.sections.notices import notices
-from jointscope.tools.report.sections.predictions import predictions
-from jointscope.tools.report.sections.provenance import provenance
-from jointscope.tools.report.sections.worst_windows import worst_windows
+from jointscope.graphs.comparison.comparison_result import ComparisonResult
+from jointscope.tools.report.page.notices import notices
+from jointscope.tools.report.page.page import page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.comparison.horizon_curve import horizon_curve
+from jointscope.tools.report.sections.comparison.horizon_table import horizon_table
+from jointscope.tools.report.sections.comparison.model_scores import model_scores
+from jointscope.tools.report.sections.comparison.predictions import predictions
+from jointscope.tools.report.sections.comparison.worst_windows import worst_windows
 
 
 def comparison_report(result: ComparisonResult) -> str:

@@ -5,23 +5,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jointscope.graphs.diagnosis_result import Diagnosis
-from jointscope.tools.report.compared_models import of_diagnosis
-from jointscope.tools.report.page import Section, page
-from jointscope.tools.report.sections.channel_failures import channel_failures
-from jointscope.tools.report.sections.diagnosis_verdict import diagnosis_verdict
-from jointscope.tools.report.sections.failure_correlations import failure_correlations
-from jointscope.tools.report.sections.horizon_curve import horizon_curve
-from jointscope.tools.report.sections.next_commands import after_diagnosis
-from jointscope.tools.report.sections.noise_levels import noise_levels
-from jointscope.tools.report.sections.notices import notices
-from jointscope.tools.report.sections.provenance import provenance
-from jointscope.tools.report.sections.ranking import ranking
-from jointscope.tools.report.sections.regimes import regimes
-from jointscope.tools.report.sections.torque_maps import torque_maps
-from jointscope.tools.report.sections.torque_over_time import torque_over_time
-from jointscope.tools.report.sections.untestable import untestable
-from jointscope.tools.report.sections.worst_windows import worst_windows
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.tools.presentation.compared_models import of_diagnosis
+from jointscope.tools.report.page.notices import notices
+from jointscope.tools.report.page.page import Section, page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.comparison.horizon_curve import horizon_curve
+from jointscope.tools.report.sections.comparison.worst_windows import worst_windows
+from jointscope.tools.report.sections.diagnosis.channel_failures import channel_failures
+from jointscope.tools.report.sections.diagnosis.diagnosis_verdict import diagnosis_verdict
+from jointscope.tools.report.sections.diagnosis.failure_correlations import failure_correlations
+from jointscope.tools.report.sections.diagnosis.next_commands import after_diagnosis
+from jointscope.tools.report.sections.diagnosis.noise_levels import noise_levels
+from jointscope.tools.report.sections.diagnosis.ranking import ranking
+from jointscope.tools.report.sections.diagnosis.regimes import regimes
+from jointscope.tools.report.sections.diagnosis.torque_maps import torque_maps
+from jointscope.tools.report.sections.diagnosis.torque_over_time import torque_over_time
+from jointscope.tools.report.sections.diagnosis.untestable import untestable
 
 
 def diagnosis_report(result: Diagnosis) -> str:

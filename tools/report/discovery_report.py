@@ -7,25 +7,25 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
-from jointscope.graphs.discovery_result import Discovery, DiscoveryStep
-from jointscope.tools.report.compared_models import of_discovery
-from jointscope.tools.report.page import Section, foldable, page
-from jointscope.tools.report.sections.channel_failures import channel_failures
-from jointscope.tools.report.sections.discovery_verdict import discovery_verdict
-from jointscope.tools.report.sections.failure_correlations import failure_correlations
-from jointscope.tools.report.sections.found_parameters import found_parameters
-from jointscope.tools.report.sections.horizon_curve import horizon_curve
-from jointscope.tools.report.sections.next_commands import after_discovery
-from jointscope.tools.report.sections.noise_levels import noise_levels
-from jointscope.tools.report.sections.notices import notices
-from jointscope.tools.report.sections.provenance import provenance
-from jointscope.tools.report.sections.ranking import ranking
-from jointscope.tools.report.sections.regimes import regimes
-from jointscope.tools.report.sections.torque_maps import torque_maps
-from jointscope.tools.report.sections.torque_over_time import torque_over_time
-from jointscope.tools.report.sections.untestable import untestable
-from jointscope.tools.report.sections.waterfall import waterfall
-from jointscope.tools.report.sections.worst_windows import worst_windows
+from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep
+from jointscope.tools.presentation.compared_models import of_discovery
+from jointscope.tools.report.page.notices import notices
+from jointscope.tools.report.page.page import Section, foldable, page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.comparison.horizon_curve import horizon_curve
+from jointscope.tools.report.sections.comparison.worst_windows import worst_windows
+from jointscope.tools.report.sections.diagnosis.channel_failures import channel_failures
+from jointscope.tools.report.sections.diagnosis.discovery_verdict import discovery_verdict
+from jointscope.tools.report.sections.diagnosis.failure_correlations import failure_correlations
+from jointscope.tools.report.sections.diagnosis.found_parameters import found_parameters
+from jointscope.tools.report.sections.diagnosis.next_commands import after_discovery
+from jointscope.tools.report.sections.diagnosis.noise_levels import noise_levels
+from jointscope.tools.report.sections.diagnosis.ranking import ranking
+from jointscope.tools.report.sections.diagnosis.regimes import regimes
+from jointscope.tools.report.sections.diagnosis.torque_maps import torque_maps
+from jointscope.tools.report.sections.diagnosis.torque_over_time import torque_over_time
+from jointscope.tools.report.sections.diagnosis.untestable import untestable
+from jointscope.tools.report.sections.diagnosis.waterfall import waterfall
 
 BEFORE_AFTER = "Worst windows, before and after"
 BEFORE_AFTER_LEAD = (

@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-from jointscope.graphs.fixed_lag.replay_result import ReplayResult
-from jointscope.tools.report.page import page
-from jointscope.tools.report.sections.batch_agreement import agreement
-from jointscope.tools.report.sections.correlation_over_time import correlation_over_time
-from jointscope.tools.report.sections.events import events, messages
-from jointscope.tools.report.sections.innovations import innovations
-from jointscope.tools.report.sections.latency import latency
-from jointscope.tools.report.sections.nis import nis
-from jointscope.tools.report.sections.provenance import provenance
-from jointscope.tools.report.sections.replay_states import replay_states
-from jointscope.tools.report.sections.replay_verdict import replay_verdict
+from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
+from jointscope.tools.report.page.page import page
+from jointscope.tools.report.page.provenance import provenance
+from jointscope.tools.report.sections.replay.batch_agreement import agreement
+from jointscope.tools.report.sections.replay.correlation_over_time import correlation_over_time
+from jointscope.tools.report.sections.replay.events import events, messages
+from jointscope.tools.report.sections.replay.innovations import innovations
+from jointscope.tools.report.sections.replay.latency import latency
+from jointscope.tools.report.sections.replay.nis import nis
+from jointscope.tools.report.sections.replay.replay_states import replay_states
+from jointscope.tools.report.sections.replay.replay_verdict import replay_verdict
 
 
 def replay_report(result: ReplayResult) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery
-from jointscope.tools.report.numbers import significant
-from jointscope.tools.report.page import Key, Section, figure, page, sentence, table
-from jointscope.tools.report.plot import Axes, Curve, plot
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.report.page.page import Key, Section, figure, page, sentence, table
+from jointscope.tools.report.page.plot import Axes, Curve, plot
 
 MILLI = 1e3
 AXES = "xyz"
@@ -51,7 +51,7 @@ def _waterfall(result: TransmissionDiscovery) -> Section:
 
 
 def _sizes(result: TransmissionDiscovery) -> Section:
-    from jointscope.tools.transmission_text import size_rows
+    from jointscope.tools.terminal.transmission_text import size_rows
 
     rows = [[escape(cell) for cell in row] for row in size_rows(result)]
     lead = "Standard deviations are the spread over blocks of the recordings that were left out one by one."

@@ -13,18 +13,18 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from jointscope.graphs.fixed_lag.estimated_state import EstimatedState
-from jointscope.graphs.fixed_lag.event import Event
+from jointscope.graphs.fixed_lag.messages.event import Event
+from jointscope.graphs.fixed_lag.replay.tick_log import TickLog
 from jointscope.graphs.fixed_lag.tick import Tick
-from jointscope.graphs.fixed_lag.tick_log import TickLog
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.outside_modules import need_module
-from jointscope.robots.robot import Robot
-from jointscope.tools.rerun_log.correlation_over_time import send_correlations
-from jointscope.tools.rerun_log.estimate_lines import send_estimate_lines
-from jointscope.tools.rerun_log.event_lines import send_events, send_latency
-from jointscope.tools.rerun_log.innovation_lines import send_innovations, send_nis
+from jointscope.tools.rerun_log.entities.correlation_over_time import send_correlations
+from jointscope.tools.rerun_log.entities.estimate_lines import send_estimate_lines
+from jointscope.tools.rerun_log.entities.event_lines import send_events, send_latency
+from jointscope.tools.rerun_log.entities.innovation_lines import send_innovations, send_nis
+from jointscope.tools.rerun_log.entities.rrd_file import APPLICATION
 from jointscope.tools.rerun_log.log_replay import replay_blueprint, send_pose
-from jointscope.tools.rerun_log.rrd_file import APPLICATION
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -6,16 +6,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jointscope.graphs.calibration_result import CalibrationResult
-from jointscope.tools.report.judgement import judge
-from jointscope.tools.report.sensor_signals import bag_name
-from jointscope.tools.rerun_log.covariance_picture import covariance_views, send_covariance
-from jointscope.tools.rerun_log.moving_robot import robot_view, send_robot
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.sensor_lines import send_sensors, sensor_views
-from jointscope.tools.rerun_log.state_lines import send_states, state_views
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.viewer_text import viewer_text
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.presentation.sensor_signals import bag_name
+from jointscope.tools.rerun_log.entities.covariance_picture import covariance_views, send_covariance
+from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_robot
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.sensor_lines import send_sensors, sensor_views
+from jointscope.tools.rerun_log.entities.state_lines import send_states, state_views
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
-from jointscope.tools.closed_loop_text import closed_loop_text
-from jointscope.tools.report.sections.loop_answer import loop_judgement
-from jointscope.tools.rerun_log.columns import GREY, WHITE, Colour, send_lines, thinned, time_column
-from jointscope.tools.rerun_log.moving_robot import robot_view, send_bodies
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.viewer_text import entity, viewer_text
+from jointscope.tools.report.sections.closed_loop.loop_answer import loop_judgement
+from jointscope.tools.rerun_log.entities.columns import GREY, WHITE, Colour, send_lines, thinned, time_column
+from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_bodies
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
+from jointscope.tools.terminal.closed_loop_text import closed_loop_text
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -6,12 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jointscope.graphs.comparison_result import ComparisonResult
-from jointscope.tools.report.numbers import percent, significant
-from jointscope.tools.rerun_log.prediction_lines import prediction_bytes, prediction_views, send_predictions
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.viewer_text import viewer_text
+from jointscope.graphs.comparison.comparison_result import ComparisonResult
+from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 
 if TYPE_CHECKING:
     import rerun as rr

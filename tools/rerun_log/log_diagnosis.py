@@ -6,13 +6,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jointscope.graphs.diagnosis_result import Diagnosis
-from jointscope.tools.report.compared_models import of_diagnosis
-from jointscope.tools.rerun_log.diagnosis_documents import diagnosis_markdown, ranking_markdown, send_document
-from jointscope.tools.rerun_log.prediction_lines import prediction_bytes, prediction_views, send_predictions
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.torque_lines import send_torque, torque_bytes, torque_views
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.tools.presentation.compared_models import of_diagnosis
+from jointscope.tools.rerun_log.entities.diagnosis_documents import diagnosis_markdown, ranking_markdown, send_document
+from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.torque_lines import send_torque, torque_bytes, torque_views
 
 if TYPE_CHECKING:
     import rerun.blueprint as rrb

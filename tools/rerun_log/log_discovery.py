@@ -7,21 +7,21 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jointscope.graphs.diagnosis_result import Diagnosis
-from jointscope.graphs.discovery_result import Discovery
-from jointscope.tools.report.compared_models import of_discovery
-from jointscope.tools.rerun_log.columns import JOINT_COLOURS
-from jointscope.tools.rerun_log.diagnosis_documents import (
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.discovery_result import Discovery
+from jointscope.tools.presentation.compared_models import of_discovery
+from jointscope.tools.rerun_log.entities.columns import JOINT_COLOURS
+from jointscope.tools.rerun_log.entities.diagnosis_documents import (
     diagnosis_markdown,
     discovery_markdown,
     ranking_markdown,
     send_document,
 )
-from jointscope.tools.rerun_log.prediction_lines import prediction_bytes, prediction_views, send_predictions
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.torque_lines import send_torque, torque_bytes, torque_views
-from jointscope.tools.rerun_log.viewer_text import viewer_text
+from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.torque_lines import send_torque, torque_bytes, torque_views
+from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 
 if TYPE_CHECKING:
     import rerun as rr

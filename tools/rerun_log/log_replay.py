@@ -6,11 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jointscope.graphs.fixed_lag.replay_result import CovarianceSeries, ReplayResult, StateSeries
-from jointscope.robots.robot import Robot
-from jointscope.tools.replay_judgement import diagnose_command, judge_replay, suspects
-from jointscope.tools.rerun_log.correlation_over_time import correlation_view, send_correlations
-from jointscope.tools.rerun_log.estimate_lines import (
+from jointscope.graphs.fixed_lag.replay.replay_result import CovarianceSeries, ReplayResult, StateSeries
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.presentation.replay_judgement import diagnose_command, judge_replay, suspects
+from jointscope.tools.presentation.tip_ellipsoid import link_coordinates
+from jointscope.tools.rerun_log.entities.correlation_over_time import correlation_view, send_correlations
+from jointscope.tools.rerun_log.entities.estimate_lines import (
     bias_views,
     correction_views,
     estimate_views,
@@ -19,14 +20,13 @@ from jointscope.tools.rerun_log.estimate_lines import (
     send_estimate_lines,
     sigma_views,
 )
-from jointscope.tools.rerun_log.event_lines import event_view, latency_views, send_events, send_latency
-from jointscope.tools.rerun_log.innovation_lines import innovation_views, nis_views, send_innovations, send_nis
+from jointscope.tools.rerun_log.entities.event_lines import event_view, latency_views, send_events, send_latency
+from jointscope.tools.rerun_log.entities.innovation_lines import innovation_views, nis_views, send_innovations, send_nis
+from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_estimate
+from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
+from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 from jointscope.tools.rerun_log.log_calibration import SIGNS
-from jointscope.tools.rerun_log.moving_robot import robot_view, send_estimate
-from jointscope.tools.rerun_log.rrd_file import rrd_file
-from jointscope.tools.rerun_log.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.viewer_text import viewer_text
-from jointscope.tools.tip_ellipsoid import link_coordinates
 
 if TYPE_CHECKING:
     import rerun as rr

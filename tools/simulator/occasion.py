@@ -15,19 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.recording import Recording, Stream
-from jointscope.robots.robot import Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.units import si_unit
-from jointscope.tools.simulator.disturbance import Disturbance
 from jointscope.tools.simulator.effects import make_effects
-from jointscope.tools.simulator.engine import STEPS_PER_TICK, TICK, Controller, Engine
-from jointscope.tools.simulator.motion import MIN_REST, start_position
-from jointscope.tools.simulator.online_encoder import OnlineEncoder
-from jointscope.tools.simulator.random_streams import random_stream
-from jointscope.tools.simulator.sampled_sensor import SampledEncoder, SampledGyro, SampledSensor
-from jointscope.tools.simulator.sensing import MountedGyro, Sampling
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.tools.simulator.loop.motion import MIN_REST, start_position
+from jointscope.tools.simulator.loop.online_encoder import OnlineEncoder
+from jointscope.tools.simulator.loop.sampled_sensor import SampledEncoder, SampledGyro, SampledSensor
+from jointscope.tools.simulator.loop.sensing import MountedGyro, Sampling
 from jointscope.tools.simulator.truth import effect_records, true_parameters, true_robot
+from jointscope.tools.simulator.world.disturbance import Disturbance
+from jointscope.tools.simulator.world.engine import STEPS_PER_TICK, TICK, Controller, Engine
+from jointscope.tools.simulator.world.random_streams import random_stream
+from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.controller import PController
-from jointscope.tools.simulator.disturbance import Disturbance
-from jointscope.tools.simulator.engine import STEPS_PER_TICK, TICK
-from jointscope.tools.simulator.motion import make_motion
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.simulator.loop.controller import PController
+from jointscope.tools.simulator.loop.motion import make_motion
+from jointscope.tools.simulator.loop.sensing import Sampling
 from jointscope.tools.simulator.occasion import Conditions, Occasion
-from jointscope.tools.simulator.sensing import Sampling
+from jointscope.tools.simulator.world.disturbance import Disturbance
+from jointscope.tools.simulator.world.engine import STEPS_PER_TICK, TICK
 
 Array = NDArray[np.float64]
 

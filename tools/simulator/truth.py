@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.robots.effects_at_once import without_effects
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.sensing import MountedGyro
+from jointscope.robots.files.effects_at_once import without_effects
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.simulator.loop.sensing import MountedGyro
+from jointscope.tools.simulator.world.effect import SimulatedEffect
 
 TINY = 1e-12  # in the unit of the parameter; inertia and stiffness must be above
 

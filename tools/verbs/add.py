@@ -6,8 +6,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, notes, only_in
-from jointscope.tools.text_table import text_table
+from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 
 EXAMPLE = """example:
   jointscope add doggy bearing_flexibility@joint1 -o doggy_bearing.yaml
@@ -33,8 +33,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Adds, writes, and says what a calibration will find."""
-    from jointscope.robots.effects_at_once import add_effects
-    from jointscope.tools.report.numbers import significant
+    from jointscope.robots.files.effects_at_once import add_effects
+    from jointscope.tools.presentation.numbers import significant
 
     before, edited = edit_robot(args, add_effects)
     rows = [

@@ -7,11 +7,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from jointscope.tools.left_out import add_leave_out_option, leave_out
-from jointscope.tools.progress import progress_bar, reading
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_calibration
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs
+from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
+from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
@@ -42,11 +42,11 @@ def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
     files = ResultFiles.of(args)
     check_outputs(files.all, inputs=[*args.bags, *args.effects])
-    from jointscope.graphs.calibrate import calibrate
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.graphs.calibration.calibrate import calibrate
+    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags import read_recording
-    from jointscope.tools.calibration_text import calibration_text
-    from jointscope.tools.first_look import first_look
+    from jointscope.tools.terminal.calibration_text import calibration_text
+    from jointscope.tools.verb_parts.first_look import first_look
 
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
         if robot.free_links:
-            from jointscope.tools.free_links import run_free_links
+            from jointscope.tools.verb_parts.free_links import run_free_links
 
             text = run_free_links(robot, recordings, None, files, False, progress)
         else:

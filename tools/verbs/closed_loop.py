@@ -9,12 +9,12 @@ from typing import Any
 
 from jointscope.robots.errors import SimulationError
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES
-from jointscope.tools.progress import progress_bar
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_closed_loop
-from jointscope.tools.simulation_options import add_simulation_options, conditions_of
 from jointscope.tools.simulator.effect_list import effect_list
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_closed_loop
+from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope closed-loop doggy --seed 3 --friction smooth --report loop.html
@@ -84,10 +84,10 @@ def run(args: argparse.Namespace) -> int:
     robot_files = [name for name in (args.robot, args.model) if name is not None and Path(name).is_file()]
     outputs = [bag if bag is not None and bag.suffix else None, truth_file, *files.all]
     check_outputs(outputs, inputs=[*robot_files, *args.effects])
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.write_bag import write_bag
     from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
-    from jointscope.tools.closed_loop_text import closed_loop_text
+    from jointscope.tools.terminal.closed_loop_text import closed_loop_text
 
     load_user_effects(args.effects)
     robot = load_robot(args.robot)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RobotError
-from jointscope.tools.left_out import add_leave_out_option, leave_out
-from jointscope.tools.progress import progress_bar, reading
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_comparison
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs
+from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
+from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_comparison
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
@@ -49,10 +49,10 @@ def run(args: argparse.Namespace) -> int:
     names = labels(args.robots)
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
     check_outputs(files.all, inputs=[args.bag, *robot_files, *args.effects])
-    from jointscope.graphs.compare import compare
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.graphs.comparison.compare import compare
+    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags import read_recording
-    from jointscope.tools.comparison_text import comparison_text
+    from jointscope.tools.terminal.comparison_text import comparison_text
 
     load_user_effects(args.effects)
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope demo -o demo"""
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise JointscopeError(f"cannot write into {folder}: it is a file; expected a folder, or a new name")
     check_outputs([folder / "found.yaml" if folder.is_dir() else folder, args.json])
-    from jointscope.tools.demo_story import DemoStory
+    from jointscope.tools.verb_parts.demo_story import DemoStory
 
     try:
         with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as hidden:

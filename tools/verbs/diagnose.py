@@ -6,12 +6,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
-from jointscope.tools.named_recordings import diagnosis_of
-from jointscope.tools.progress import progress_bar
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_diagnosis
-from jointscope.tools.user_effects import load_user_effects
-from jointscope.tools.whole_file import check_outputs
+from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.verb_parts.named_recordings import diagnosis_of
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_diagnosis
+from jointscope.tools.verb_parts.user_effects import load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
@@ -39,9 +39,9 @@ def run(args: argparse.Namespace) -> int:
     files = ResultFiles.of(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
-    from jointscope.graphs.diagnose import diagnose
-    from jointscope.robots.robot_file import load_robot
-    from jointscope.tools.diagnosis_text import diagnosis_text
+    from jointscope.graphs.discovery.diagnose import diagnose
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
     with progress_bar() as progress:

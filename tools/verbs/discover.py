@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError
-from jointscope.robots.robot import Robot
-from jointscope.tools.bag_arguments import add_bag_arguments, input_files, read_bags
-from jointscope.tools.named_recordings import discovery_of
-from jointscope.tools.progress import Progress, progress_bar
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_discovery
-from jointscope.tools.user_effects import load_user_effects
-from jointscope.tools.whole_file import check_outputs
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.terminal.progress import Progress, progress_bar
+from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.verb_parts.named_recordings import discovery_of
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_discovery
+from jointscope.tools.verb_parts.user_effects import load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
@@ -48,20 +48,20 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Discovers, writes the files, and tells the steps."""
-    from jointscope.tools.discovery_state import state_file, step_file
+    from jointscope.tools.verb_parts.discovery_state import state_file, step_file
 
     files = ResultFiles.of(args)
     beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MAX_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
     load_user_effects(args.effects)
-    from jointscope.robots.robot_file import load_robot
-    from jointscope.tools.discovery_text import discovery_text
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.terminal.discovery_text import discovery_text
 
     robot = load_robot(args.robot)
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
         if robot.free_links:
-            from jointscope.tools.free_links import run_free_links
+            from jointscope.tools.verb_parts.free_links import run_free_links
 
             text = run_free_links(robot, recordings, holdout, files, True, progress)
         else:
@@ -79,8 +79,8 @@ def _discover(
     args: argparse.Namespace, robot: Robot, recordings: Sequence[Any], holdout: Any, progress: Progress
 ) -> Any:
     """The computation; whatever ends it, finished steps stay on disk."""
-    from jointscope.graphs.discover import discover
-    from jointscope.tools.discovery_state import DiscoveryState, hashes_of
+    from jointscope.graphs.discovery.discover import discover
+    from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
     hashes = hashes_of(robot, recordings, holdout, args.effects)
     state = DiscoveryState(args.output, hashes, recordings, robot.path.name)

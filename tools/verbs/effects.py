@@ -7,8 +7,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """examples:
   jointscope effects
@@ -37,8 +37,8 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lists, or prints one card."""
     check_outputs([args.json], inputs=args.effects)
-    from jointscope.robots.effect_catalogue import catalogue, find_effect
-    from jointscope.tools.effect_text import card_text, effect_json, list_text
+    from jointscope.robots.files.effect_catalogue import catalogue, find_effect
+    from jointscope.tools.terminal.effect_text import card_text, effect_json, list_text
 
     load_user_effects(args.effects)
     if args.id is None:

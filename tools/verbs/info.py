@@ -7,9 +7,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from jointscope.tools.progress import progress_bar, reading
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope info calibration.mcap
@@ -38,9 +38,9 @@ def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
     check_outputs([args.json], inputs=[args.bag, *args.effects])
     from jointscope.robots.errors import RecordingError
-    from jointscope.robots.robot_file import load_robot
+    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.describe_bag import describe_bag
-    from jointscope.tools.bags.open_bag import BAG_SUFFIXES
+    from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
     other = Path(args.robot or "")
     if args.robot and args.bag.suffix in (".yaml", ".yml") and (other.is_dir() or other.suffix in BAG_SUFFIXES):

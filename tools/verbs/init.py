@@ -7,11 +7,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jointscope.tools.progress import progress_bar, reading
-from jointscope.tools.whole_file import check_outputs, whole_file, write_json
+from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 if TYPE_CHECKING:
-    from jointscope.tools.robot_guess.named_signal import Wish
+    from jointscope.tools.init.streams.named_signal import Wish
 
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
@@ -53,14 +53,14 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Guesses, writes, reads the file again and says whether the bag fits it."""
     check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
-    from jointscope.robots.robot_file import load_robot, urdf_reference
+    from jointscope.robots.files.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
-    from jointscope.tools.robot_guess.drive_table import drive_content, drive_table
-    from jointscope.tools.robot_guess.drive_values import EXPLAINED
-    from jointscope.tools.robot_guess.held_text import locked_line
-    from jointscope.tools.robot_guess.other_joints import Typed
-    from jointscope.tools.robot_guess.robot_guess import guess_robot
-    from jointscope.tools.robot_guess.robot_text import guesses, robot_text
+    from jointscope.tools.init.estimates.drive_values import EXPLAINED
+    from jointscope.tools.init.robot_guess import guess_robot
+    from jointscope.tools.init.streams.other_joints import Typed
+    from jointscope.tools.init.text.drive_table import drive_content, drive_table
+    from jointscope.tools.init.text.held_text import locked_line
+    from jointscope.tools.init.text.robot_text import guesses, robot_text
 
     _check_order(args.urdf, args.bag)
     typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name)
@@ -110,7 +110,7 @@ def _check_order(urdf: Path, bag: Path) -> None:
     """Says at once that a URDF is missing, or that bag and URDF have changed places."""
     from jointscope.robots.errors import RobotError
     from jointscope.robots.yaml_section import did_you_mean
-    from jointscope.tools.bags.open_bag import BAG_SUFFIXES
+    from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
     if bag.suffix == ".urdf" and (urdf.is_dir() or urdf.suffix in BAG_SUFFIXES):
         raise RobotError(f"{urdf} is no URDF; the URDF comes first: jointscope init {bag} {urdf} -o ROBOT.yaml")
@@ -129,7 +129,7 @@ def _plain(line: str) -> str:
 
 def _wish(joints: str, locked: str) -> Wish:
     """What the options say about joints."""
-    from jointscope.tools.robot_guess.named_signal import Wish
+    from jointscope.tools.init.streams.named_signal import Wish
 
     given = [part.strip().partition("=") for part in joints.split(",") if part.strip()]
     return Wish(

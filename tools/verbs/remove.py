@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from jointscope.tools.edited_robot import add_edit_arguments, edit_robot, notes, only_in
+from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 
 EXAMPLE = """example:
   jointscope remove doggy_bearing.yaml bearing_flexibility@joint1 -o doggy_rigid.yaml
@@ -31,7 +31,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Removes, writes, and says what is gone."""
-    from jointscope.robots.effects_at_once import remove_effects
+    from jointscope.robots.files.effects_at_once import remove_effects
 
     before, edited = edit_robot(args, remove_effects)
     gone = ", ".join(p.name for p in only_in(before, edited.robot))

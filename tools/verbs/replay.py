@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.progress import progress_bar
-from jointscope.tools.result_files import ResultFiles, add_result_options, write_replay
-from jointscope.tools.state_table import check_table_name, state_table
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs
+from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_replay
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.state_table import check_table_name, state_table
+from jointscope.tools.writing.whole_file import check_outputs
 
 if TYPE_CHECKING:
-    from jointscope.graphs.fixed_lag.replay_result import ReplayResult
-    from jointscope.robots.robot import Robot
+    from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
+    from jointscope.robots.model.robot import Robot
     from jointscope.tools.bags import ArrivalReader
-    from jointscope.tools.progress import Progress
+    from jointscope.tools.terminal.progress import Progress
 
 BATCH_SECONDS = 120.0  # longer recordings are compared with the batch smoother only on request
 EXAMPLE = """example:
@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
         check_table_name(args.output)
     check_outputs(outputs, inputs=[args.bag, *robot_file, *args.effects])
     load_user_effects(args.effects)
-    from jointscope.robots.robot_file import load_robot
-    from jointscope.tools.replay_text import replay_text
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.terminal.replay_text import replay_text
 
     robot, said = _in_posture(load_robot(args.robot), args.bag)
     with progress_bar() as progress, ExitStack() as stack:
@@ -109,9 +109,9 @@ def _replayed(
     args: argparse.Namespace, robot: Robot, progress: Progress, stack: ExitStack
 ) -> tuple[ReplayResult, list[str]]:
     """The replay with all that listens to it, and what was left out; the table is complete when `stack` closes."""
-    from jointscope.graphs.fixed_lag.replay import replay
+    from jointscope.graphs.fixed_lag.replay.replay import replay
     from jointscope.tools.bags import ArrivalReader
-    from jointscope.tools.replay_listeners import Listeners, Pace
+    from jointscope.tools.verb_parts.replay_listeners import Listeners, Pace
 
     adapt = dict(args.adapt)
     listeners = Listeners()
@@ -145,7 +145,7 @@ def _with_source(
     wanted = args.batch if args.batch is not None else result.recording_seconds <= BATCH_SECONDS
     if not wanted or not len(result.lagged.times):
         return result
-    from jointscope.graphs.fixed_lag.batch_agreement import batch_agreement
+    from jointscope.graphs.fixed_lag.replay.batch_agreement import batch_agreement
     from jointscope.tools.bags import read_recording
 
     progress("batch smoother", 0.5)

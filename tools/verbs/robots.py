@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import RobotError
-from jointscope.tools.text_table import text_table
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """examples:
   jointscope robots
@@ -33,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lists, or prints one."""
     check_outputs([args.json])
-    from jointscope.robots.robot_file import READY_PREFIX, READY_ROOT, read_document, ready_robots
+    from jointscope.robots.files.robot_file import READY_PREFIX, READY_ROOT, read_document, ready_robots
     from jointscope.robots.yaml_section import did_you_mean
 
     ready = ready_robots()

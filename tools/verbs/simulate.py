@@ -8,15 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.robot import Robot
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.write_bag import write_bag
-from jointscope.tools.progress import progress_bar
-from jointscope.tools.simulation_options import add_simulation_options, conditions_of
 from jointscope.tools.simulator import DEFAULT_SECONDS, Simulation, simulate_under
 from jointscope.tools.simulator.effect_list import effect_list
-from jointscope.tools.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.whole_file import check_outputs, write_json
+from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
+from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope simulate doggy -o train.mcap --seed 3 --friction smooth --effect bearing_flexibility@joint1

@@ -11,7 +11,7 @@ import pytest
 from online_doggy import feed
 
 from jointscope.graphs.fixed_lag import FixedLagEstimator
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
 
 NAMES = ("command", "motor_encoder", "imu1", "imu2")
 ODDITIES = {

@@ -8,8 +8,8 @@ import pytest
 from online_doggy import feed, told
 
 from jointscope.graphs.fixed_lag import FixedLagEstimator
-from jointscope.robots.effect_editing import add_effect
 from jointscope.robots.errors import EstimatorError
+from jointscope.robots.files.effect_editing import add_effect
 
 REST, MOTION = 0.45, 0.8  # [s] when the robot rests, and when it moves
 

@@ -11,9 +11,9 @@ from simulated_arm import Arm, divided, moved, written
 
 from jointscope.graphs.starts.drive_regression import Driven, drive_equations
 from jointscope.graphs.starts.motion_cells import motion_cells
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Stream
-from jointscope.robots.rigid_tree import RigidTree
+from jointscope.robots.recordings.recording import Stream
 
 ARM = Arm()
 NOISE = 1e-5  # [rad]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from slow_pendulum import pendulum, recorded, swing
 
-from jointscope.graphs.calibrate import calibrate
+from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
 
 BESIDE, APART = "/js", "/cmd"  # the positions' own topic, and another one

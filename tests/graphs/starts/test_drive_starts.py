@@ -10,11 +10,11 @@ import pytest
 from simulated_arm import Arm, divided, moved, written
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.initial_guess import initial_dynamics, initial_states
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.starts.initial_guess import initial_dynamics, initial_states
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
 
 ARM = Arm("yx", inertia=(0.7, 0.2), dry=(2.0, 0.8), viscous=(1.5, 0.6))
 CONSTANTS = (9.0, 4.0)  # [N m/A]

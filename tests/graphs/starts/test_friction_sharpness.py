@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, moved, written
 
-from jointscope.graphs.calibrate import calibrate
-from jointscope.robots.elastic_joints import ElasticJoints
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.errors import RobotError
-from jointscope.robots.recording import Recording
-from jointscope.robots.robot_file import load_robot
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
 
 SLIDE = Arm("X", inertia=(0.7,), dry=(2.0,), viscous=(15.0,), gravity=(0.0, 0.0, 0.0))
 YAML = """

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
-from jointscope.tools.closed_loop.plan import Plan
-from jointscope.tools.simulator.controller import full_command, proportional
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.closed_loop.planning.plan import Plan
+from jointscope.tools.simulator.loop.controller import full_command, proportional
 
 Array = NDArray[np.float64]
 

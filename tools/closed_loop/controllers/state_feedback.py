@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
-from jointscope.tools.closed_loop.optimal_gains import OptimalGains
-from jointscope.tools.closed_loop.reference import Reference
-from jointscope.tools.simulator.controller import full_command
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.closed_loop.planning.optimal_gains import OptimalGains
+from jointscope.tools.closed_loop.planning.reference import Reference
+from jointscope.tools.simulator.loop.controller import full_command
 
 Array = NDArray[np.float64]
 

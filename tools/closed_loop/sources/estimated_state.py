@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
-from jointscope.tools.closed_loop.estimator_account import EstimatorAccount
-from jointscope.tools.closed_loop.reference import Reference
-from jointscope.tools.simulator.online_sensors import Sample
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.closed_loop.planning.estimator_account import EstimatorAccount
+from jointscope.tools.closed_loop.planning.reference import Reference
+from jointscope.tools.simulator.loop.online_sensors import Sample
+from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.tools.simulator.online_sensors import Sample
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.tools.simulator.loop.online_sensors import Sample
+from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.engine import Engine
-from jointscope.tools.simulator.online_sensors import Sample
-from jointscope.tools.simulator.specification import motor_joint
-from jointscope.tools.simulator.trajectory import Trajectory
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.simulator.loop.online_sensors import Sample
+from jointscope.tools.simulator.world.engine import Engine
+from jointscope.tools.simulator.world.specification import motor_joint
+from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sections of the reports, one per file: each takes a result and returns a Section."""
+"""The sections of the reports, one file each, in a room for each kind of result."""

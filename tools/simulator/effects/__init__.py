@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from functools import cache
 
 from jointscope.robots.errors import EffectError
-from jointscope.robots.robot import Robot
-from jointscope.tools.simulator.effect import SimulatedEffect, owners_of
-from jointscope.tools.simulator.not_simulated import NOT_SIMULATED
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.simulator.world.effect import SimulatedEffect, owners_of
+from jointscope.tools.simulator.world.not_simulated import NOT_SIMULATED
 
 
 @cache

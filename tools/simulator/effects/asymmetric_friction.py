@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jointscope.tools.simulator.effect import Address
-from jointscope.tools.simulator.rotor_friction import RotorFriction
+from jointscope.tools.simulator.world.effect import Address
+from jointscope.tools.simulator.world.rotor_friction import RotorFriction
 
 
 class AsymmetricFriction(RotorFriction):

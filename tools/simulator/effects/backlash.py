@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jointscope.tools.simulator.effect import Address, SimulatedEffect
-from jointscope.tools.simulator.specification import set_linear, spring_tendon
+from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.world.specification import set_linear, spring_tendon
 
 
 class Backlash(SimulatedEffect):

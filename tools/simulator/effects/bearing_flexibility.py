@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.inertia import full_inertia, is_possible
-from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import joint_axis, link_body, set_linear
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.inertia import full_inertia, is_possible
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+from jointscope.tools.simulator.world.specification import joint_axis, link_body, set_linear
 
 # What another effect may have given the joint.
 PASSIVE = ("stiffness", "damping", "frictionloss", "solref_friction", "solimp_friction", "armature")

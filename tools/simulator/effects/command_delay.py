@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.tools.simulator.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
-from jointscope.robots.sensors import Sensor
-from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.robots.parts.sensors import Sensor
+from jointscope.tools.simulator.world.effect import SimulatedEffect
 
 Array = NDArray[np.float64]
 

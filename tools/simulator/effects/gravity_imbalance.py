@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import link_body, set_linear
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+from jointscope.tools.simulator.world.specification import link_body, set_linear
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import add_dry_friction, motor_joint, set_linear
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+from jointscope.tools.simulator.world.specification import add_dry_friction, motor_joint, set_linear
 
 Array = NDArray[np.float64]
 

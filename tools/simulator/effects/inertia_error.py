@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from jointscope.robots.errors import EffectError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.inertia import is_possible
-from jointscope.tools.simulator.specification import link_body
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.inertia import is_possible
+from jointscope.tools.simulator.world.specification import link_body
 
 SHARE = 0.08  # of each moment, by default
 

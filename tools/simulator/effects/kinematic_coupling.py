@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from jointscope.robots.errors import EffectError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.specification import spring_tendon
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.specification import spring_tendon
 
 NEIGHBOUR = 0.03  # [rad/rad] from the joint before, by default
 

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jointscope.tools.simulator.effect import Address, SimulatedEffect
-from jointscope.tools.simulator.specification import add_dry_friction
+from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.world.specification import add_dry_friction
 
 
 class LinkCoulomb(SimulatedEffect):

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jointscope.tools.simulator.effect import Address
-from jointscope.tools.simulator.rotor_friction import RotorFriction
+from jointscope.tools.simulator.world.effect import Address
+from jointscope.tools.simulator.world.rotor_friction import RotorFriction
 
 
 class LoadDependentFriction(RotorFriction):

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from jointscope.robots.errors import EffectError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import drive
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+from jointscope.tools.simulator.world.specification import drive
 
 LEAST = 1e-4  # [s] a shorter one cannot be integrated at the engine's step
 

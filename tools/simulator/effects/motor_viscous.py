@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.specification import add_linear, motor_joint
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.specification import add_linear, motor_joint
 
 
 class MotorViscous(SimulatedEffect):

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.inertia import long_axis
-from jointscope.tools.simulator.specification import link_body
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.inertia import long_axis
+from jointscope.tools.simulator.world.specification import link_body
 
 DISTANCE = 0.5  # [m] from the joint; only mass times its square is told, so the mass follows
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from jointscope.tools.simulator.rotor_friction import RotorFriction
+from jointscope.tools.simulator.world.rotor_friction import RotorFriction
 
 
 class PositionDependentFriction(RotorFriction):

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from jointscope.tools.simulator.effect import Address, SimulatedEffect
+from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
 
 
 class Push(SimulatedEffect):

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.tools.simulator.effect import SimulatedEffect
+from jointscope.tools.simulator.world.effect import SimulatedEffect
 
 Array = NDArray[np.float64]
 

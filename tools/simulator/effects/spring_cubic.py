@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from jointscope.robots.errors import SimulationError
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.specification import motor_joint
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.specification import motor_joint
 
 
 class SpringCubic(SimulatedEffect):

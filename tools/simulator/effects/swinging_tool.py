@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jointscope.tools.simulator.effect import SimulatedEffect
-from jointscope.tools.simulator.inertia import long_axis
-from jointscope.tools.simulator.mujoco_module import load_mujoco
-from jointscope.tools.simulator.specification import link_body, set_linear
+from jointscope.tools.simulator.world.effect import SimulatedEffect
+from jointscope.tools.simulator.world.inertia import long_axis
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+from jointscope.tools.simulator.world.specification import link_body, set_linear
 
 DISTANCE = 0.4  # [m] from the joint to the tool's mounting, along the long axis of the body
 

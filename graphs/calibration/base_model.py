@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A calibrated model together with what it makes of its training recordings; where every diagnosis begins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.state_layout import StateLayout
+from jointscope.robots.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+CYCLE = 4.0  # [s] of motion that holds one piece for fitting and one for validation
+FIT_SHARE = 0.45  # of each cycle
+FEWEST_CYCLES = 2
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of one recording.
+
+    Attributes:
+        bag: index of the recording.
+        t0, t1: limits [s].
+    """
+
+    bag: int
+    t0: float
+    t1: float
+
+
+@dataclass(frozen=True)
+class BaseModel:
+    """A model calibrated with all training recordings.
+
+    Attributes:
+        robot: calibrated; every gyro predicted in full.
+        recordings: the training recordings.
+        states: smoothed states of each, shape (m + 1, d).
+        calibrations: shared values with the biases of each.
+        result: the calibration.
+    """
+
+    robot: Robot
+    recordings: tuple[Recording, ...]
+    states: tuple[Array, ...]
+    calibrations: tuple[Calibration, ...]
+    result: CalibrationResult
+
+    @staticmethod
+    def of(robot: Robot, recordings: Sequence[Recording], start: BaseModel | None = None) -> BaseModel:
+        """Calibrates a robot.
+
+        Args:
+            robot: the model with start values.
+            recordings: training recordings.
+            start: a model of the same recordings whose values are near; nothing is guessed anew.
+        """
+        full = with_full_gyros(robot)
+        near = [calibration for calibration in start.calibrations] if start is not None else None
+        result = calibrate(full, recordings, near=near)
+        return BaseModel(
+            result.robot,
+            tuple(recordings),
+            tuple(bag.states for bag in result.bags),
+            tuple(bag.calibration for bag in result.bags),
+            result,
+        )
+
+    @property
+    def layout(self) -> StateLayout:
+        """Of the states."""
+        return self.robot.layout
+
+    def problem(self, bag: int) -> BagProblem:
+        """Factors of one recording."""
+        return BagProblem.of(self.robot, self.recordings[bag])
+
+    def states_at(self, bag: int, ticks: Array, layout: StateLayout) -> Array:
+        """Smoothed states at other ticks of a recording, in another layout, shape (k, d)."""
+        own = self.problem_ticks(bag)
+        x = np.column_stack([np.interp(ticks, own, column) for column in self.states[bag].T])
+        return layout.carried_over(x, self.layout)
+
+    def problem_ticks(self, bag: int) -> Array:
+        """Ticks of a recording, shape (m + 1,) [s]."""
+        return self.result.bags[bag].ticks
+
+    def spans(self) -> tuple[list[Span], list[Span]]:
+        """Pieces for fitting and pieces for validation, in turn."""
+        fit, validation = [], []
+        for bag, recording in enumerate(self.recordings):
+            start, end = first_command_time(recording), float(self.problem_ticks(bag)[-1])
+            cycles = max(round((end - start) / CYCLE), FEWEST_CYCLES)
+            length = (end - start) / cycles
+            for i in range(cycles):
+                t0 = start + i * length
+                fit.append(Span(bag, t0, t0 + FIT_SHARE * length))
+                validation.append(Span(bag, t0 + FIT_SHARE * length, t0 + length))
+        return fit, validation
+
+
+def with_full_gyros(robot: Robot) -> Robot:
+    """The robot with all components of every gyro predicted from the state: the paper's forms hide effects."""
+    return robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batch calibration: recordings and a robot in, a calibrated robot with uncertainties out.
+
+Stages: 1. states from the measurements, parameters by regression; 2. windows of the recordings, where parameters and
+process noise are found; 3. all samples of all recordings; 4. uncertainties. Nothing is tuned to one robot.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.calibration_summary import summarize
+from jointscope.graphs.calibration.encoder_noise import with_visible_noise
+from jointscope.graphs.calibration.failures_with_notices import names_notices
+from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
+from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
+from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.solving.batch_solver import Progress, solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.starts.drive_signal import with_known_drive_signal
+from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
+from jointscope.graphs.starts.second_opinion import regressed_values
+from jointscope.graphs.starts.time_shift_start import with_best_shifts
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.resting_joints import must_move
+from jointscope.robots.recordings.screening import screen
+
+Array = NDArray[np.float64]
+
+MEASURED = (
+    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
+    "`held: true` in the section command makes it a command that acts until the next one"
+)
+TOLD_HELD = "the motion says that each value on {} acts until the next one, as a command does: `held: true`"
+TOLD_MEASURED = "the motion says that the drive signal on {} was measured, linear between its samples: `held: false`"
+WINDOW_ITERATIONS = 12
+
+
+@in_solver_context
+@names_notices
+def calibrate(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    *,
+    biases_only: bool = False,
+    near: Sequence[Calibration] | None = None,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Calibrates a robot with one or more recordings.
+
+    Args:
+        robot: model with start values and priors.
+        recordings: at least one; parameters and rotations are shared, states and biases are each recording's own.
+        biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
+        near: values with the biases of each recording that are near the solution already, where the robot's own values
+            and noise are, too: nothing is guessed, no windows are cut.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
+        SolveError: no convergence, or a state or parameter that nothing determines.
+    """
+    started = time.perf_counter()
+    report = progress or (lambda text, share: None)
+    result = _calibrated(robot, recordings, biases_only, near, report)
+    turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
+    if turned:
+        report("again, with mountings held", 0.0)
+        anew = _calibrated(held(robot, turned), recordings, False, None, report)
+        result = released(robot, anew, turned)
+    report("done", 1.0)
+    return replace(result, wall_seconds=time.perf_counter() - started)
+
+
+def _calibrated(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    biases_only: bool,
+    near: Sequence[Calibration] | None,
+    report: Progress,
+) -> CalibrationResult:
+    """One calibration; arguments as in `calibrate`."""
+    notices = check_recordings(robot, recordings, every_joint=not biases_only)
+    robot, found = _with_drive_signal(robot, recordings)
+    notices += found
+    noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
+    seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
+    problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in recordings]
+    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
+    history = History()
+    if near is None:
+        blunt = blunt_sharpness(seen, recordings)[:1]
+        first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
+        noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
+    else:
+        calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
+    problems = anchored(problems, calibrations)
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), sigmas=near is None and not biases_only)
+    solved = stage.solve(problems, noise, calibrations)
+    # the file that will be written says in which posture its values were found
+    robot = robot.locked_as_in(recordings[0].posture)
+    result = summarize(robot, solved, tuple(history.records), notices, hold)
+    if near is not None or biases_only:
+        return result
+    estimate = solved.solution.estimate
+    timing = drive_timing(solved.problems, estimate.states, estimate.calibrations)
+    return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
+
+
+def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
+    """Screens all recordings; every joint must move in at least one of them.
+
+    Raises:
+        RecordingError: as the screening says, or joints that never move.
+    """
+    if not recordings:
+        raise RecordingError("no recording given; pass at least one bag")
+    seen: dict[str, str] = {}
+    for recording in recordings:
+        before = seen.get(recording.sha256) if recording.sha256 else None
+        seen[recording.sha256] = recording.path
+        if before is not None:
+            raise RecordingError(
+                f"{recording.path} is the same recording as {before}; give every recording once, "
+                "or its samples count twice"
+            )
+    notices = [notice for recording in recordings for notice in screen(recording, robot)]
+    if every_joint:
+        must_move(robot, recordings)
+    return notices
+
+
+def _with_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> tuple[Robot, list[Notice]]:
+    """The robot with what the motion says about its drive signal, and a sentence about it where it is not plain."""
+    known = with_known_drive_signal(robot, recordings)
+    if known.command.held is not robot.command.held:
+        text = (TOLD_HELD if known.command.held else TOLD_MEASURED).format(robot.command.topic)
+    elif robot.command.held is None and not robot.command_held:
+        text = MEASURED.format(robot.command.topic)
+    else:
+        return known, []
+    return known, [Notice("command", "info", 0, text)]
+
+
+def _windows_stage(
+    recordings: Sequence[Recording],
+    problems: Sequence[BagProblem],
+    hold: tuple[str, ...],
+    history: History,
+    progress: Progress,
+) -> tuple[ProcessNoise, list[Calibration]]:
+    """Parameters and noise from windows; returns the noise and a calibration for each recording."""
+    progress("first guess", 0.0)
+    robot = problems[0].robot
+    pieces = windows_of(recordings)
+    bags = [initial_biases(problem, Calibration.of(robot)) for problem in problems]
+    windows = [BagProblem.of(robot, piece) for _, piece in pieces]
+    calibrations = [bags[i] for i, _ in pieces]
+    states = [initial_states(w, c) for w, c in zip(windows, calibrations, strict=True)]
+    if not hold:
+        # the regression filters its signals and wants them long
+        whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
+        guess = initial_dynamics(problems, whole, bags[0])
+        calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
+    windows, estimate = with_best_shifts(windows, Estimate(tuple(states), tuple(calibrations)), hold)
+    # nearly linear in the states alone: bring them to the parameters before both move
+    solution = solve(windows, estimate, max_iterations=4, step_tolerance=0.5, hold=(DYNAMICS,))
+    history.add("states", solution)
+    if not hold:
+        # only a start for the whole recording: what windows leave open may go on wandering
+        solution = solve(windows, solution.estimate, max_iterations=WINDOW_ITERATIONS, step_tolerance=0.3)
+        history.add("windows", solution)
+    noise, estimate = robot.noise, solution.estimate
+    if noise.estimate:
+        noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
+    found = estimate.calibrations[0]
+    return noise, [replace(bag, dynamics=found.dynamics, rotations=found.rotations) for bag in bags]
+
+
+def _loose(noise: ProcessNoise) -> ProcessNoise:
+    """Noise with which any start value can be approached; the estimation goes down from there."""
+    return not_below(noise, LOOSE)
+
+
+def _part(progress: Callable[[str, float], None], start: float, stop: float) -> Progress:
+    """A progress that fills a part of another."""
+    return lambda text, share: progress(text, start + (stop - start) * share)

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The graph of a finished calibration, for programs that go on with GTSAM: factors of their own, other optimizers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.custom_factor import block_key, extract_calibration, state_key
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.condensed_graph import CondensedGraph
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
+from jointscope.robots.errors import SolveError
+
+Array = NDArray[np.float64]
+
+LAMBDA_START, LAMBDA_FACTOR = 1e-9, 30.0
+
+
+@dataclass(frozen=True)
+class CalibrationGraph:
+    """A calibration as GTSAM sees it.
+
+    Attributes:
+        graph: all factors; add your own.
+        values: where the calibration ended.
+        keys: of the shared blocks by name ("dynamics", "imu1.rotation", "imu1.bias", of a second recording
+            "imu1.bias (bag 2)"), then of the states by recording and time ("x 12.000 s", "x 0.500 s (bag 2)").
+        like: any calibration of the robot; gives names and kinds of the parameters.
+    """
+
+    graph: gtsam.NonlinearFactorGraph
+    values: gtsam.Values
+    keys: Mapping[str, int]
+    like: Calibration
+
+    @staticmethod
+    def of(result: CalibrationResult, per_sample: bool = False) -> CalibrationGraph:
+        """The graph of a calibration.
+
+        Args:
+            result: what `calibrate` returned.
+            per_sample: one factor for every sample instead of condensed ones; GTSAM's optimizers then take a time that
+                grows with the square of the samples, as they copy all values for each of their callbacks.
+        """
+        problems = [BagProblem.of(result.robot, bag.recording) for bag in result.bags]
+        estimate = Estimate(tuple(bag.states for bag in result.bags), tuple(bag.calibration for bag in result.bags))
+        if per_sample:
+            graph, values = nonlinear_graph(problems, estimate), initial_values(estimate)
+        else:
+            condensed, values = CondensedGraph.of(problems, estimate)
+            graph = condensed.graph
+        keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
+        return CalibrationGraph(graph, values, keys, estimate.calibrations[0])
+
+    def coordinate(self, parameter: str) -> int:
+        """Place of a parameter in the block "dynamics", which holds positive ones as logarithms.
+
+        Raises:
+            SolveError: no such parameter is free.
+        """
+        if parameter not in self.like.names:
+            raise SolveError(f"no free parameter {parameter!r} in the graph; it has {', '.join(self.like.names)}")
+        return self.like.names.index(parameter)
+
+    def parameters(self, values: gtsam.Values) -> dict[str, float]:
+        """Values of all free parameters in their units, by name."""
+        found = extract_calibration(values, self.like, (DYNAMICS,))
+        return dict(zip(found.names, found.values.tolist(), strict=True))
+
+    def sigmas(self, values: gtsam.Values) -> dict[str, float]:
+        """Standard deviations of all free parameters in their units, by `gtsam.Marginals`."""
+        covariance = gtsam.Marginals(self.graph, values).marginalCovariance(self.keys[DYNAMICS])
+        slopes = extract_calibration(values, self.like, (DYNAMICS,)).value_by_coordinate
+        return dict(zip(self.like.names, (np.sqrt(np.diag(covariance)) * slopes).tolist(), strict=True))
+
+    def optimize(self) -> gtsam.Values:
+        """The minimum of the graph as it is now, by `gtsam.LevenbergMarquardtOptimizer` from `values`.
+
+        Raises:
+            SolveError: a factor has a key that the graph's values lack, or nothing determines a variable.
+        """
+        self._check_keys()
+        parameters = gtsam.LevenbergMarquardtParams()
+        parameters.setlambdaInitial(LAMBDA_START)
+        parameters.setlambdaFactor(LAMBDA_FACTOR)
+        parameters.setDiagonalDamping(True)
+        parameters.setRelativeErrorTol(1e-10)
+        parameters.setAbsoluteErrorTol(1e-8)
+        parameters.setOrdering(self.ordering)
+        try:
+            return gtsam.LevenbergMarquardtOptimizer(self.graph, self.values, parameters).optimize()
+        except RuntimeError as err:
+            raise SolveError(f"GTSAM cannot solve the graph: {' '.join(str(err).split())[:200]}") from err
+
+    @property
+    def ordering(self) -> gtsam.Ordering:
+        """States in the order of time, then shared blocks, then what a user added."""
+        shared = [key for name, key in self.keys.items() if not name.startswith("x ")]
+        states = [key for name, key in self.keys.items() if name.startswith("x ")]
+        known = {*shared, *states}
+        ordering = gtsam.Ordering()
+        for key in (*states, *shared, *(key for key in self.values.keys() if key not in known)):
+            ordering.push_back(key)
+        return ordering
+
+    def without_states(self, values: gtsam.Values | None = None) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
+        """What the recordings say about the shared blocks alone: a small linear graph about some values, and these.
+
+        The states are eliminated; what is left are `gtsam.LinearContainerFactor`s, to which other factors may be added.
+        """
+        values = self.values if values is None else values
+        states = gtsam.Ordering()
+        for name, key in self.keys.items():
+            if name.startswith("x "):
+                states.push_back(key)
+        _, rest = self.graph.linearize(values).eliminatePartialSequential(states)
+        shared = gtsam.Values(values)
+        for i in range(states.size()):
+            shared.erase(states.at(i))
+        return gtsam.LinearContainerFactor.ConvertLinearGraph(rest, shared), shared
+
+    def describe(self) -> str:
+        """The factors, a line each, with the names of their variables."""
+        names = {key: name for name, key in self.keys.items()}
+        lines = [f"{self.graph.size()} factors on {self.values.size()} variables"]
+        for i in range(self.graph.size()):
+            factor = self.graph.at(i)
+            touched = [names.get(key, gtsam.DefaultKeyFormatter(key)) for key in factor.keys()]
+            lines.append(f"{i:4d}  {factor.dim()} rows: {', '.join(touched)}")
+        return "\n".join(lines)
+
+    def _check_keys(self) -> None:
+        for i in range(self.graph.size()):
+            missing = [key for key in self.graph.at(i).keys() if not self.values.exists(key)]
+            if missing:
+                raise SolveError(
+                    f"factor {i} touches {gtsam.DefaultKeyFormatter(missing[0])}, which the graph's values lack; "
+                    f"insert a start value for it into `values`, or use one of `keys`: {', '.join(self.keys)}"
+                )
+
+
+def _block_keys(calibrations: Sequence[Calibration], values: gtsam.Values) -> dict[str, int]:
+    keys: dict[str, int] = {}
+    for bag, calibration in enumerate(calibrations):
+        for block in calibration.blocks:
+            key = block_key(block, calibration, bag)
+            if key not in keys.values() and values.exists(key):
+                keys[block if bag == 0 else f"{block} (bag {bag + 1})"] = key
+    return keys
+
+
+def _state_keys(problems: Sequence[BagProblem], values: gtsam.Values) -> dict[str, int]:
+    keys = {}
+    for bag, problem in enumerate(problems):
+        behind = "" if bag == 0 else f" (bag {bag + 1})"
+        for tick, time in enumerate(problem.timeline.ticks.tolist()):
+            key = state_key(tick, bag)
+            if values.exists(key):
+                keys[f"x {time:.4f} s{behind}"] = key
+    return keys

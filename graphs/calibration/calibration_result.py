@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a calibration found, in the form that files, reports and machines read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.external_torque import ExternalTorque
+from jointscope.graphs.scoring.drive_timing import DriveTiming
+from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One calibrated number.
+
+    Attributes:
+        name: full name; rotations appear as "imu1.R_imu_body.x" (angle about that body axis away from the prior).
+        value, sigma: estimate and standard deviation, in `unit`.
+        unit: SI unit.
+        start: value before the calibration.
+        prior, prior_sigma: prior mean and standard deviation.
+        published: value from the literature; None where there is none.
+        note: "" or what the user must know: at a bound, held by its prior.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+    start: float
+    prior: float
+    prior_sigma: float
+    published: float | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class WeakDirection:
+    """A combination of parameters that the recording determines badly.
+
+    Attributes:
+        weights: share of each parameter in the direction, largest first; relative changes for positive parameters,
+            absolute ones [unit] otherwise.
+        sigma: standard deviation along the direction: relative change of the leading parameter (or [rad], [rad/s]).
+        text: one sentence with names and percentages.
+    """
+
+    weights: dict[str, float]
+    sigma: float
+    text: str
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """How one measured channel is fitted by the smoothed states.
+
+    Attributes:
+        rmse: root mean square of measured - predicted [unit].
+        sigma: standard deviation of the sensor [unit].
+        chi2: mean square of rmse / sigma, corrected for the freedom of the states; 1 if the noise is as stated.
+        unit: SI unit.
+    """
+
+    rmse: float
+    sigma: float
+    chi2: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class ResidualSeries:
+    """Measured and predicted values of one sensor over time (predicted from the smoothed states).
+
+    Attributes:
+        channels: names of the columns.
+        units: SI unit of each.
+        times: shape (m,) [s].
+        measured, predicted: shape (m, c) [unit].
+        sigma: expected standard deviation of measured - predicted, shape (m, c) [unit].
+        chi2: mean square of residual over sigma, corrected for the freedom of the states, shape (c,).
+    """
+
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    times: Array
+    measured: Array
+    predicted: Array
+    sigma: Array
+    chi2: Array = field(default_factory=lambda: np.ones(0))
+
+
+@dataclass(frozen=True)
+class BagFit:
+    """States and residuals of one recording.
+
+    Attributes:
+        recording: the data.
+        calibration: shared values with this recording's biases.
+        ticks: times of the states, shape (m,) [s].
+        commands: command of each step, the last one repeated, shape (m, n).
+        states: smoothed states (q_link, v_link, q_motor, v_motor), shape (m, 4n).
+        sigmas: their standard deviations, shape (m, 4n).
+        residuals: by sensor name.
+        process: residual of the dynamics, one column per equation (link, motor, memories), shape (m - 1, r) [rad/s].
+        process_sigma: its standard deviation, shape (m - 1, r) [rad/s].
+        isolated: moments in which a torque acts that the motion does not ask for at other times.
+    """
+
+    recording: Recording
+    calibration: Calibration
+    ticks: Array
+    commands: Array
+    states: Array
+    sigmas: Array
+    residuals: dict[str, ResidualSeries]
+    process: Array
+    process_sigma: Array
+    isolated: tuple[ExternalTorque, ...] = ()
+
+
+@dataclass(frozen=True)
+class IterationRecord:
+    """One iteration for the convergence plot: stage ("windows", "whole"), cost, damping, largest step [sigma]."""
+
+    stage: str
+    cost: float
+    damping: float
+    step_in_sigmas: float
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """Everything a calibration found.
+
+    Attributes:
+        robot: the calibrated robot, with sigmas.
+        start: the robot before.
+        bags: one fit per recording.
+        parameters: dynamic parameters, then rotations, then biases of the first bag ("imu1.bias.x").
+        names: names of all shared values in the order of `correlation`.
+        correlation: correlation matrix of all shared values, shape (s, s).
+        weak_directions: badly determined combinations, worst first.
+        channels: fit per channel over all bags.
+        noise: estimated process noise.
+        sigma_inflation: factor by which block-robust standard deviations exceed those of white noise, per parameter.
+        iterations: history.
+        cost: half the sum of squared whitened residuals at the end.
+        samples: number of measurements used.
+        recording_seconds: length of all recordings together [s].
+        wall_seconds: time the calibration took [s].
+        findings: sentences for the user, most important first.
+        converged: False where the model contradicts the recordings so much that the values never came to rest.
+        unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
+        timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
+        regressed: parameters of drives as regression on the same recordings has them, where it applies.
+    """
+
+    robot: Robot
+    start: Robot
+    bags: tuple[BagFit, ...]
+    parameters: tuple[ParameterEstimate, ...]
+    names: tuple[str, ...]
+    correlation: Array
+    weak_directions: tuple[WeakDirection, ...]
+    channels: dict[str, ChannelFit]
+    noise: ProcessNoise
+    sigma_inflation: dict[str, float]
+    iterations: tuple[IterationRecord, ...]
+    cost: float
+    samples: int
+    recording_seconds: float
+    wall_seconds: float
+    findings: tuple[str, ...] = field(default_factory=tuple)
+    converged: bool = True
+    unsettled: float = 0.0
+    timing: DriveTiming | None = None
+    regressed: Mapping[str, Value] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of `--json` as INTERFACE promises it."""
+        return {
+            "converged": self.converged,
+            "iterations": len(self.iterations),
+            "samples": self.samples,
+            "recording_seconds": self.recording_seconds,
+            "wall_seconds": self.wall_seconds,
+            "cost": self.cost,
+            "parameters": self._json_parameters(),
+            "weak_directions": [{"parameters": d.weights, "sigma": d.sigma} for d in self.weak_directions],
+            "channels": {
+                name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
+            },
+            "noise": {
+                "unit": "rad/s/sqrt(s), of joints that slide m/s/sqrt(s)"
+                if self.robot.tree.slides
+                else "rad/s/sqrt(s)",
+                "link_velocity": list(map(float, self.noise.link_velocity)),
+                "motor_velocity": list(map(float, self.noise.motor_velocity)),
+            },
+            "bags": [
+                {"path": bag.recording.path, "sha256": bag.recording.sha256}
+                | {f"{name}.bias": bias.tolist() for name, bias in bag.calibration.biases.items()}
+                for bag in self.bags
+            ],
+            "findings": list(self.findings),
+        }
+
+    def _json_parameters(self) -> dict[str, Any]:
+        """Scalars by name; biases (of the first bag) and rotations as they stand in a robot file."""
+        found: dict[str, Any] = {
+            p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit}
+            for p in self.parameters
+            if p.name in self.robot.parameters
+        }
+        for gyro in self.robot.gyros:
+            sigmas = (gyro.bias_sigma, gyro.R_sigma)
+            bias_sigma, R_sigma = (None if sigma is None else sigma.tolist() for sigma in sigmas)
+            found[f"{gyro.name}.bias"] = {"value": gyro.bias.tolist(), "sigma": bias_sigma, "unit": "rad/s"}
+            found[f"{gyro.name}.R_imu_body"] = {
+                "value": gyro.R_imu_body.tolist(),
+                "sigma": R_sigma,
+                "unit": "1; sigma about the axes of the body [rad]",
+            }
+        return found

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Turns a solved problem into a CalibrationResult: fits, parameter table, robot, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibration_result import (
+    BagFit,
+    CalibrationResult,
+    ChannelFit,
+    IterationRecord,
+    ParameterEstimate,
+)
+from jointscope.graphs.calibration.encoder_noise import EncoderFit, estimated_sigmas
+from jointscope.graphs.calibration.external_torque import external_torques_of
+from jointscope.graphs.calibration.findings import findings
+from jointscope.graphs.calibration.identifiability import weak_directions
+from jointscope.graphs.calibration.residual_collection import BagResiduals, collect, series_of
+from jointscope.graphs.noise.noise_estimation import NoiseEvidence
+from jointscope.graphs.noise.robust_sigma import inflation
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.batch_solver import Solution
+from jointscope.graphs.solving.posterior import StatePosterior, posteriors
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import AXES, Gyro, LinkEncoder, MotorEncoder, Sensor
+from jointscope.robots.recordings.recording import Notice
+
+Array = NDArray[np.float64]
+
+HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
+NEAR_ZERO = 0.5  # relative sigma from which a small positive value is called compatible with zero
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A converged problem with its residuals and uncertainties.
+
+    Attributes:
+        problems: factors of each recording, with the noise used.
+        solution: states and shared values.
+        posteriors: uncertainty of each recording's states.
+        covariance: of all shared values, shape (s, s).
+        residuals: of each recording.
+        evidence: what the residuals say about the process noise.
+    """
+
+    problems: list[BagProblem]
+    solution: Solution
+    posteriors: list[StatePosterior]
+    covariance: Array
+    residuals: list[BagResiduals]
+    evidence: NoiseEvidence
+
+    @property
+    def robot(self) -> Robot:
+        """The robot before the calibration, with the noise of sensors and motion that was used."""
+        return self.problems[0].robot
+
+    def encoder_sigmas(self, encoder: MotorEncoder | LinkEncoder) -> Array:
+        """Sigmas that the residuals of an encoder ask for, shape (n,)."""
+        bags = [(p, c.series[encoder.name]) for p, c in zip(self.problems, self.residuals, strict=True)]
+        fits = [(p.recording.streams[encoder.name], series_of(p, encoder, parts)) for p, parts in bags if parts]
+        return estimated_sigmas(encoder, [EncoderFit(*fit) for fit in fits])
+
+    @staticmethod
+    def of(problems: list[BagProblem], solution: Solution, hold: Sequence[str]) -> Solved:
+        """Uncertainties and one pass over all residuals."""
+        found, covariance = posteriors(problems, solution, hold)
+        evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
+        residuals = [
+            collect(problem, solution, i, posterior, evidence)
+            for i, (problem, posterior) in enumerate(zip(problems, found, strict=True))
+        ]
+        return Solved(problems, solution, found, covariance, residuals, evidence)
+
+
+def summarize(
+    robot: Robot,
+    solved: Solved,
+    iterations: tuple[IterationRecord, ...],
+    notices: Sequence[Notice],
+    hold: Sequence[str],
+) -> CalibrationResult:
+    """Everything that users see of a calibration.
+
+    Args:
+        robot: the robot before the calibration.
+        solved: the solution.
+        iterations: history of all stages.
+        notices: what the screening saw.
+        hold: blocks that were held.
+    """
+    solution, shared = solved.solution, solved.solution.shared
+    collected = solved.residuals
+    factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
+    covariance = solved.covariance * np.outer(factor, factor)
+    bags = tuple(_bag_fit(solved, i, c, factor) for i, c in enumerate(collected))
+    names = _names(robot, solution.estimate.calibrations[0], shared.bags)
+    sigmas = np.sqrt(np.diag(covariance))
+    calibration = solution.estimate.calibrations[0]
+    parameters = _parameters(robot, calibration, sigmas)
+    weak = () if hold else weak_directions(robot, calibration, shared, covariance)
+    correlation = covariance / np.maximum(np.outer(sigmas, sigmas), 1e-300)
+    noise = solved.problems[0].dynamics.steps.noise
+    result = CalibrationResult(
+        robot=_calibrated(robot, parameters, calibration, sigmas, solved),
+        start=robot,
+        bags=bags,
+        parameters=parameters,
+        names=names,
+        correlation=correlation,
+        weak_directions=weak,
+        channels=_channels(solved.robot, bags),
+        noise=noise,
+        sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
+        iterations=iterations,
+        cost=solution.cost,
+        samples=sum(len(p.factor) for problem in solved.problems for p in problem.sensors),
+        recording_seconds=sum(problem.recording.duration for problem in solved.problems),
+        wall_seconds=0.0,
+        converged=not solution.flat,
+        unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
+    )
+    return replace(result, findings=findings(result, notices))
+
+
+def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
+    problem, solution = solved.problems[i], solved.solution
+    widening = factor[solution.shared.indices(i)]
+    posterior = solved.posteriors[i]
+    posterior = replace(posterior, shared=posterior.shared * np.outer(widening, widening))
+    residuals = {}
+    for name, sensor in problem.robot.sensors.items():
+        if collector.series[name]:
+            residuals[name] = series_of(problem, sensor, collector.series[name])
+    process = np.concatenate([r for r, _ in collector.process])
+    process_sigma = np.concatenate([s for _, s in collector.process])
+    u, states = problem.timeline.u, solution.estimate.states[i]
+    calibration = solution.estimate.calibrations[i]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    return BagFit(
+        recording=problem.recording,
+        calibration=calibration,
+        ticks=problem.timeline.ticks,
+        commands=np.vstack([u, u[-1:]]),
+        states=states,
+        sigmas=posterior.sigmas,
+        residuals=residuals,
+        process=process,
+        process_sigma=process_sigma,
+        isolated=external_torques_of(problem, states, process, values),
+    )
+
+
+def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
+    """Fit per channel over all recordings."""
+    found = {}
+    for name, sensor in robot.sensors.items():
+        series = [bag.residuals[name] for bag in bags if name in bag.residuals]
+        for j, channel in enumerate(series[0].channels if series else ()):
+            error = np.concatenate([s.measured[:, j] - s.predicted[:, j] for s in series])
+            weights = np.array([len(s.times) for s in series], float)
+            chi2 = float(np.average([s.chi2[j] for s in series], weights=weights))
+            found[channel] = ChannelFit(
+                float(np.sqrt(np.mean(error**2))), float(sensor.sigmas[j]), chi2, sensor.units[j]
+            )
+    return found
+
+
+def _names(robot: Robot, calibration: Calibration, bags: int) -> tuple[str, ...]:
+    rotations = [f"{gyro}.R_imu_body.{axis}" for gyro in calibration.rotations for axis in AXES]
+    biases = [f"{gyro}.bias.{axis}" for gyro in calibration.biases for axis in AXES]
+    own = biases if bags == 1 else [f"{name} (bag {i + 1})" for i in range(bags) for name in biases]
+    return (*calibration.names, *rotations, *own)
+
+
+def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[ParameterEstimate, ...]:
+    """The table of all shared values (biases of the first recording)."""
+    found = []
+    slopes = calibration.value_by_coordinate
+    for i, name in enumerate(calibration.names):
+        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
+        note = ""
+        relative_prior = p.prior_sigma / p.prior if p.positive else p.prior_sigma
+        if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
+            note = "at its bound: compatible with zero"
+        elif sigmas[i] > HELD_BY_PRIOR * relative_prior:
+            note = "held by its prior"
+        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
+    start = len(calibration.names)
+    for gyro in robot.gyros:
+        angle = Rotation.from_matrix(gyro.R_prior.T @ calibration.rotations[gyro.name]).as_rotvec()
+        before = Rotation.from_matrix(gyro.R_prior.T @ gyro.R_imu_body).as_rotvec()
+        for j, axis in enumerate(AXES):
+            sigma = float(sigmas[start + j])
+            note = "not observable, held by its prior" if sigma > HELD_BY_PRIOR * gyro.R_prior_sigma else ""
+            name = f"{gyro.name}.R_imu_body.{axis}"
+            row = (float(angle[j]), sigma, "rad", float(before[j]), 0.0, gyro.R_prior_sigma, None, note)
+            found.append(ParameterEstimate(name, *row))
+        start += 3
+    for gyro in robot.gyros:
+        for j, axis in enumerate(AXES):
+            sigma = float(sigmas[start + j])
+            note = "held by its prior" if sigma > HELD_BY_PRIOR * gyro.bias_prior_sigma else ""
+            value, before_bias = float(calibration.biases[gyro.name][j]), float(gyro.bias[j])
+            row = (value, sigma, "rad/s", before_bias, before_bias, gyro.bias_prior_sigma, None, note)
+            found.append(ParameterEstimate(f"{gyro.name}.bias.{axis}", *row))
+        start += 3
+    return tuple(found)
+
+
+def _calibrated(
+    robot: Robot,
+    parameters: Sequence[ParameterEstimate],
+    calibration: Calibration,
+    sigmas: Array,
+    solved: Solved,
+) -> Robot:
+    """The robot with values, sigmas and noise found."""
+    table = {p.name: p for p in parameters}
+    new = {
+        name: replace(p, value=table[name].value, sigma=table[name].sigma) if name in table else p
+        for name, p in robot.parameters.items()
+    }
+    sensors: dict[str, Sensor] = {}
+    for name, sensor in robot.sensors.items():
+        if isinstance(sensor, Gyro):
+            sensors[name] = _calibrated_gyro(sensor, calibration, table)
+        elif isinstance(sensor, MotorEncoder | LinkEncoder):
+            used = solved.robot.sensors[name]
+            sensors[name] = replace(sensor, sigmas=used.sigmas)
+    noise = solved.problems[0].dynamics.steps.noise
+    return replace(robot, parameters=new, noise=noise).with_sensors(sensors)
+
+
+def _calibrated_gyro(gyro: Gyro, calibration: Calibration, table: dict[str, ParameterEstimate]) -> Gyro:
+    return replace(
+        gyro,
+        bias=calibration.biases[gyro.name],
+        R_imu_body=calibration.rotations[gyro.name],
+        bias_sigma=np.array([table[f"{gyro.name}.bias.{axis}"].sigma for axis in AXES]),
+        R_sigma=np.array([table[f"{gyro.name}.R_imu_body.{axis}"].sigma for axis in AXES]),
+    )

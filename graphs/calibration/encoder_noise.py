@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sigma of an encoder, from what a calibration leaves of its samples.
+
+    sigma^2 <- sigma^2 times sum of squares / (samples - leverages)
+
+where residuals are white: they are noise, and as large as they are. Coloured residuals are something that the model
+lacks, and no sigma may hide it. For the same reason none is raised beyond what neighbouring samples differ by: a
+missing effect bends the motion, it does not make samples jump. Process noise is estimated in the same way beside it,
+see noise_estimation.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.calibration.calibration_result import ResidualSeries
+from jointscope.graphs.problem.coarse_encoder import COARSE, encoder_steps
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.recordings.recording import Recording, Stream
+
+Array = NDArray[np.float64]
+
+AGREES = (0.8, 1.25)  # mean squared residual in sigmas that asks for no other sigma
+COLOUR = 0.25  # largest autocorrelation of white residuals; a quantized encoder reaches 0.2
+LAGS = 100  # samples
+BY_CHANCE = 4.0  # [1/sqrt(samples)] autocorrelation that white noise may show
+FOURTH_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
+SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
+ALIKE = 0.15  # relative difference of what both say about white noise
+TOO_SMALL = 1.5  # times the sigma, noise that the samples show by themselves
+ALTERNATING, FAR = -0.6, 4.0  # correlation of neighbouring differences, and [sigma] beyond which none counts more
+TYPICAL = 1.4826  # standard deviation of normal numbers over the median of their sizes
+
+
+@dataclass(frozen=True)
+class EncoderFit:
+    """What is left of one encoder in one recording: its samples, and the series of residuals."""
+
+    stream: Stream
+    series: ResidualSeries
+
+
+def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]) -> Array:
+    """Sigma of each channel that the residuals ask for, shape (n,); as it was where they do not tell.
+
+    Args:
+        encoder: with the sigmas that were used.
+        fits: of all recordings.
+    """
+    sigmas = encoder.sigmas.copy()
+    if not encoder.estimate_sigma or not fits:
+        return sigmas
+    weights = [len(fit.series.times) for fit in fits]
+    chi2 = np.average([fit.series.chi2 for fit in fits], axis=0, weights=weights)
+    lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
+    highest = np.max([_roughness(fit.stream.values) for fit in fits], axis=0)
+    for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
+        # a smaller sigma hides nothing, whatever colour is left
+        if chi2[j] < AGREES[0] or all(
+            _is_white(fit.series.measured[:, j] - fit.series.predicted[:, j]) for fit in fits
+        ):
+            wanted = float(sigmas[j] * np.sqrt(chi2[j]))
+            bounded = max(wanted, lowest[j]) if wanted < sigmas[j] else min(wanted, highest[j])
+            # a bound may lie beyond what is there already
+            sigmas[j] = min(bounded, sigmas[j]) if wanted < sigmas[j] else max(bounded, sigmas[j])
+    return sigmas
+
+
+def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
+    """The robot with sigmas that are not far below what every look at the samples shows.
+
+    With a sigma that is too small the states follow the noise, which process noise then seems to explain. Differences
+    of fourth and of sixth order see the same noise where it is white, and different parts of a motion; and those of
+    white noise change their sign from one to the next, those of a motion do not.
+    """
+    changed = {}
+    for encoder in (robot.motor_encoder, robot.link_encoder):
+        if encoder is None or not encoder.estimate_sigma:
+            continue
+        seen = np.min([_visible_noise(r.streams[encoder.name].values) for r in recordings], axis=0)
+        sigmas = np.where(seen > TOO_SMALL * encoder.sigmas, seen, encoder.sigmas)
+        changed[encoder.name] = replace(encoder, sigmas=sigmas)
+    return robot.with_sensors(changed)
+
+
+def _visible_noise(values: Array) -> Array:
+    """White noise of each channel, shape (n,); zero where it cannot be told from motion."""
+    if len(values) < 4 * len(SIXTH_DIFFERENCE):
+        return np.zeros(values.shape[1])
+    found = []
+    for column in values.T:
+        parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
+        fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
+        alike = abs(fourth - sixth) < ALIKE * sixth and all(map(_alternates, parts))
+        found.append(sixth if alike else 0.0)
+    return np.array(found)
+
+
+def _alternates(differences: Array) -> bool:
+    """Whether differences of order n are those of white noise, correlated by -n / (n + 1) from one to the next."""
+    typical = TYPICAL * float(np.median(np.abs(differences)))
+    part = np.clip(differences, -FAR * typical, FAR * typical)
+    return float(part[:-1] @ part[1:]) < ALTERNATING * float(part @ part)
+
+
+def _rounding(stream: Stream, sigmas: Array) -> Array:
+    """Standard deviation of the rounding of a quantized encoder, shape (n,); zero for others."""
+    step = encoder_steps(stream.values)
+    return np.asarray(np.where(step > COARSE * sigmas, step, 0.0) / np.sqrt(12.0), dtype=np.float64)
+
+
+def _roughness(values: Array) -> Array:
+    """Noise that would explain by how much neighbouring samples differ, shape (n,)."""
+    if len(values) < 2 * len(FOURTH_DIFFERENCE):
+        return np.zeros(values.shape[1])
+    rest = [np.convolve(column, FOURTH_DIFFERENCE, mode="valid") for column in values.T]
+    return np.array([np.sqrt(np.mean(part**2)) for part in rest])
+
+
+def _is_white(residual: Array) -> bool:
+    r = residual - residual.mean()
+    power = float(r @ r)
+    if power == 0.0:
+        return False
+    lags = range(1, min(LAGS, len(r) // 4) + 1)
+    largest = max((abs(float(r[:-lag] @ r[lag:])) / power for lag in lags), default=1.0)
+    return largest < max(COLOUR, BY_CHANCE / np.sqrt(len(r)))

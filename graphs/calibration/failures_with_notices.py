@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors of an estimation together with what looked odd in the recordings, which often is the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
+
+from jointscope.robots.errors import SolveError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.screening import screen
+
+SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
+MOST = 3
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def with_notices(message: str, recordings: Sequence[Recording], notices: Sequence[Notice]) -> str:
+    """A failure with what the screening and the reader saw, unless the message says it already."""
+    everything = [*notices, *(notice for recording in recordings for notice in recording.notices)]
+    texts = dict.fromkeys(notice.text for notice in everything if notice.kind in SUSPICIOUS)
+    said = [text for text in texts if text in message]
+    return "; ".join([message, *[text for text in texts if text not in said][: max(MOST - len(said), 0)]])
+
+
+def names_notices(
+    function: Callable[Concatenate[Robot, Sequence[Recording], P], T],
+) -> Callable[Concatenate[Robot, Sequence[Recording], P], T]:
+    """Decorates what learns from recordings: its SolveErrors name what looked odd in them."""
+
+    @wraps(function)
+    def named(robot: Robot, recordings: Sequence[Recording], *args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            return function(robot, recordings, *args, **kwargs)
+        except SolveError as err:
+            notices = [notice for recording in recordings for notice in screen(recording, robot)]
+            raise SolveError(with_notices(str(err), recordings, notices)) from err
+
+    return named

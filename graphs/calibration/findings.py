@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a calibration tells the user in words: is it good, what is weak, what looks wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
+from jointscope.robots.recordings.recording import Notice
+
+CHI2_LOW, CHI2_HIGH = 0.6, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
+COLOURED = 1.5  # block-robust over plain sigma from which a value counts as widened
+SAID = 0.2  # relative change of a sigma that is told
+SEVERAL = 0.25  # share of widened values from which residuals are called coloured; a few widen by chance
+
+
+def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple[str, ...]:
+    """Sentences, most important first.
+
+    Args:
+        result: a calibration without findings.
+        notices: what the screening saw.
+    """
+    said = [*_not_at_rest(result), *_isolated(result), _verdict(result)]
+    said += [*_unsettled(result), *_sensor_noise(result), *_other_sigmas(result), *_process_noise(result)]
+    said += _coloured(result)
+    said += [direction.text for direction in result.weak_directions]
+    said += [f"{p.name}: {p.note}" for p in result.parameters if p.note and "prior" not in p.note]
+    said += [notice.text for notice in notices]
+    return tuple(said)
+
+
+def _not_at_rest(result: CalibrationResult) -> list[str]:
+    if result.converged:
+        return []
+    worst, fit = max(result.channels.items(), key=lambda item: item[1].chi2)
+    return [
+        f"the model contradicts the recordings (residuals of {np.sqrt(fit.chi2):.2g} sigma on {worst}): nothing was "
+        "gained any more although values still moved; believe no value and no sigma before the missing effect is in "
+        "the model: jointscope diagnose"
+    ]
+
+
+def _unsettled(result: CalibrationResult) -> list[str]:
+    if not result.unsettled:
+        return []
+    return [
+        f"the iterations ended with a last step of {result.unsettled:.1g} sigma: states where joints turn over still "
+        "moved, the values did not"
+    ]
+
+
+def _other_sigmas(result: CalibrationResult) -> list[str]:
+    """Encoders whose sigma the calibration found to be another one."""
+    said = []
+    for name, before in result.start.sensors.items():
+        if not isinstance(before, MotorEncoder | LinkEncoder):
+            continue
+        now = result.robot.sensors[name].sigmas
+        changed = [
+            f"{channel} {new:.3g} {unit} (was {old:.3g})"
+            for channel, unit, old, new in zip(before.channels, before.units, before.sigmas, now, strict=True)
+            if abs(np.log(new / old)) > np.log(1.0 + SAID)
+        ]
+        if changed:
+            said.append(
+                f"the residuals are white and of another size than stated, so these sigmas were found anew: "
+                f"{', '.join(changed)}; `estimate_sigma: false` in sensors.{name} keeps yours"
+            )
+    return said
+
+
+def _isolated(result: CalibrationResult) -> list[str]:
+    return [moment.sentence(bag.recording) for bag in result.bags for moment in bag.isolated]
+
+
+def _verdict(result: CalibrationResult) -> str:
+    dynamics = [p for p in result.parameters if p.name in result.robot.parameters]
+    count = len(dynamics)
+    # how well a time is known shows in seconds, not in shares of a delay that may be none
+    dynamics = [p for p in dynamics if p.value and p.unit != "s"]
+    relative = [p.sigma / abs(p.value) for p in dynamics]
+    if not relative:
+        return "no parameter was free"
+    worst = dynamics[int(np.argmax(relative))]
+    typical = float(np.median(relative))
+    return (
+        f"{count} parameters from {result.samples:,} samples: typically +-{100 * typical:.2g} %, "
+        f"worst {worst.name} with +-{100 * max(relative):.2g} %"
+    )
+
+
+def _sensor_noise(result: CalibrationResult) -> list[str]:
+    odd = {name: fit.chi2 for name, fit in result.channels.items() if not CHI2_LOW < fit.chi2 < CHI2_HIGH}
+    if not odd:
+        return ["every sensor channel is explained down to its stated noise"]
+    listed = ", ".join(f"{name} ({np.sqrt(chi2):.2g} sigma)" for name, chi2 in odd.items())
+    too_large = any(chi2 > CHI2_HIGH for chi2 in odd.values())
+    reason = (
+        "the model lacks something that these channels see, or their sigma in the robot file is too small"
+        if too_large
+        else "smaller than stated, as that of a quantized encoder at rest, or the states follow the noise"
+    )
+    return [f"residuals do not have the stated size on {listed}: {reason}"]
+
+
+def _process_noise(result: CalibrationResult) -> list[str]:
+    """How much unexplained torque the noise stands for, against what the motors do."""
+    robot, said = result.robot, []
+    densities = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
+    bag = result.bags[0]
+    layout = robot.layout
+    v = bag.states[:, layout.velocities]
+    for j, side in enumerate([f"{name} link" for name in layout.links] + [f"{name} motor" for name in layout.motors]):
+        # velocity that the model cannot explain after a tenth of a second, against the velocity itself
+        drift, size = densities[j] * np.sqrt(0.1), float(np.sqrt(np.mean(v[:, j] ** 2)))
+        if size > 0 and drift > 0.1 * size:
+            said.append(f"{side}: {100 * drift / size:.0f} % of its velocity is unexplained after 0.1 s")
+    return said
+
+
+def _coloured(result: CalibrationResult) -> list[str]:
+    names = [name for name, factor in result.sigma_inflation.items() if factor > COLOURED]
+    if len(names) < SEVERAL * len(result.sigma_inflation):
+        return []
+    largest = max(result.sigma_inflation.values())
+    return [
+        f"residuals are coloured: standard deviations of {len(names)} values were widened, up to {largest:.1f} times; "
+        "an effect may be missing"
+    ]

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The prediction error that sensor noise and state uncertainty alone would leave, channel by channel.
+
+A missing effect inflates the process noise of a calibration. The floor therefore uses only the white part of it, with
+free torques beside (see `white_noise`). A disturbance that lasts longer than a few milliseconds cannot be told from a
+missing effect and is no part of the floor. An encoder's floor grows with the uncertainty of the motion, a gyro's about
+an axis that nothing turns about stays at its noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.comparison.causal_filter import filter_around
+from jointscope.graphs.noise.white_noise import separate_noise
+from jointscope.graphs.problem.bag_problem import BagProblem, factor_on_state, first_command_time
+from jointscope.robots.errors import SolveError
+
+Array = NDArray[np.float64]
+
+SETTLING = 0.5  # [s] of motion after which the filter knows the deflection
+STARTS = 400  # predictions over which the floor is averaged
+
+
+def settled_from(problem: BagProblem) -> float:
+    """Time from which predictions are scored [s]: the filter has seen half a second of motion.
+
+    At rest friction hides the deflection, and after a start in motion the filter has to find it first; no prediction
+    can know it before. At least half of the recording is always scored.
+    """
+    ticks = problem.timeline.ticks
+    motion = first_command_time(problem.recording) if problem.rests else float(ticks[0])
+    return min(motion + SETTLING, 0.5 * float(ticks[0] + ticks[-1]))
+
+
+def are_judged(problem: BagProblem, start: NDArray[np.intp], horizon: float) -> NDArray[np.bool_]:
+    """Whether predictions from these ticks are the model's own: nothing left out in them, nor just before, shape (s,).
+
+    Where a stretch that is left out ends, the filter knows no more than at a start in motion.
+    """
+    return problem.recording.are_judged(problem.timeline.ticks[start] + horizon, horizon + SETTLING)
+
+
+def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> dict[str, float]:
+    """Root mean square of the expected error `horizon` seconds ahead, in sensor sigmas, by channel.
+
+    A model may contradict its recording so much that free torques beside it run away; no more is known of its floor
+    then than the noise of the sensors.
+
+    Args:
+        problem: the recording with the model's noise.
+        x: smoothed states, shape (m, d).
+        calibration: shared values.
+        horizon: prediction horizon [s].
+    """
+    try:
+        quiet = problem.with_noise(separate_noise(problem, x, calibration).white)
+    except SolveError:
+        return dict.fromkeys(problem.robot.channels, 1.0)
+    filtered = filter_around(quiet, x, calibration)
+    steps = max(round(horizon / float(np.median(problem.timeline.h))), 1)
+    first = int(np.searchsorted(problem.timeline.ticks, settled_from(problem)))
+    last = max(len(x) - 2 - steps, 0)
+    start = np.unique(np.linspace(min(first, last), last, STARTS).astype(int))
+    judged = are_judged(problem, start, horizon)
+    start = start[judged] if np.any(judged) else start
+    P = filtered.covariance[start]
+    for i in range(min(steps, len(x) - 2)):
+        P = _advance(quiet, x, calibration, start + i, P)
+    floors = np.sqrt(np.mean(_channel_variances(quiet, x[start + steps], calibration, P), axis=0))
+    return dict(zip(problem.robot.channels, map(float, floors), strict=True))
+
+
+def _advance(problem: BagProblem, x: Array, calibration: Calibration, ticks: NDArray[np.intp], P: Array) -> Array:
+    """Covariances one tick later: F P F' + Q."""
+    chosen = problem.dynamics.select(ticks)
+    linear = chosen.linearize((x[ticks], x[ticks + 1]), calibration)
+    J1_inverse = np.linalg.inv(linear.by_state[1])
+    F = -J1_inverse @ linear.by_state[0]
+    G = J1_inverse * chosen.sigmas[:, None, :]
+    return F @ P @ F.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)
+
+
+def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, P: Array) -> Array:
+    """Expected squared error of every channel in sigmas, shape (s, c)."""
+    found = []
+    for name, sensor in problem.robot.sensors.items():
+        factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
+        J = factor.linearize((x,), calibration).by_state[0] / sensor.sigmas[:, None]
+        found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
+    return np.hstack(found)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Predicted motion: many starts advance side by side through the recorded commands, or one through all of them.
+
+The paper's Euler step where the robot file says euler, else Runge-Kutta of order 4 with as many substeps as springs,
+dampers and friction ask for. Predictions share no code with the collocation that smoothed the states. A model that
+contradicts the recording may run away: its states are then infinite or no numbers, without a word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta_from
+from jointscope.graphs.problem.timeline import Timeline
+from jointscope.robots.dynamics.command_path import CommandPath
+from jointscope.robots.dynamics.rates_of_many import RatesOfMany
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+Rate = Callable[[Array], Array]
+
+
+class Predictor:
+    """Advances states by the model of one robot.
+
+    Args:
+        robot: the model.
+        timeline: ticks and commands.
+    """
+
+    def __init__(self, robot: Robot, timeline: Timeline):
+        self._model = RatesOfMany(robot)
+        self._euler = robot.choices.integrator == "euler"
+        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
+        self._h, u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
+        self._torque = self._model.torque_of(u)
+        self._cuts = StepCuts(robot, float(np.median(self._h)))
+
+    def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
+        """States one tick later, shape (s, d).
+
+        Args:
+            x: states, shape (s, d).
+            step: step that each state takes, shape (s,).
+        """
+        h, torque, cuts = self._h[step][:, None], self._torque[step], self._cuts
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            first = self._model.rates(x, torque)
+            if self._euler:
+                return x + h * first
+            if cuts.fine == cuts.coarse:
+                return _advanced(lambda at: self._model.rates(at, torque), x, first, h, cuts.coarse)
+            fine, after = cuts.fine_ones(x, first, h), np.empty_like(x)
+            for some, count in ((fine, cuts.fine), (~fine, cuts.coarse)):
+                if np.any(some):
+                    acting = torque[some]
+                    rate = _with_torque(self._model.rates, acting)
+                    after[some] = _advanced(rate, x[some], first[some], h[some], count)
+            return after
+
+    def paths(self, x: Array, start: NDArray[np.intp], steps: int) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
+        """Steps, states before and after each of them, until `steps` are done or the recording ends.
+
+        Args:
+            x: states at the starts, shape (s, d).
+            start: tick of each start, shape (s,).
+            steps: number of ticks to go.
+        """
+        for i in range(steps):
+            step = start + i
+            if np.any(step >= len(self._h)):
+                return
+            after = self.advance(x, step)
+            yield step, x, after
+            x = after
+
+    def path(self, x: Array) -> Array:
+        """States at all ticks from the first one, shape (m + 1, d); no numbers where the model has run away.
+
+        Args:
+            x: state at the first tick, shape (d,).
+        """
+        path = np.full((len(self._h) + 1, len(x)), np.nan)
+        path[0] = x
+        for step, _, after in self.paths(x[None], np.zeros(1, np.intp), len(self._h)):
+            if not np.all(np.isfinite(after)):
+                break
+            path[step[0] + 1] = after[0]
+        return path
+
+
+def _with_torque(rates: Callable[[Array, Array], Array], torque: Array) -> Rate:
+    return lambda x: rates(x, torque)
+
+
+def _advanced(rate: Rate, x: Array, first: Array, h: Array | float, count: int) -> Array:
+    """States after h, in a number of equal steps; `first` is the rate where they begin."""
+    h = h / count
+    x = runge_kutta_from(first, rate, x, h)
+    for _ in range(count - 1):
+        x = runge_kutta_from(rate(x), rate, x, h)
+    return x

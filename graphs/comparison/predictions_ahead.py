@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every sensor would read if the model ran on from a state, with the commands alone.
+
+Predictions ahead start from causal states, which use data up to their start only. Open loop starts from one state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.interpolated import interpolate
+from jointscope.graphs.comparison.causal_filter import FilteredStates
+from jointscope.graphs.comparison.noise_floor import are_judged, settled_from
+from jointscope.graphs.comparison.prediction import Predictor
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+HORIZON = 0.1  # [s] the horizon of `error`
+HORIZONS = (0.01, 0.1, 1.0)  # [s]
+SPACING = {0.01: 0.01, 0.1: 0.01, 1.0: 0.1}  # [s] between starts, by horizon
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Predictions that end near the samples of one sensor.
+
+    Attributes:
+        sample: index of the sample in its stream, shape (s,).
+        predicted: predicted measurement, shape (s, c).
+        states: predicted states, shape (s, d).
+    """
+
+    sample: NDArray[np.intp]
+    predicted: Array
+    states: Array
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Channels of a sensor that were sampled at the same instants.
+
+    Attributes:
+        sensor: name.
+        channels: indices of the channels.
+        taken: when the samples were really taken, shape (m,) [s].
+    """
+
+    sensor: str
+    channels: NDArray[np.intp]
+    taken: Array
+
+
+def predict_ahead(
+    problem: BagProblem, calibration: Calibration, predictor: Predictor, causal: FilteredStates, horizon: float
+) -> dict[str, Ahead]:
+    """Predictions `horizon` seconds ahead from starts all over the recording, by sensor."""
+    timeline = problem.timeline
+    ticks, h = timeline.ticks, float(np.median(timeline.h))
+    stride = max(round(SPACING[horizon] / h), 1)
+    groups = _groups(problem)
+    latest = max(
+        float(np.max(np.abs(problem.recording.streams[g.sensor].times - g.taken), initial=0.0)) for g in groups
+    )
+    longest = int(np.ceil((horizon + latest + 2.0 * h) / float(np.min(_sums(timeline.h, horizon)))))
+    start = np.arange(np.searchsorted(ticks, settled_from(problem)), len(ticks) - 1 - longest, stride)
+    if len(start) == 0:
+        return {
+            name: Ahead(np.zeros(0, np.intp), np.zeros((0, len(s.channels))), causal.mean[:0])
+            for name, s in problem.robot.sensors.items()
+        }
+    judged = are_judged(problem, start, horizon)
+    wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
+    taken = [g.taken[wanted[g.sensor][0]] for g in groups]
+    steps = [timeline.locate(times)[0] for times in taken]
+    found = [np.full((len(start), causal.mean.shape[1]), np.nan) for _ in groups]
+    for step, before, after in predictor.paths(causal.mean[start], start, longest):
+        for states, times, ends in zip(found, taken, steps, strict=True):
+            here = ends == step
+            if np.any(here):
+                states[here] = _between(problem, step[here], times[here], before[here], after[here])
+    result = {}
+    for name, (sample, near) in wanted.items():
+        own = [(g, states) for g, states in zip(groups, found, strict=True) if g.sensor == name]
+        good = near & np.all([np.all(np.isfinite(states), axis=1) for _, states in own], axis=0)
+        good &= judged
+        stamps = problem.recording.streams[name].times[sample[good]]
+        predicted = np.full((len(stamps), len(problem.robot.sensors[name].channels)), np.nan)
+        for group, states in own:
+            all_channels = predict_sensor(problem.robot, name, states[good], calibration, stamps)
+            predicted[:, group.channels] = all_channels[:, group.channels]
+        result[name] = Ahead(sample[good], predicted, own[0][1][good])
+    return result
+
+
+def _groups(problem: BagProblem) -> list[_Group]:
+    """All channels of all sensors, by when they were sampled."""
+    found = []
+    for name in problem.robot.sensors:
+        stamps = problem.recording.streams[name].times
+        for channels, late in late_channels(problem.robot, name):
+            found.append(_Group(name, channels, stamps - Lateness.of(problem.robot, late, stamps).anchor))
+    return found
+
+
+def _sums(h: Array, horizon: float) -> Array:
+    """Mean step over every stretch of about the horizon, shape (k,)."""
+    count = max(min(int(horizon / float(np.median(h))), len(h)), 1)
+    total = np.convolve(h, np.ones(count), mode="valid")
+    return total / count
+
+
+def _target_samples(taken: Array, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period."""
+    right = np.clip(np.searchsorted(taken, times), 1, len(taken) - 1)
+    nearest = np.where(times - taken[right - 1] < taken[right] - times, right - 1, right)
+    period = float(np.median(np.diff(taken)))
+    return nearest, np.abs(taken[nearest] - times) <= 0.5 * period + 1e-9
+
+
+def _between(problem: BagProblem, step: NDArray[np.intp], times: Array, before: Array, after: Array) -> Array:
+    """States between two ticks."""
+    ticks = problem.timeline.ticks
+    h = ticks[step + 1] - ticks[step]
+    return interpolate(problem.robot.layout, before, after, np.clip((times - ticks[step]) / h, 0.0, 1.0), h)
+
+
+def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration, stamps: Array) -> Array:
+    """What a sensor would read at states of shape (s, d) with these stamps, shape (s,) [s]; shape (s, c)."""
+    nothing = np.zeros((len(x), len(robot.sensors[name].channels)))
+    return factor_on_state(robot, name, nothing, stamps).residual((x,), calibration)
+
+
+def predict_open_loop(
+    problem: BagProblem, calibration: Calibration, predictor: Predictor, x0: Array
+) -> dict[str, Array]:
+    """Predictions at all samples from the first state and the commands alone.
+
+    NaN outside the ticks, infinite where the model has run away.
+    """
+    ticks = problem.timeline.ticks
+    path = predictor.path(x0)
+    lost = ~np.all(np.isfinite(path), axis=1)
+    streams = problem.recording.streams
+    found = {name: np.full(streams[name].values.shape, np.nan) for name in problem.robot.sensors}
+    for group in _groups(problem):
+        inside = (group.taken >= ticks[0]) & (group.taken <= ticks[-1])
+        step, _ = problem.timeline.locate(group.taken[inside])
+        x = _between(problem, step, group.taken[inside], path[step], path[step + 1])
+        stamps = streams[group.sensor].times[inside]
+        with np.errstate(invalid="ignore", over="ignore"):
+            predicted = predict_sensor(problem.robot, group.sensor, x, calibration, stamps)
+        predicted[lost[step + 1]] = np.inf
+        found[group.sensor][np.ix_(inside, group.channels)] = predicted[:, group.channels]
+    return found

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which physical effect is missing: calibrate, score the catalogue, refit the leaders, decide on validation blocks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.calibration.base_model import BaseModel, Span
+from jointscope.graphs.calibration.failures_with_notices import names_notices
+from jointscope.graphs.comparison.compare import compare_model
+from jointscope.graphs.comparison.comparison_result import ModelComparison
+from jointscope.graphs.comparison.failure_analysis import analyse_failure
+from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.diagnosis_words import paragraphs_of
+from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_missing_torque
+from jointscope.graphs.discovery.refit import refit
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
+from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
+from jointscope.graphs.discovery.verdicts import (
+    MATTERS,
+    SAME,
+    SENSOR_FLOOR,
+    ValidatedRefit,
+    excess_share,
+    judge,
+    worth_a_refit,
+)
+from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.screening import screen
+
+Array = NDArray[np.float64]
+
+LEADERS = 3  # candidates that are refitted
+PATIENCE = 2  # times as many, as long as none of them helps: one effect may hide that another one is right
+LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
+ADEQUATE = 0.05  # share of the squared error that may stay unexplained
+SUSPICION = "Look at this before any effect"  # how a paragraph about a plain mistake begins
+NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
+
+
+@dataclass
+class _Clock:
+    """Wall seconds by stage."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    _last: float = field(default_factory=time.perf_counter)
+
+    def stage(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name] = self.seconds.get(name, 0.0) + now - self._last
+        self._last = now
+
+
+@in_solver_context
+@names_notices
+def diagnose(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None = None,
+    *,
+    base: BaseModel | None = None,
+    comparison: ModelComparison | None = None,
+    validation: ValidationError | None = None,
+    leaders: int = LEADERS,
+    missing_torque: bool = True,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Ranks the effects that a model lacks.
+
+    Args:
+        robot: the model.
+        recordings: training recordings; they also give the validation blocks.
+        holdout: scored once per refit and reported; it never chooses.
+        base: the model calibrated with these recordings, if that was done.
+        comparison: of that model with the held-out recording, else with the first training recording, if it was made.
+        validation: errors of that model on the validation blocks, if they are known.
+        leaders: number of candidates to refit; up to twice as many where none of them helps.
+        missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    report, clock = progress or (lambda text, share: None), _Clock()
+    report("calibrating the base model", 0.0)
+    base = base or BaseModel.of(robot, recordings)
+    clock.stage("calibration")
+    report("scoring the catalogue", 0.3)
+    scored = score_candidates(base)
+    clock.stage("score")
+    report("where the model fails", 0.45)
+    comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
+    failure = analyse_failure(comparison, holdout or base.recordings[0])
+    clock.stage("comparison")
+    fit, spans = fit_and_judge(base)
+    before = validation or judged_error(base, base.robot, base.calibrations, spans)
+    validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report)
+    clock.stage("refits")
+    seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
+    candidates = _ranked(
+        [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
+    )
+    best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
+    share = unexplained(comparison)
+    if best is not None:
+        after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
+        share = unexplained_share(after, comparison.judged_floor)
+    refits = {label: t.refit.robot for label, t in validated.items()}
+    missing = None
+    if missing_torque:
+        report("the missing torque", 0.95)
+        missing = _missing_torque(base, {name: r for name, r in refits.items() if r.has_effect(*name.split("@"))})
+        clock.stage("missing torque")
+    result = Diagnosis(
+        robot=base.robot,
+        candidates=tuple(candidates),
+        adequate=best is None and max(share, *_elsewhere(base, holdout)) < ADEQUATE,
+        unexplained_share=share,
+        error=comparison.judged_error,
+        floor=comparison.judged_floor,
+        validation_error=before.error,
+        failure=failure,
+        missing=missing,
+        noise_levels=scored.noise_levels,
+        placebo_score=scored.placebo,
+        paragraphs=(),
+        refits=refits,
+        comparison=comparison,
+        wall_seconds=clock.seconds,
+        recordings=base.recordings,
+        heldout=holdout,
+    )
+    return replace(result, paragraphs=(*_suspicions(base), *paragraphs_of(result)))
+
+
+def _suspicions(base: BaseModel) -> list[str]:
+    """Plain mistakes that the screening saw, and pushes: they look like effects, so they come first.
+
+    The robot as it was before its calibration is screened: a mounting that was calibrated hides axes that are swapped.
+    """
+    notices = [notice for recording in base.recordings for notice in screen(recording, base.result.start)]
+    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
+    texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
+    return [f"{SUSPICION}: {text}." for text in texts]
+
+
+def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
+    """Of the beginning of the first training recording; None where its states cannot be estimated."""
+    recording, ticks = base.recordings[0], base.problem_ticks(0)
+    end = float(min(ticks[-1], ticks[0] + LONGEST))
+    part = recording if end == ticks[-1] else recording.between(float(ticks[0]), end)
+    kept = ticks <= end
+    try:
+        whole = bool(np.all(kept))
+        states = base.states[0] if whole else None
+        calibration = base.calibrations[0] if whole else None
+        return estimate_missing_torque(base.robot, part, states, calibration, explained_by=refits)
+    except JointscopeError:
+        return None
+
+
+def _elsewhere(base: BaseModel, holdout: Recording | None) -> list[float]:
+    """Unexplained shares of the further training recordings, where no recording was held out; at least one number."""
+    others = base.recordings[1:] if holdout is None else ()
+    return [0.0, *(unexplained(compare_model("base", base.robot, recording)) for recording in others)]
+
+
+def unexplained(comparison: ModelComparison) -> float:
+    """Share of a comparison's squared error that its floor does not explain."""
+    return unexplained_share(comparison.judged_error, comparison.judged_floor)
+
+
+def unexplained_share(error: float, floor: float) -> float:
+    """(error^2 - floor^2) / error^2, at least 0."""
+    return float(max(1.0 - (floor / error) ** 2, 0.0)) if error != 0.0 else 0.0
+
+
+def _refit_leaders(
+    base: BaseModel,
+    scored: ScoredCandidates,
+    error: float,
+    spans: tuple[Sequence[Span], Sequence[Span]],
+    holdout: Recording | None,
+    leaders: int,
+    report: Progress,
+) -> tuple[dict[str, ValidatedRefit], set[str]]:
+    """Refits of the best candidates, and the labels of those whose fit ran away.
+
+    Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too; where none
+    helps, the next ones are.
+    """
+    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
+    found, failed, enough = dict[str, ValidatedRefit](), set[str](), 0.0
+    for i, candidate in enumerate(worth[: PATIENCE * leaders]):
+        helped = any(t.validation.error**2 < (1.0 - MATTERS) * error**2 for t in found.values())
+        if candidate.plausible < enough or (i >= leaders and helped):
+            break
+        report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
+        validated = _refit_and_validate(base, candidate, *spans, holdout)
+        if validated is None:
+            failed.add(candidate.label)
+            continue
+        found[candidate.label] = validated
+        if excess_share(error, validated.validation.error, SENSOR_FLOOR) > NEARLY_ALL:
+            enough = max(enough, NEAR * candidate.plausible)
+    return found, failed
+
+
+def _refit_and_validate(
+    base: BaseModel,
+    candidate: ScoredCandidate,
+    fit: Sequence[Span],
+    spans: Sequence[Span],
+    holdout: Recording | None,
+) -> ValidatedRefit | None:
+    try:
+        found = refit(base, fit, candidate.best)
+        errors: ValidationError = judged_error(base, found.robot, found.biases, spans)
+    except (JointscopeError, np.linalg.LinAlgError):
+        return None
+    return ValidatedRefit(found, errors, _heldout(found.robot, holdout))
+
+
+def _heldout(robot: Robot, holdout: Recording | None) -> float:
+    """Only reported: a model that cannot follow the held-out recording has no figure there, and keeps its verdict."""
+    if holdout is None:
+        return float("nan")
+    try:
+        return heldout_error(robot, holdout)
+    except (JointscopeError, np.linalg.LinAlgError):
+        return float("nan")
+
+
+def _yielding(candidate: Candidate, smallest: float, missing: Sequence[Candidate]) -> Candidate:
+    """A candidate that explains only part of what the best one explains is no more than possible."""
+    if candidate.verdict != "missing" or candidate.validation_error <= smallest * (1.0 + SAME):
+        return candidate
+    best = min(missing, key=lambda c: c.validation_error)
+    reason = f"but {best.label} explains more of it; look again once that is in the model"
+    return replace(candidate, verdict="possible", reasons=(*candidate.reasons, reason))
+
+
+def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
+    order = {"missing": 0, "possible": 1, "absent": 2, "untestable": 3}
+    missing = [c for c in candidates if c.verdict == "missing"]
+    smallest = min((c.validation_error for c in missing), default=0.0)
+    candidates = [_yielding(c, smallest, missing) for c in candidates]
+
+    def key(c: Candidate) -> tuple[float, ...]:
+        if c.verdict == "missing":
+            return (0.0, float(c.dof), -c.score)
+        return (float(order[c.verdict]), -c.score, 0.0)
+
+    return sorted(candidates, key=key)

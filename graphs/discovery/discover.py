@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calibrate, diagnose, add, calibrate ... until the model is adequate or nothing helps: forward selection with removal.
+
+After every addition each effect that was added before is looked at again: one whose sizes fell back to null is taken
+out. The held-out recording is scored once per step and never chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from jointscope.graphs.calibration.base_model import BaseModel, with_full_gyros
+from jointscope.graphs.calibration.failures_with_notices import names_notices
+from jointscope.graphs.comparison.compare import compare_model
+from jointscope.graphs.discovery.diagnose import ADEQUATE, diagnose, unexplained
+from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
+from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, judged_error
+from jointscope.graphs.discovery.verdicts import MATTERS, SURE
+from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.files.effect_editing import remove_effect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+
+MAX_STEPS = 8
+Save = Callable[[int, DiscoveryStep], str]
+
+
+@in_solver_context
+@names_notices
+def discover(
+    robot: Robot,
+    recordings: Sequence[Recording],
+    holdout: Recording | None = None,
+    *,
+    save: Save | None = None,
+    resume: Sequence[SavedStep] | None = None,
+    max_steps: int = MAX_STEPS,
+    missing_torque: bool = True,
+    progress: Progress | None = None,
+) -> Discovery:
+    """Finds the effects that a model lacks, one after the other.
+
+    Args:
+        robot: the base model.
+        recordings: training recordings.
+        holdout: scored once per step.
+        save: called with the number of each finished step and the step; returns the robot file it wrote.
+        resume: finished steps of an earlier run; the search goes on after the last.
+        max_steps: effects to add at the most.
+        missing_torque: estimate the missing torque at every step, too; pictures need it, no verdict does.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps, missing_torque)
+    return search.run(robot, resume or ())
+
+
+class _Search:
+    """One discovery."""
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        holdout: Recording | None,
+        save: Save | None,
+        report: Progress,
+        max_steps: int,
+        missing_torque: bool,
+    ):
+        self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
+        self.max_steps, self.missing_torque, self.steps = max_steps, missing_torque, list[DiscoveryStep]()
+        self.errors: ValidationError | None = None  # of the last step; unknown after a resumed one
+
+    def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
+        """All steps."""
+        for saved in resume:
+            self._restore(saved)
+        self.report("calibrating the base model", 0.0)
+        start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
+        base = BaseModel.of(start, self.recordings)
+        if not self.steps:
+            self._add_step(None, None, base, "The base model.", self._training_errors(base))
+        stop, diagnosis = self._loop(base)
+        last = self.steps[-1]
+        adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE
+        return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.holdout is not None)
+
+    def _loop(self, base: BaseModel) -> tuple[str, Diagnosis | None]:
+        added = sum(step.added is not None for step in self.steps)
+        refused: set[str] = set()
+        while True:
+            share = added / self.max_steps
+            diagnosis = diagnose(
+                base.robot,
+                self.recordings,
+                self.holdout,
+                base=base,
+                comparison=self.steps[-1].comparison,
+                validation=self.errors,
+                missing_torque=self.missing_torque,
+                progress=self._part(share),
+            )
+            self._attach(diagnosis)
+            chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
+            if not chosen:
+                return _why(diagnosis), diagnosis
+            if added >= self.max_steps:
+                return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
+            grown = next((g for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), None)
+            if grown is None:
+                return "what helped on validation blocks did not hold when calibrated with all data", diagnosis
+            base = self._without_idle(grown)
+            refused.clear()
+            added += 1
+
+    def _try(self, base: BaseModel, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> BaseModel | None:
+        """The model with a candidate, calibrated with all training recordings; None if that makes it worse."""
+        self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
+        try:
+            grown = BaseModel.of(diagnosis.refits[candidate.label], self.recordings, start=base)
+            errors = self._training_errors(grown)
+        except JointscopeError:
+            errors = None
+        before = self.steps[-1].train_error
+        if errors is None or not errors.error**2 < (1.0 - MATTERS) * before**2:
+            refused.add(candidate.label)
+            return None
+        self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, before, errors.error), errors)
+        return grown
+
+    def _without_idle(self, base: BaseModel) -> BaseModel:
+        """Takes out effects whose sizes fell back to null after another one came in."""
+        found_before = {step.added for step in self.steps[:-1]}
+        for here in base.robot.effects:
+            if here.label not in found_before or not _is_idle(base.robot, here):
+                continue
+            try:
+                smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
+                errors = self._training_errors(smaller)
+            except JointscopeError:
+                continue
+            if errors.error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
+                self._add_step(None, here.label, smaller, f"{here.label} fell back to null and was taken out.", errors)
+                base = smaller
+        return base
+
+    def _add_step(
+        self, added: str | None, removed: str | None, base: BaseModel, paragraph: str, errors: ValidationError
+    ) -> None:
+        comparison = compare_model(f"step {len(self.steps)}", base.robot, self.holdout or self.recordings[0])
+        step = DiscoveryStep(
+            added=added,
+            removed=removed,
+            robot=base.robot,
+            train_error=errors.error,
+            heldout_error=comparison.judged_error if self.holdout is not None else float("nan"),
+            floor=comparison.judged_floor,
+            diagnosis=None,
+            comparison=comparison,
+            paragraph=paragraph,
+        )
+        if self.save is not None:
+            step = replace(step, robot_file=self.save(len(self.steps), step))
+        self.steps.append(step)
+        self.errors = errors
+
+    def _restore(self, saved: SavedStep) -> None:
+        comparison = compare_model(f"step {len(self.steps)}", saved.robot, self.holdout or self.recordings[0])
+        self.steps.append(
+            DiscoveryStep(
+                added=saved.added,
+                removed=saved.removed,
+                robot=saved.robot,
+                train_error=saved.train_error,
+                heldout_error=saved.heldout_error,
+                floor=saved.floor,
+                diagnosis=None,
+                comparison=comparison,
+                robot_file=saved.robot_file,
+                paragraph=saved.paragraph,
+            )
+        )
+
+    def _attach(self, diagnosis: Diagnosis) -> None:
+        """The last step learns what was found with it as the base."""
+        self.steps[-1] = replace(self.steps[-1], diagnosis=diagnosis)
+
+    def _training_errors(self, base: BaseModel) -> ValidationError:
+        return judged_error(base, base.robot, base.calibrations, fit_and_judge(base)[1])
+
+    def _part(self, start: float) -> Progress:
+        width = 1.0 / (self.max_steps + 1)
+        return lambda text, share: self.report(text, min(start + width * share, 1.0))
+
+
+def _is_idle(robot: Robot, here: EffectAt) -> bool:
+    """Whether every size of an effect is free and compatible with its null value."""
+    sizes = [p for p in here.effect.parameters_at(robot, here.owner) if not p.is_shape]
+    values = [robot.parameters[here.parameter(p.name)] for p in sizes]
+    return bool(sizes) and all(
+        not v.fixed and v.sigma is not None and abs(v.value - p.null) < SURE * v.sigma
+        for p, v in zip(sizes, values, strict=True)
+    )
+
+
+def _why(diagnosis: Diagnosis) -> str:
+    if diagnosis.adequate:
+        return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
+    return (
+        f"nothing in the catalogue explains the rest: {100 * diagnosis.unexplained_share:.0f} % of the squared error "
+        "above what noise alone would leave"
+    )
+
+
+def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> str:
+    start = f"{candidate.owner}.{candidate.effect}."
+    own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
+    values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
+    what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
+    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma."

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A real calibration with one more effect, on the fitting pieces of the training recordings.
+
+It starts from the base model's states and values and from the sizes that the score test predicts, so a few iterations
+do. The process noise is estimated again: the base model's noise has swallowed part of the effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.calibration.base_model import BaseModel, Span
+from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.score_test import HypothesisScore
+from jointscope.graphs.solving.batch_solver import solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.posterior import posteriors
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+FOLLOWING, FIRST_ITERATIONS, LAST_ITERATIONS, NOISE_CYCLES = 6, 8, 8, 6
+EASY = 0.05  # [rad/s/sqrt(s), m/s/sqrt(s)] smallest densities with which a refit begins
+ENOUGH = 0.3  # [sigma] last step of a refit
+SMALLEST_START = 0.05  # of the start value: where a logarithmic size begins if the score test wants less
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A model with one more effect, fitted.
+
+    Attributes:
+        robot: with the values and noise found.
+        label: ID@OWNER of the effect; empty for the base model itself.
+        biases: shared values that hold the biases of each recording.
+        sigmas: standard deviation of each of the effect's parameters in its unit, by the last part of its name.
+        converged: whether the last step was small.
+    """
+
+    robot: Robot
+    label: str
+    biases: tuple[Calibration, ...]
+    sigmas: dict[str, float]
+    converged: bool
+
+
+def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None, label: str = "") -> Refit:
+    """Fits the base model plus one effect.
+
+    Args:
+        base: the base model.
+        spans: pieces to fit.
+        score: the effect, its shapes and where to start; None fits the robot of `base` itself.
+        label: another effect than that of the score, started at its own start values.
+
+    Raises:
+        SolveError: the fit ran away.
+    """
+    robot = base.robot
+    if score is not None:
+        robot = add_effect(robot, score.hypothesis.label, start_of(score, robot))
+    elif label:
+        robot = add_effect(robot, label)
+    # noise that is next to nothing holds the states where the model without the effect has them
+    noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
+    problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
+    if score is not None or label:
+        # the states still are those of a model without the effect: they follow before all parameters move
+        estimate = solve(problems, estimate, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
+    solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
+    estimate = solution.estimate
+    if noise.estimate:
+        noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
+    if any(isinstance(here.effect, TimeShift) for here in robot.effects):
+        moved = _with(robot, estimate.calibrations[0])
+        problems = [replace(BagProblem.of(moved, p.recording), owner=p.owner) for p in problems]
+    problems = [problem.with_noise(noise) for problem in problems]
+    solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
+    found = solution.estimate.calibrations[0]
+    _, covariance = posteriors(problems, solution)
+    sigma = np.sqrt(np.diag(covariance))[: len(found.names)] * found.value_by_coordinate
+    name = score.hypothesis.label if score is not None else label
+    own = {
+        full.rsplit(".", 1)[1]: float(value)
+        for full, value in zip(found.names, sigma, strict=True)
+        if name and full.startswith("{1}.{0}.".format(*name.split("@")))
+    }
+    robot = replace(_with(robot, found), noise=noise)
+    return Refit(robot, name, _biases(base, spans, solution.estimate.calibrations), own, solution.converged)
+
+
+def start_of(score: HypothesisScore, robot: Robot) -> dict[str, float]:
+    """Where the refit starts: the predicted sizes, kept positive where the law needs it, and the best shapes."""
+    here, start = score.hypothesis.here, {}
+    for size, value in zip(score.hypothesis.sizes, score.estimate, strict=True):
+        start[size.name] = max(float(value), SMALLEST_START * size.start) if size.logarithmic else float(value)
+    known = {p.name for p in here.effect.parameters_at(robot, here.owner)}
+    start |= {name: value for name, value in score.hypothesis.shapes.items() if name in known}
+    if isinstance(here.effect, Structure) and here.effect.form == "bearing":
+        start |= _bearing_start(score, robot)
+    return start
+
+
+def _bearing_start(score: HypothesisScore, robot: Robot) -> dict[str, float]:
+    """Inertia and damping that give the best resonance with the predicted compliance."""
+    here, start = score.hypothesis.here, {}
+    omega, ratio = 2.0 * np.pi * score.hypothesis.shapes["frequency"], score.hypothesis.shapes["damping_ratio"]
+    usual = {p.name: p.start for p in here.effect.parameters_at(robot, here.owner)}
+    for axis, size, value in zip("xy", score.hypothesis.sizes, score.estimate, strict=True):
+        compliance = max(float(value), SMALLEST_START * size.start)
+        inertia = float(
+            np.clip(1.0 / (compliance * omega**2), 0.5 * usual[f"inertia_{axis}"], 2.0 * usual[f"inertia_{axis}"])
+        )
+        start[f"inertia_{axis}"] = inertia
+        start[f"damping_{axis}"] = 2.0 * ratio * float(np.sqrt(inertia / compliance))
+    return start
+
+
+def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[BagProblem], Estimate]:
+    """The pieces as problems of the new robot, with the base model's states."""
+    problems, states, calibrations = [], [], []
+    for span in spans:
+        piece: Recording = base.recordings[span.bag].between(span.t0, span.t1)
+        problem = replace(BagProblem.of(robot, piece), owner=span.bag)
+        problems.append(problem)
+        states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
+        calibrations.append(replace(Calibration.of(robot), biases=base.calibrations[span.bag].biases))
+    return problems, Estimate(tuple(states), tuple(calibrations))
+
+
+def _with(robot: Robot, calibration: Calibration) -> Robot:
+    """The robot with the values of a calibration."""
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    gyros = {
+        gyro.name: replace(gyro, R_imu_body=calibration.rotations[gyro.name], bias=calibration.biases[gyro.name])
+        for gyro in robot.gyros
+    }
+    return robot.with_values(values).with_sensors(gyros)
+
+
+def _biases(base: BaseModel, spans: Sequence[Span], found: Sequence[Calibration]) -> tuple[Calibration, ...]:
+    """Biases of each recording: the mean over its pieces."""
+    result = []
+    for bag, calibration in enumerate(base.calibrations):
+        own = [c for span, c in zip(spans, found, strict=True) if span.bag == bag]
+        mean = {name: np.mean([c.biases[name] for c in own], axis=0) for name in calibration.biases} if own else {}
+        result.append(replace(calibration, biases={**calibration.biases, **mean}))
+    return tuple(result)

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From scores and refits to verdicts: missing, possible, absent, untestable, each with its reasons.
+
+Scores rank, validation decides. An effect is missing if its refit lowers the error on validation blocks by a share that
+matters, on most of the blocks, with a possible sign, and pays for its parameters. A recording that was held out never
+enters here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
+from jointscope.graphs.discovery.refit import Refit
+from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
+from jointscope.graphs.discovery.validation import ValidationError
+from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
+
+MATTERS = 0.02  # share of the squared validation error that an effect must explain
+MOST = 0.6  # share of the validation blocks on which it must help
+SURE = 3.0  # [sigma] a refitted size must be away from null
+HORIZON = 0.1  # [s] predictions of this length that do not overlap count as independent
+SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
+HARM = 3.0  # times the error on a block from which an effect is said to harm there
+SAME = 0.02  # relative difference of errors that decides nothing
+
+
+@dataclass(frozen=True)
+class ValidatedRefit:
+    """A candidate that was refitted.
+
+    Attributes:
+        refit: the fit.
+        validation: its errors on validation blocks.
+        heldout: its error on the held-out recording; NaN without one.
+    """
+
+    refit: Refit
+    validation: ValidationError
+    heldout: float = float("nan")
+
+
+def judge(
+    scored: ScoredCandidate,
+    base: ValidationError,
+    validated: ValidatedRefit | None,
+    seconds: float,
+    failed: bool = False,
+) -> Candidate:
+    """The verdict on one candidate.
+
+    Args:
+        scored: its score.
+        base: errors of the base model on validation blocks.
+        validated: its refit; None if it was not worth one.
+        seconds: of all validation blocks.
+        failed: whether its refit ran away.
+    """
+    here, sizes = scored.best.hypothesis.here, scored.best.hypothesis.sizes
+    if validated is None:
+        parameters = {
+            size.name: EffectEstimate(float(value), float(sigma), size.unit)
+            for size, value, sigma in zip(sizes, scored.best.estimate, scored.best.sigma, strict=True)
+        }
+        verdict, reasons = _without_refit(scored, failed)
+        return _candidate(scored, parameters, verdict, reasons)
+    robot, refit = validated.refit.robot, validated.refit
+    parameters = {
+        p.name: EffectEstimate(robot.parameters[here.parameter(p.name)].value, refit.sigmas.get(p.name, np.nan), p.unit)
+        for p in here.effect.parameters_at(robot, here.owner)
+    }
+    share = excess_share(base.error, validated.validation.error, SENSOR_FLOOR)
+    bic = _bic(base.error, validated.validation.error, len(parameters), seconds)
+    verdict, reasons = _after_refit(scored, base, validated, parameters, bic, sizes)
+    return replace(
+        _candidate(scored, parameters, verdict, reasons),
+        share=share,
+        refitted=True,
+        validation_error=validated.validation.error,
+        heldout_error=validated.heldout,
+        bic=bic,
+    )
+
+
+def _candidate(
+    scored: ScoredCandidate, parameters: Mapping[str, EffectEstimate], verdict: str, reasons: tuple[str, ...]
+) -> Candidate:
+    here = scored.best.hypothesis.here
+    return Candidate(
+        effect=here.effect.id,
+        owner=here.owner,
+        score=scored.plausible,
+        dof=scored.best.dof,
+        p_value=scored.p_value,
+        parameters=parameters,
+        verdict=verdict,
+        look_alikes=scored.look_alikes,
+        reasons=reasons,
+        numerics=here.effect.card.numerics,
+    )
+
+
+def excess_share(before: float, after: float, floor: float) -> float:
+    """Part of the squared error above the floor that went, at most 1."""
+    excess = before**2 - min(floor, before) ** 2
+    return float(min((before**2 - after**2) / excess, 1.0)) if excess > 0 else 0.0
+
+
+def worth_a_refit(scored: ScoredCandidate, placebo: float) -> bool:
+    """Whether a score is beyond chance and beyond what meaningless regressors reach."""
+    return scored.chance < SIGNIFICANT and scored.plausible / scored.best.dof > placebo
+
+
+def _without_refit(scored: ScoredCandidate, failed: bool) -> tuple[str, tuple[str, ...]]:
+    if failed:
+        return "possible", ("its refit ran away; calibrate a robot with it to see",)
+    if scored.right_sign and scored.chance < SIGNIFICANT:
+        return "possible", ("its score is beyond chance, but others explain more; it was not refitted",)
+    effect, sizes = scored.best.hypothesis.here.effect, scored.best.hypothesis.sizes
+    reach = {size.name: SURE * float(sigma) for size, sigma in zip(sizes, scored.best.sigma, strict=True)}
+    if sizes and all(reach[size.name] > _worth_seeing(effect, size) for size in sizes):
+        size = sizes[0]
+        return "untestable", (
+            f"this motion cannot show it: {size.name} of {_worth_seeing(effect, size):g} {size.unit} would stay within "
+            f"{SURE:g} sigma; needed: {effect.card.excitation}",
+        )
+    if not scored.right_sign:
+        return "absent", ("the data want the impossible sign",)
+    return "absent", ("it would explain no more than chance",)
+
+
+def _worth_seeing(effect: Effect, size: EffectParameter) -> float:
+    """A size that a diagnosis should be able to see: the catalogue's example, else the largest plausible one."""
+    example = abs(effect.example.get(size.name, 0.0))
+    return example if example > 0.0 else size.prior_sigma / 10.0
+
+
+def _after_refit(
+    scored: ScoredCandidate,
+    base: ValidationError,
+    validated: ValidatedRefit,
+    parameters: Mapping[str, EffectEstimate],
+    bic: float,
+    sizes: tuple[EffectParameter, ...],
+) -> tuple[str, tuple[str, ...]]:
+    now, reasons = validated.validation, []
+    fall = 1.0 - (now.error / base.error) ** 2
+    if not validated.refit.converged and not fall >= MATTERS:
+        return "possible", ("its refit did not converge; calibrate a robot with it to see",)
+    if not np.isfinite(now.error) or fall < MATTERS:
+        return "absent", (
+            f"with it the error on validation blocks goes from {base.error:.3g} to {now.error:.3g} sigma",
+        )
+    reasons.append(f"the error on validation blocks falls from {base.error:.3g} to {now.error:.3g} sigma")
+    seen = np.isfinite(now.by_span) & np.isfinite(base.by_span)
+    better = int(np.sum(now.by_span[seen] < base.by_span[seen]))
+    reasons.append(f"it helps on {better} of {int(seen.sum())} validation blocks")
+    worse = now.by_span[seen] / np.maximum(base.by_span[seen], SENSOR_FLOOR)
+    if np.max(worse, initial=0.0) > HARM:
+        reasons.append(
+            f"on one of them it makes the error {np.max(worse):.1f} times larger: it may stand in for something else"
+        )
+    sizes = tuple(s for s in sizes if s.name in parameters)
+    wrong = [s.name for s in sizes if s.sign == "+" and parameters[s.name].value < s.null]
+    if wrong:
+        return "absent", (*reasons, f"but {wrong[0]} comes out with the impossible sign")
+    unsure = bool(sizes) and all(
+        abs(parameters[s.name].value - s.null) < SURE * parameters[s.name].sigma for s in sizes
+    )
+    if unsure:
+        return "possible", (*reasons, f"but no size is {SURE:g} sigma away from null")
+    if better < MOST * seen.sum() or bic >= 0.0:
+        return "possible", (*reasons, "but not on enough of them, or not enough for its parameters")
+    return "missing", tuple(reasons)
+
+
+def _bic(before: float, after: float, parameters: int, seconds: float) -> float:
+    """Change of the Bayesian information criterion; predictions that do not overlap are the samples."""
+    if not np.isfinite(after):
+        return float("nan")
+    samples = max(seconds / HORIZON, 2.0)
+    return float(samples * np.log(after**2 / before**2) + parameters * np.log(samples))

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes down what a fixed-lag estimator said at each tick, in bounded memory and with little work per tick."""
+
+from __future__ import annotations
+
+from array import array
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.fixed_lag.estimated_state import EstimatedState
+from jointscope.graphs.fixed_lag.replay.replay_result import CovarianceSeries, InnovationSeries, Latency, StateSeries
+from jointscope.graphs.fixed_lag.replay.thinned_rows import MOST, ThinnedRows
+from jointscope.graphs.fixed_lag.tick import Tick
+from jointscope.graphs.fixed_lag.window.innovation import Innovation
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+MATRICES = 4096
+MATRIX_STEP = 0.02  # [s] between two covariance matrices, before thinning
+
+
+class TickLog:
+    """Ticks as series."""
+
+    def __init__(self, robot: Robot, most: int = MOST, matrices: int = MATRICES):
+        """Empty.
+
+        Args:
+            robot: the model.
+            most: rows of a series that are kept.
+            matrices: covariance matrices that are kept.
+        """
+        self.ticks = 0
+        self._robot = robot
+        self._most = most
+        self._now = StateLog(robot, most)
+        self._lagged = StateLog(robot, most)
+        self._innovations: dict[str, InnovationLog] = {}
+        d = robot.layout.size
+        self._matrices = ThinnedRows(1 + d * d, matrices)
+        self._next_matrix = -np.inf
+        self._seconds = array("f")
+        self._latency = ThinnedRows(2, most)
+
+    @property
+    def stride(self) -> int:
+        """Every stride-th tick is in the series."""
+        return self._now.stride
+
+    def add(self, tick: Tick, lagged: EstimatedState | None, seconds: float) -> None:
+        """Writes down a tick and the state at the lag; the update took so long [s]."""
+        state = tick.state
+        self.ticks += 1
+        self._now.add(state)
+        if lagged is not None:
+            self._lagged.add(lagged)
+        for innovation in tick.innovations:
+            log = self._innovations.get(innovation.sensor)
+            if log is None:
+                channels = self._robot.sensors[innovation.sensor].channels
+                log = self._innovations[innovation.sensor] = InnovationLog(channels, self._most)
+            log.add(innovation)
+        self._seconds.append(seconds)
+        if (row := self._latency.next()) is not None:
+            row[:] = state.time, seconds
+        if state.time >= self._next_matrix:
+            self._next_matrix = max(self._next_matrix + MATRIX_STEP, state.time + 0.5 * MATRIX_STEP)
+            if (row := self._matrices.next()) is not None:
+                row[0], row[1:] = state.time, state.covariance.ravel()
+
+    def states(self) -> StateSeries:
+        """The newest states."""
+        return self._now.series()
+
+    def lagged(self) -> StateSeries:
+        """The states at the lag."""
+        return self._lagged.series()
+
+    def innovations(self) -> dict[str, InnovationSeries]:
+        """By sensor, in the order of the robot."""
+        sensors = self._robot.sensors
+        return {n: self._innovations[n].series(sensors[n].units) for n in sensors if n in self._innovations}
+
+    def covariances(self) -> CovarianceSeries:
+        """Covariance matrices of the newest states."""
+        rows, d = self._matrices.rows, self._robot.layout.size
+        return CovarianceSeries(rows[:, 0], rows[:, 1:].reshape(-1, d, d))
+
+    def latency(self) -> Latency:
+        """Wall time of the updates."""
+        seconds = np.frombuffer(self._seconds, dtype=np.float32).astype(float)
+        if not len(seconds):
+            seconds = np.full(1, np.nan)
+        p50, p99 = np.quantile(seconds, [0.5, 0.99])
+        rows = self._latency.rows
+        return Latency(float(p50), float(p99), float(seconds.max()), float(seconds.mean()), rows[:, 0], rows[:, 1])
+
+
+class StateLog:
+    """Estimated states as rows: time, mean, sigma, sigma of the deflections, biases and parameters with sigmas."""
+
+    def __init__(self, robot: Robot, most: int):
+        self._layout = robot.layout
+        self._most = most
+        self._rows: ThinnedRows | None = None
+        self._gyros: tuple[str, ...] = ()
+        self._parameters: tuple[str, ...] = ()
+
+    @property
+    def stride(self) -> int:
+        """Every stride-th state is kept."""
+        return 1 if self._rows is None else self._rows.stride
+
+    def add(self, state: EstimatedState) -> None:
+        """Writes a state down; the first one says which biases and parameters there are."""
+        if self._rows is None:
+            self._gyros, self._parameters = tuple(state.biases), tuple(state.parameters)
+            layout = self._layout
+            width = 1 + 2 * layout.size + len(layout.joints) + 6 * len(self._gyros) + 2 * len(self._parameters)
+            self._rows = ThinnedRows(width, self._most)
+        row = self._rows.next()
+        if row is None:
+            return
+        d, layout, P = self._layout.size, self._layout, state.covariance
+        variance = P.diagonal()
+        link, motor = layout.joint_q, layout.motor_q
+        row[0] = state.time
+        row[1 : 1 + d] = state.mean
+        row[1 + d : 1 + 2 * d] = np.sqrt(np.maximum(variance, 0.0))
+        at = 1 + 2 * d
+        spread = variance[link] + variance[motor] - 2.0 * P[link, motor]
+        row[at : at + len(link)] = np.sqrt(np.maximum(spread, 0.0))
+        at += len(link)
+        for name in self._gyros:
+            row[at : at + 3], row[at + 3 : at + 6] = state.biases[name], state.bias_sigmas[name]
+            at += 6
+        for name in self._parameters:
+            row[at : at + 2] = state.parameters[name]
+            at += 2
+
+    def series(self) -> StateSeries:
+        """The rows taken apart."""
+        d, n = self._layout.size, len(self._layout.joints)
+        rows = np.empty((0, 1 + 2 * d + n)) if self._rows is None else self._rows.rows
+        at = 1 + 2 * d + n
+        biases, sigmas, parameters = {}, {}, {}
+        for name in self._gyros:
+            biases[name], sigmas[name] = rows[:, at : at + 3], rows[:, at + 3 : at + 6]
+            at += 6
+        for name in self._parameters:
+            parameters[name] = rows[:, at : at + 2]
+            at += 2
+        mean, sigma, deflection = rows[:, 1 : 1 + d], rows[:, 1 + d : 1 + 2 * d], rows[:, 1 + 2 * d : 1 + 2 * d + n]
+        return StateSeries(rows[:, 0], mean, sigma, deflection, biases, sigmas, parameters)
+
+
+class InnovationLog:
+    """Innovations of one sensor as rows: time, nis, dof, used, residual, sigma; and sums over all of them."""
+
+    def __init__(self, channels: tuple[str, ...], most: int):
+        self._channels = channels
+        self._rows = ThinnedRows(4 + 2 * len(channels), most)
+        self._squares, self._used = np.zeros(len(channels)), np.zeros(len(channels))
+        self._nis = self._dof = 0.0
+        self._count = 0
+
+    def add(self, innovation: Innovation) -> None:
+        """Writes an innovation down; channels that were not looked at are NaN."""
+        looked_at: slice | list[int] = slice(None)
+        if len(innovation.channels) != len(self._channels):
+            looked_at = [self._channels.index(channel) for channel in innovation.channels]
+        self._count += 1
+        if innovation.used:
+            self._squares[looked_at] += (innovation.residual / innovation.sigma) ** 2
+            self._used[looked_at] += 1
+            self._nis += innovation.nis
+            self._dof += innovation.dof
+        row = self._rows.next()
+        if row is not None:
+            c = len(self._channels)
+            row[:4] = innovation.time, innovation.nis, innovation.dof, innovation.used
+            row[4:] = np.nan
+            row[4 : 4 + c][looked_at], row[4 + c :][looked_at] = innovation.residual, innovation.sigma
+
+    def series(self, units: tuple[str, ...]) -> InnovationSeries:
+        """The rows taken apart."""
+        rows, c = self._rows.rows, len(self._channels)
+        rows = rows[np.argsort(rows[:, 0], kind="stable")]  # late samples came after newer ones
+        with np.errstate(invalid="ignore", divide="ignore"):
+            by_channel = self._squares / self._used
+        return InnovationSeries(
+            channels=self._channels,
+            units=units,
+            times=rows[:, 0],
+            residual=rows[:, 4 : 4 + c],
+            sigma=rows[:, 4 + c :],
+            nis=rows[:, 1],
+            dof=rows[:, 2],
+            used=rows[:, 3] > 0.5,
+            nis_mean=self._nis / self._dof if self._dof else float("nan"),
+            dof_sum=self._dof,
+            channel_nis=dict(zip(self._channels, by_channel.tolist(), strict=True)),
+            count=self._count,
+        )

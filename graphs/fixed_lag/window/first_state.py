@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the estimator begins: from the first hundredths of a second of encoder samples, at rest or in motion.
+
+Motor positions and velocities come from a straight line through the encoder samples; links are where their motors are,
+within what springs give way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.fixed_lag.window.adaptation import prior_sigmas
+from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
+from jointscope.graphs.fixed_lag.window.newest_state import NewestState
+from jointscope.graphs.fixed_lag.window.observation import Observation
+from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+WINDOW = 0.02  # [s] of encoder samples
+FEWEST = 5  # encoder samples
+LONGEST_WAIT = 0.5  # [s] between two samples that belong together; after half of it fewer must do
+STILL = 4.0  # [sigma] spread of the encoders at rest
+REST_VELOCITY = 0.01  # [rad/s] uncertainty at rest; friction holds a motor while the link may still swing a little
+LINK_VELOCITY = 1.0  # [rad/s] of a link against its motor, in motion
+ACCELERATION = 100.0  # [rad/s^2] that a straight line may hide
+
+
+@dataclass(frozen=True)
+class EncoderSample:
+    """Complete readings of all encoders: time [s] and positions without zero, shape (n,) [rad]."""
+
+    time: float
+    q: Array
+
+
+class FirstSamples:
+    """Encoder samples until there are enough.
+
+    Args:
+        robot: its encoders.
+    """
+
+    def __init__(self, robot: Robot):
+        self._encoder, self._n = robot.motor_encoder, robot.n
+        self.samples: list[EncoderSample] = []
+
+    @property
+    def newest(self) -> Array | None:
+        """Newest positions, shape (n,) [rad]; None before the first."""
+        return self.samples[-1].q if self.samples else None
+
+    def add(self, observations: Sequence[Observation]) -> bool:
+        """Takes in the groups of channels of one message; returns whether the estimator can begin."""
+        own = [o for o in observations if o.sensor == self._encoder.name]
+        if sum(len(o.values) for o in own) < self._n:
+            return False
+        q = np.empty(self._n)
+        for o in own:
+            q[o.channels] = o.values
+        taken, samples = own[0].taken, self.samples
+        if samples and abs(taken - samples[-1].time) > LONGEST_WAIT:
+            samples.clear()
+        if samples and taken <= samples[-1].time:
+            return False  # older than what is there
+        samples.append(EncoderSample(taken, q - np.asarray(self._encoder.zero)))
+        span = taken - samples[0].time
+        return (span >= WINDOW and len(samples) >= FEWEST) or (span >= LONGEST_WAIT / 2 and len(samples) > 1)
+
+
+def first_state(
+    robot: Robot,
+    layout: AugmentedLayout,
+    samples: Sequence[EncoderSample],
+    walking: NewestState | None,
+) -> tuple[float, NewestState]:
+    """Time and Gaussian of the first tick.
+
+    Args:
+        robot: sensors with priors of their biases.
+        layout: of the estimator's state.
+        samples: encoder samples, in the order of time.
+        walking: an earlier estimate whose biases and parameters go on; None for their priors.
+    """
+    own, sigma = layout.robot, robot.motor_encoder.sigmas
+    t = np.array([s.time for s in samples])
+    q = np.array([s.q for s in samples])
+    now, span = float(t[-1]), float(max(t[-1] - t[0], 1e-4))
+    rests = bool(np.all(np.ptp(q, axis=0) < STILL * sigma))
+    v = np.zeros(robot.n) if rests else np.polyfit(t - now, q, 1)[0]
+    v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * float(np.max(sigma)) / span, 0.5 * ACCELERATION * span)
+    mean, variance = np.zeros(layout.size), np.zeros(layout.size)
+    mean[own.motor_q], mean[own.motor_v] = q[-1], v
+    mean[own.joint_q], mean[own.joint_v] = q[-1], v
+    variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, v_sigma**2
+    links = np.arange(own.n_link)
+    variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
+    variance[own.motor_q] = sigma**2
+    variance[own.memory] = [memory.spread**2 for memory in robot.memories.values()]
+    if walking is not None:
+        mean[layout.walking] = walking.mean[layout.walking]
+        covariance = np.diag(variance)
+        covariance[layout.walking, layout.walking] = walking.covariance[layout.walking, layout.walking]
+        return now, NewestState(mean, covariance)
+    for gyro in robot.gyros:
+        mean[layout.biases[gyro.name]], variance[layout.biases[gyro.name]] = gyro.bias, gyro.bias_prior_sigma**2
+    mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
+    variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
+    return now, NewestState(mean, np.diag(variance))

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Process noise of one step at one state: the whitening of the defects of the dynamics factor, and its inverse.
+
+The same rows as `factors.step`: velocity defects d_v and d_q - (h/2) d_v, link rows turned into impulses by
+W = M(q) / (inertia alone), with standard deviations s sqrt(h) and s h sqrt(h/12).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+SAME_POSITION = 0.02  # [rad] inertia weighs the noise; within this it does so as before, to two percent
+
+
+class StepNoise:
+    """Noise of the steps of one robot.
+
+    Args:
+        robot: its noise and layout.
+    """
+
+    def __init__(self, robot: Robot):
+        self._layout, noise = robot.layout, robot.noise
+        self._integrated, self._position = noise.model == "integrated", noise.position
+        self._density = np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
+        # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
+        self._tree = robot.kinematic_tree
+        self._alone = self._tree.free_inertias()
+        r, k = len(self._density), len(robot.layout.positions)
+        self._rate_rows, self._position_rows = np.arange(r), np.arange(r, r + k)
+        self._eye = np.eye(robot.layout.n_link)
+        self._kept: tuple[Array, float, tuple[Array, Array]] | None = None
+
+    def of_step(self, x: Array, h: float, extra: Array | None = None) -> tuple[Array, Array]:
+        """Whitening T and its inverse G: T defect is white with unit variance, defect = G n.
+
+        Args:
+            x: state at which the inertia is taken, shape (d,).
+            h: length of the step [s].
+            extra: further standard deviation of each velocity and memory over the step, shape (r,).
+
+        Returns:
+            Shapes (d, d); columns of T and rows of G are those of the state, rows of T velocities and memories first.
+        """
+        q = x[self._layout.q_link]
+        if extra is None and self._kept is not None:
+            at, length, found = self._kept
+            if length == h and np.abs(q - at).max() < SAME_POSITION:
+                return found
+        found = self._computed(x, h, extra)
+        if extra is None:
+            self._kept = q, h, found
+        return found
+
+    def _computed(self, x: Array, h: float, extra: Array | None) -> tuple[Array, Array]:
+        layout, k = self._layout, len(self._layout.positions)
+        sigma = self._density * math.sqrt(h)
+        position = sigma[:k] * (h / math.sqrt(12.0)) if self._integrated else np.full(k, self._position * math.sqrt(h))
+        if extra is not None:
+            sigma = np.sqrt(sigma**2 + extra**2)
+        T, G = np.zeros((2, layout.size, layout.size))
+        # as if every coordinate were alone; of the links only where inertia does not weigh
+        T[self._rate_rows, layout.rates], G[layout.rates, self._rate_rows] = 1.0 / sigma, sigma
+        T[self._position_rows, layout.positions], G[layout.positions, self._position_rows] = 1.0 / position, position
+        if not self._integrated:
+            return T, G
+        half, moved = 0.5 * h, layout.velocities
+        T[self._position_rows, moved], G[layout.positions, self._rate_rows[:k]] = -half / position, half * sigma[:k]
+        n, q, v = layout.n_link, layout.q_link, layout.v_link
+        W = self._mass_matrix(x[q]) / self._alone[:, None]
+        W_inverse = lapack.dgesv(W, self._eye)[2]
+        rates, positions = slice(0, n), slice(len(sigma), len(sigma) + n)
+        by_position = W / position[:n, None]
+        T[rates, v], T[positions, q], T[positions, v] = W / sigma[:n, None], by_position, -half * by_position
+        by_rate = W_inverse * sigma[:n]
+        G[v, rates], G[q, rates], G[q, positions] = by_rate, half * by_rate, W_inverse * position[:n]
+        return T, G
+
+    def _mass_matrix(self, q: Array) -> Array:
+        return self._tree.mass_matrix(q[None])[0]

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""One recording as factors on a chain of states.
+
+X(0) --dyn-- X(1) --dyn-- X(2) -- ... -- X(N)          dyn:  dynamics of the robot's integrator
+|    \\    /  |                            |            enc:  motor encoder, at a tick or between two
+initial  enc,  gyro                          ...          gyro: full, vertical or relative
+\\___ dynamics parameters, rotations, biases (shared by all ticks)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.bias_at_rest import BiasAtRestFactor
+from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.factors.euler_dynamics import EulerDynamics
+from jointscope.factors.factor import Factor
+from jointscope.factors.initial_state import InitialStateFactor
+from jointscope.factors.midpoint_dynamics import MidpointDynamics
+from jointscope.factors.priors import BiasPrior
+from jointscope.factors.simpson_dynamics import SimpsonDynamics
+from jointscope.factors.step import Steps
+from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
+from jointscope.graphs.problem.sensor_placement import factor_on_state as factor_on_state
+from jointscope.graphs.problem.timeline import Timeline
+from jointscope.robots.dynamics.command_path import CommandPath
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.recordings.recording import Recording, Stream
+
+Array = NDArray[np.float64]
+
+INTEGRATORS: dict[str, type[DynamicsFactor]] = {
+    "euler": EulerDynamics,
+    "midpoint": MidpointDynamics,
+    "simpson": SimpsonDynamics,
+}
+DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
+REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
+MOVING_SIGMA = 20.0  # [rad/s] where it does not
+SLACK = 1e3  # on the process noise where something unknown acts; the sensors alone tell the states there
+
+
+@dataclass(frozen=True)
+class BagProblem:
+    """All factors of one recording.
+
+    Attributes:
+        robot: the model.
+        recording: the data.
+        timeline: ticks and commands.
+        dynamics: one factor with all steps.
+        placed: sensors, initial state, priors that belong to this bag.
+        rests: whether the recording starts at rest.
+        owner: number of the recording that this is a piece of; pieces share its biases. None for a whole recording.
+    """
+
+    robot: Robot
+    recording: Recording
+    timeline: Timeline
+    dynamics: DynamicsFactor
+    placed: tuple[Placed, ...]
+    rests: bool
+    owner: int | None = None
+
+    @staticmethod
+    def of(robot: Robot, recording: Recording) -> BagProblem:
+        """Builds the factors of a recording; its robot is in the posture of the recording."""
+        robot.need_link_dynamics()
+        robot = robot.in_posture(recording.posture)
+        timeline = Timeline.of(recording, robot.command_held)
+        weights = _impulse_weights(robot, recording, timeline)
+        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
+        index = np.arange(len(timeline.h))
+        acting, slack = path if path.changes else None, _slack(recording, timeline)
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
+        dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
+        rests = starts_at_rest(robot, recording)
+        spreads = tuple(memory.spread for memory in robot.memories.values())
+        initial = InitialStateFactor(robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads)
+        placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
+        for name in robot.sensors:
+            placed += place_sensor(robot, recording, timeline, name)
+        for gyro in robot.gyros:
+            placed.append(_without_states(BiasPrior(gyro), 1))
+            if robot.choices.bias_at_rest and rests:
+                resting = recording.streams[gyro.name].between(-np.inf, first_command_time(recording))
+                values = resting.values[recording.are_judged(resting.times)]
+                if len(values):
+                    placed.append(_without_states(BiasAtRestFactor(gyro, values), len(values)))
+        return BagProblem(robot, recording, timeline, dynamics, tuple(placed), rests)
+
+    def with_noise(self, noise: ProcessNoise) -> BagProblem:
+        """The same problem with another process noise."""
+        return replace(self, dynamics=self.dynamics.with_noise(noise))
+
+    def of_robot(self, robot: Robot) -> BagProblem:
+        """The same recording, the same piece, of a robot with other choices, constants or sensors."""
+        return replace(BagProblem.of(robot, self.recording), owner=self.owner)
+
+    @staticmethod
+    def owners(problems: Sequence[BagProblem]) -> tuple[int, ...]:
+        """Recording of each problem: all of them whole, or all of them pieces."""
+        return tuple(i if problem.owner is None else problem.owner for i, problem in enumerate(problems))
+
+    @property
+    def sensors(self) -> tuple[Placed, ...]:
+        """The factors that hold measurements of states."""
+        return tuple(p for p in self.placed if p.factor.name in self.robot.sensors)
+
+
+def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> Array:
+    """M(q) of every step over the mean inertia of each coordinate, shape (m, n_link, n_link); q from the encoders."""
+    encoder = recording.streams[robot.motor_encoder.name]
+    middle = timeline.ticks[:-1] + 0.5 * timeline.h
+    angles = [np.interp(middle, encoder.times, column) for column in encoder.values.T]
+    layout, tree = robot.layout, robot.kinematic_tree
+    q = np.zeros((len(middle), layout.n_link))
+    q[:, layout.joint_link] = np.column_stack(angles) - robot.motor_encoder.zero
+    return tree.mass_matrix(q) / tree.free_inertias()[:, None]
+
+
+def _slack(recording: Recording, timeline: Timeline) -> Array | None:
+    """Steps that touch a stretch that is left out bind the motion no more; None where there are none."""
+    if not recording.left_out:
+        return None
+    return np.where(recording.are_judged(timeline.ticks[1:], timeline.h), 1.0, SLACK)
+
+
+def first_command_time(recording: Recording) -> float:
+    """Time of the first command that is not zero [s]; the last stamp if there is none."""
+    command = recording.command
+    moving = np.flatnonzero(np.any(command.values != 0.0, axis=1))
+    return float(command.times[moving[0]] if len(moving) else command.times[-1])
+
+
+def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.1) -> bool:
+    """Whether commands are zero, encoders and gyros still for the first `window` seconds."""
+    encoder = recording.streams[robot.motor_encoder.name]
+    t0 = float(max(encoder.times[0], recording.command.times[0]))
+    if first_command_time(recording) < t0 + window:
+        return False
+    part = encoder.between(t0, t0 + window)
+    if len(part) < 4:
+        return False
+    still = bool(np.all(_drift(part) < 4.0 * robot.motor_encoder.sigmas))
+    # friction may hold the motors while the links swing: the gyros must be still, too
+    gyros = [(gyro, recording.streams[gyro.name].between(t0, t0 + window)) for gyro in robot.gyros]
+    return still and all(
+        len(part) < 6 or bool(np.all(_drift(part) < 5.0 * gyro.sigma * np.sqrt(6.0 / len(part))))
+        for gyro, part in gyros
+    )
+
+
+def _drift(part: Stream) -> Array:
+    """Change of the mean from the first to the last third, shape (c,)."""
+    third = max(len(part) // 3, 1)
+    return np.abs(part.values[-third:].mean(axis=0) - part.values[:third].mean(axis=0))
+
+
+def _without_states(factor: Factor, m: int) -> Placed:
+    return Placed(factor, np.zeros(0, np.intp), np.zeros(m))

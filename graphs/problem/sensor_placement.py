@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the samples of a sensor sit on the chain of states: at a tick, or between two, whatever their stamps say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.distorted import DistortedFactor
+from jointscope.factors.factor import Factor
+from jointscope.factors.gyro import GyroFactor
+from jointscope.factors.interpolated import InterpolatedFactor
+from jointscope.factors.link_encoder import LinkEncoderFactor
+from jointscope.factors.motor_encoder import MotorEncoderFactor
+from jointscope.factors.relative_gyro import RelativeGyroFactor
+from jointscope.factors.rescaled import RescaledFactor
+from jointscope.factors.some_channels import SomeChannels
+from jointscope.factors.vertical_gyro import VerticalGyroFactor
+from jointscope.graphs.problem.coarse_encoder import shared_error
+from jointscope.graphs.problem.timeline import Timeline
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
+from jointscope.robots.recordings.recording import Recording, Stream
+
+Array = NDArray[np.float64]
+
+ALIGNED = 1.0 / 3.0  # [sigma] a sample may be taken at a tick if the signal moves less than this in between
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A factor and where its samples sit.
+
+    Attributes:
+        factor: samples in the order of time.
+        ticks: first state that each sample touches, shape (m,); empty for factors without states.
+        times: time of each sample, shape (m,) [s].
+    """
+
+    factor: Factor
+    ticks: NDArray[np.intp]
+    times: Array
+
+
+def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: str) -> list[Placed]:
+    """The samples of one sensor: those at a tick, those between two, and channels whose stamps are late apart.
+
+    Args:
+        robot: the model.
+        recording: the data.
+        timeline: ticks of the states.
+        name: name of the sensor.
+    """
+    placed = []
+    for channels, late in late_channels(robot, name):
+        if not late:
+            placed += _place_on_time(robot, recording, timeline, name, channels)
+            continue
+        stream = recording.streams[name]
+        lateness = Lateness.of(robot, late, stream.times)
+        taken = stream.times - lateness.anchor
+        inside = (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
+        step, fraction = timeline.locate(taken[inside])
+        inner = _some(_sensor_factor(robot, recording, name, stream, inside), channels, robot.sensors[name])
+        here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
+        factor = InterpolatedFactor(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
+        placed.append(Placed(factor, step, stream.times[inside]))
+    return placed
+
+
+def _place_on_time(
+    robot: Robot, recording: Recording, timeline: Timeline, name: str, channels: NDArray[np.intp]
+) -> list[Placed]:
+    """Channels with right stamps."""
+    sensor = robot.sensors[name]
+    stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
+    step, fraction = timeline.locate(stream.times)
+    h = timeline.h[step]
+    nearest = step + (fraction > 0.5)
+    distance = np.abs(stream.times - timeline.ticks[nearest])
+    aligned = np.all(distance[:, None] * _rate_of_change(stream) < ALIGNED * sensor.sigmas, axis=1)
+    placed = []
+    if np.any(aligned):
+        factor = _some(_sensor_factor(robot, recording, name, stream, aligned), channels, sensor)
+        placed.append(Placed(factor, nearest[aligned], stream.times[aligned]))
+    if not np.all(aligned):
+        between = ~aligned
+        inner = _some(_sensor_factor(robot, recording, name, stream, between), channels, sensor)
+        factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
+        placed.append(Placed(factor, step[between], stream.times[between]))
+    return placed
+
+
+def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:
+    """The factor for some of a sensor's channels; the paper's forms of a gyro are never divided."""
+    return factor if len(channels) == len(sensor.channels) else SomeChannels(factor, channels)
+
+
+def _values(robot: Robot) -> dict[str, float]:
+    """Present values of all parameters."""
+    return {name: parameter.value for name, parameter in robot.parameters.items()}
+
+
+def _rate_of_change(stream: Stream) -> Array:
+    """How fast each channel changes around each sample, shape (m, c) [unit/s]."""
+    if len(stream) < 3:
+        return np.full(stream.values.shape, np.inf)
+    return np.abs(np.gradient(stream.values, stream.times, axis=0))
+
+
+def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
+    sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
+    if isinstance(sensor, MotorEncoder | LinkEncoder):
+        factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)
+        return factor if shared is None else RescaledFactor(factor, shared[chosen])
+    assert isinstance(sensor, Gyro)
+    if sensor.form == "full":
+        return factor_on_state(robot, name, values, times)
+    if sensor.form == "vertical":
+        return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)
+    reference = robot.sensors[str(sensor.reference)]
+    assert isinstance(reference, Gyro)
+    other = recording.streams[reference.name]
+    nearest = _nearest(other.times, times)
+    return RelativeGyroFactor(sensor, values, robot.tree, robot.layout, reference, other.values[nearest])
+
+
+def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Factor:
+    """A sensor with all its channels predicted from the state, whatever form its file chooses.
+
+    Args:
+        robot: the model.
+        name: name of the sensor.
+        values: measured, shape (m, c).
+        times: stamps since the start of the recording, shape (m,) [s].
+    """
+    sensor = robot.sensors[name]
+    inner: GyroFactor | MotorEncoderFactor
+    if isinstance(sensor, LinkEncoder):
+        return LinkEncoderFactor(sensor, values, robot.layout)
+    assert not isinstance(sensor, TorqueSensor)
+    if isinstance(sensor, MotorEncoder):
+        inner = MotorEncoderFactor(sensor, values, robot.layout)
+        seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
+    else:
+        inner = GyroFactor(sensor, values, robot.kinematic_tree, robot.layout)
+        seats = {name: np.arange(len(sensor.channels))}
+    effects = [here for here in robot.effects if isinstance(here.effect, ReadingEffect) and here.owner in seats]
+    if not effects:
+        return inner
+    return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, _values(robot))
+
+
+def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:
+    """Index of the sample nearest to each wanted time."""
+    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+    return np.where(wanted - times[right - 1] < times[right] - wanted, right - 1, right)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The ticks at which states are estimated: the command stamps, so that the command is constant over every step.
+
+Steps longer than wanted (a slow or interrupted command stream) are divided; the command then acts on. A drive signal
+that was measured, as a current beside the positions, runs on between its samples instead: each step gets its mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recordings.recording import Recording, Stream
+
+Array = NDArray[np.float64]
+
+LONGEST_STEP = 2.5e-3  # [s] friction changes sign within a few milliseconds
+SHORTEST_STEP = 2e-5  # [s] below this two commands are one; the later one counts
+MOST_TICKS, MOST_PER_SAMPLE = 20_000, 100  # states that no sample tells anything of take memory and time
+CUT = "with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`"
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Ticks and what acts between them.
+
+    Attributes:
+        ticks: times of the states, shape (m + 1,) [s].
+        u: command of each step, shape (m, n), SI unit of the command.
+    """
+
+    ticks: Array
+    u: Array
+
+    @property
+    def h(self) -> Array:
+        """Length of each step, shape (m,) [s]."""
+        return np.diff(self.ticks)
+
+    @staticmethod
+    def of(recording: Recording, held: bool = True) -> Timeline:
+        """Ticks from the first command to the last sample of any sensor.
+
+        Args:
+            recording: with its drive signal.
+            held: whether each value of it acts until the next one; otherwise it is linear between samples.
+
+        Raises:
+            RecordingError: commands and sensors do not overlap in time.
+        """
+        command = recording.command
+        sensors = [stream for name, stream in recording.streams.items() if name != "command"]
+        period = float(np.median(np.diff(command.times))) if len(command) > 1 else np.inf
+        end = min(max(float(s.times[-1]) for s in sensors), float(command.times[-1]) + period)
+        keep = np.append(np.diff(command.times) >= SHORTEST_STEP, True) & (command.times < end)
+        times, u = command.times[keep], command.values[keep]
+        if len(times) < 1 or end - times[0] < 2.0 * SHORTEST_STEP:
+            raise RecordingError(
+                f"{recording.path}: commands ({command.times[0]:.3f} to {command.times[-1]:.3f} s) and sensors (until "
+                f"{end:.3f} s) do not overlap; check that their stamps come from one clock"
+            )
+        edges = np.append(times, end) if end - times[-1] >= SHORTEST_STEP else times
+        u = u[: len(edges) - 1]
+        wanted = min(period, LONGEST_STEP)
+        parts = np.maximum(np.round(np.diff(edges) / wanted - 0.3), 1).astype(int)
+        if parts.sum() > MOST_TICKS + MOST_PER_SAMPLE * recording.sample_count:
+            raise RecordingError(
+                f"{recording.path}: {recording.sample_count} samples in {end - times[0]:.0f} s are too few to follow a "
+                f"motion; expected several in a second: cut out the part in which the robot was recorded, {CUT}"
+            )
+        if np.all(parts == 1):
+            return Timeline(edges, u if held else _means(command, edges))
+        fraction = np.concatenate([np.arange(p) / p for p in parts])
+        ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
+        return Timeline(ticks, np.repeat(u, parts, axis=0) if held else _means(command, ticks))
+
+    def locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+        """Step that holds each time, and the fraction of the step that has passed, shape (k,) each."""
+        step = np.clip(np.searchsorted(self.ticks, times, side="right") - 1, 0, len(self.ticks) - 2)
+        return step, (times - self.ticks[step]) / self.h[step]
+
+
+def _means(command: Stream, ticks: Array) -> Array:
+    """Mean of a signal that is linear between samples over each step, shape (m, n); the last value goes on."""
+    times = np.append(command.times, max(float(ticks[-1]), float(command.times[-1])) + 1.0)
+    values = np.vstack([command.values, command.values[-1:]])
+    pieces = 0.5 * np.diff(times)[:, None] * (values[:-1] + values[1:])
+    reached = np.vstack([np.zeros(values.shape[1]), np.cumsum(pieces, axis=0)])
+    k = np.clip(np.searchsorted(times, ticks, side="right") - 1, 0, len(times) - 2)
+    passed = (ticks - times[k])[:, None]
+    slope = (values[k + 1] - values[k]) / np.diff(times)[k, None]
+    at_ticks = reached[k] + passed * values[k] + 0.5 * slope * passed**2
+    return np.asarray(np.diff(at_ticks, axis=0) / np.diff(ticks)[:, None], dtype=np.float64)

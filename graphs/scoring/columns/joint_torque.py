@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of torques of one joint, memories included."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.scoring.columns.column import STEP, Column, null_values
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
+
+Array = NDArray[np.float64]
+
+
+def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
+    """One column of accelerations for each size."""
+    effect, layout = hypothesis.here.effect, s.model.layout
+    assert isinstance(effect, JointTorque)
+    j = s.robot.joints.index(hypothesis.here.owner)
+    signals = joint_signals(s, j)
+    p = null_values(hypothesis)
+    if effect.memory is not None:
+        signals = signals_with_memory(effect, signals, p, s.ticks)
+    link = int(layout.joint_link[j])
+    motor = int(layout.motor_row[j])
+    rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}[effect.side]
+    found = []
+    for size in hypothesis.sizes:
+        slope = np.imag(effect.law(signals, {**p, size.name: p[size.name] + 1j * STEP})) / STEP
+        tau = np.zeros((len(s.ticks), layout.n_rates))
+        for row, sign in rows:
+            tau[:, row] = sign * slope
+        found.append(Column(at_ticks=s.accelerations(tau)))
+    return found
+
+
+def joint_signals(s: ScoreSignals, j: int) -> JointSignals:
+    """Motion of one joint."""
+    layout = s.model.layout
+    return JointSignals(
+        q_link=s.x[:, layout.joint_q[j]],
+        v_link=s.x[:, layout.joint_v[j]],
+        q_motor=s.x[:, layout.motor_q[j]],
+        v_motor=s.x[:, layout.motor_v[j]],
+        tau_spring=s.tau_spring[:, j],
+        stiffness=float(s.stiffness[j]),
+        sharpness=s.robot.sharpness_of(s.robot.joints[j]),
+    )
+
+
+def signals_with_memory(effect: JointTorque, signals: JointSignals, p: dict[str, float], ticks: Array) -> JointSignals:
+    """The same with the effect's memory integrated along the motion, by linearly implicit steps.
+
+    Each step takes dz/dt = f(z) as f(z_k) + f'(z_k) (z - z_k) and solves that exactly; for rates that are linear in z
+    between kinks of the motion nothing else is needed.
+    """
+    assert effect.memory is not None
+    rate, h = effect.memory.rate, np.diff(ticks)
+    at = [np.broadcast_to(np.real(rate(replace(signals, memory=z), p)), ticks.shape) for z in (0.0, 1.0, -1.0)]
+    constant, slope, bend = at[0], 0.5 * (at[1] - at[2]), 0.5 * (at[1] + at[2]) - at[0]
+    constant, slope, bend = (0.5 * (part[1:] + part[:-1]) for part in (constant, slope, bend))
+    z = [0.0]
+    for step, f0, f1, f2 in zip(h.tolist(), constant.tolist(), slope.tolist(), bend.tolist(), strict=True):
+        now = z[-1]
+        f, df = f0 + f1 * now + f2 * now * now, f1 + 2.0 * f2 * now
+        z.append(now + (step * f if abs(df * step) < 1e-9 else f * math.expm1(df * step) / df))
+    return replace(signals, memory=np.array(z))

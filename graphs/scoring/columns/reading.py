@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of errors of readings: distorted values and late stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.scoring.columns.column import STEP, SensorColumn, SensorPart, null_values
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.model.lateness import shifts
+
+Array = NDArray[np.float64]
+
+
+def reading_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> SensorColumn:
+    """Error of the owner's readings for one size."""
+    effect, owner = hypothesis.here.effect, hypothesis.here.owner
+    assert isinstance(effect, ReadingEffect)
+    p = null_values(hypothesis)
+    moved = {**p, size: p[size] + 1j * STEP}
+    encoder = s.robot.motor_encoder.name
+
+    def column(part: SensorPart) -> Array:
+        error: Array = np.zeros(part.reading.shape)
+        if part.name == owner:
+            error[:] = (np.imag(effect.law(part.reading, part.stamps, moved)) / STEP)[:, : len(part.channels)]
+        elif part.name == encoder and owner in s.robot.joints:
+            row = np.flatnonzero(part.channels == s.robot.joints.index(owner))
+            if len(row):
+                error[:, row] = np.imag(effect.law(part.reading[:, row], part.stamps, moved)) / STEP
+        return error
+
+    return column
+
+
+def late_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> SensorColumn:
+    """Error of readings whose stamps are late, for one size."""
+    effect = hypothesis.here.effect
+    assert isinstance(effect, TimeShift)
+    p = null_values(hypothesis)
+
+    def column(part: SensorPart) -> Array:
+        slope = effect.late(part.stamps, p)[1][size]
+        hit = np.array([shifts(hypothesis.here, s.robot, part.name, int(channel)) for channel in part.channels])
+        return -part.reading_rate * slope[:, None] * hit
+
+    return column

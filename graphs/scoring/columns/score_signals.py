@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Smoothed motion of one recording with everything that regressors are built from; never a measured signal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.robots.dynamics.carried_weight import CarriedWeight
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ScoreSignals:
+    """Motion at the m + 1 ticks of a recording.
+
+    Attributes:
+        robot: the model with the calibration's values.
+        model: its equations of motion.
+        parameters: values of the free parameters, shape (p,).
+        values: all parameters by full name.
+        ticks: shape (m + 1,) [s].
+        x: smoothed states, shape (m + 1, d).
+        rate: their time derivative by differences, shape (m + 1, d).
+        a_link: link accelerations by the model, shape (m + 1, n_link) [rad/s^2].
+        M_inverse: shape (m + 1, n_link, n_link).
+        u: logged commands of the m steps, shape (m, n).
+        response: accelerations per unit of each command, shape (m, r, n).
+        stiffness, damping: of every joint, shape (n,); zero for rigid ones.
+        tau_spring: shape (m + 1, n) [N m]; of rigid joints the weight that they carry.
+        inertia: of each motor, shape (n,) [kg m2].
+        shared: what hypotheses that differ in their shapes alone have in common, by label; they fill it.
+    """
+
+    robot: Robot
+    model: ElasticJoints
+    parameters: Array
+    values: dict[str, float]
+    ticks: Array
+    x: Array
+    rate: Array
+    a_link: Array
+    M_inverse: Array
+    u: Array
+    response: Array
+    stiffness: Array
+    damping: Array
+    tau_spring: Array
+    inertia: Array
+    shared: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def of(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
+        """From a solved recording."""
+        model = problem.dynamics.model
+        parameters, ticks = calibration.values, problem.timeline.ticks
+        values, layout = model.named(parameters), model.layout
+        u = problem.dynamics.command(parameters)
+        both = np.vstack([u, u[-1:]])
+        here = model.with_derivatives(x, both, parameters)
+        springs = model.springs(x, values)
+        return ScoreSignals(
+            robot=problem.robot.with_values(values),
+            model=model,
+            parameters=parameters,
+            values=values,
+            ticks=ticks,
+            x=x,
+            rate=np.gradient(x, ticks, axis=0, edge_order=2),
+            a_link=here.value[:, : layout.n_link],
+            M_inverse=here.rigid.by_torque,
+            u=u,
+            response=model.command_response(here, parameters)[:-1],
+            stiffness=springs.stiffness,
+            damping=springs.damping,
+            tau_spring=springs.torque + CarriedWeight(problem.robot).torque(x),
+            inertia=model.motor_inertia(values),
+        )
+
+    def accelerations(self, tau: Array) -> Array:
+        """What torques on the equations of motion do, shape (m + 1, r) both; rows of memories are zero."""
+        layout = self.model.layout
+        n = layout.n_link
+        a = np.zeros((len(tau), layout.n_rates))
+        a[:, :n] = np.einsum("kij,kj->ki", self.M_inverse, tau[:, :n])
+        elastic = [layout.joints.index(joint) for joint in layout.motors]
+        a[:, n : n + layout.n_motor] = tau[:, n : n + layout.n_motor] / self.inertia[elastic]
+        return a

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Regressors of hypotheses: how residuals change with each size of an effect at its null value.
+
+At null a law's torque is zero for every motion, so only its derivative by its sizes matters, evaluated along the
+smoothed motion. Effects act in three ways: accelerations at the ticks, accelerations held over each step (commands),
+and errors of readings. A soft bearing is scored through its compliance: the tilt is compliance times reaction torque,
+passed through a resonance; gyros see its rate, the joints its inertia. How each kind of effect makes its columns is in
+`graphs/scoring/columns/`.
+"""
+
+from __future__ import annotations
+
+from jointscope.graphs.scoring.columns.bearing import bearing_columns
+from jointscope.graphs.scoring.columns.column import Column
+from jointscope.graphs.scoring.columns.command import command_columns
+from jointscope.graphs.scoring.columns.elasticity import elasticity_column
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.columns.inertia import coriolis_columns, inertia_columns
+from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
+from jointscope.graphs.scoring.columns.reading import late_column, reading_column
+from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
+from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.effect_kinds.robot_torque import RobotTorque
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+
+
+def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
+    """One column for each size of a hypothesis."""
+    effect = hypothesis.here.effect
+    if isinstance(effect, JointTorque):
+        return joint_torque_columns(hypothesis, s)
+    if isinstance(effect, RobotTorque):
+        return robot_torque_columns(hypothesis, s)
+    if isinstance(effect, CommandEffect):
+        return command_columns(hypothesis, s)
+    if isinstance(effect, InertiaEffect):
+        return inertia_columns(hypothesis, s)
+    if isinstance(effect, ReadingEffect):
+        return [Column(reading=reading_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
+    if isinstance(effect, TimeShift):
+        return [Column(reading=late_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
+    assert isinstance(effect, Structure)
+    if effect.form == "bearing":
+        return bearing_columns(hypothesis, s)
+    if effect.form == "integration":
+        return [Column(better_integrator=True)]
+    if effect.form == "coriolis":
+        return coriolis_columns(s)
+    return [Column(reading=elasticity_column(hypothesis.here, s))] if effect.form == "elasticity" else []

@@ -1,0 +1,296 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scores of all hypotheses: what one linear step with each of them would explain, base parameters profiled out.
+
+    score = s' S^-1 s,   estimate = -S^-1 s,   covariance = S^-1
+
+with S, s of the hypothesis's sizes after states and base parameters are eliminated (Rao's score test; in the social
+sciences the modification index). Its chi-square distribution holds for white residuals; the robust statistic replaces S
+by the sum of squared scores of half-second blocks, which survives coloured ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import fdtrc
+
+from jointscope.factors.priors import shared_priors
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.score_columns import Column, columns_of
+from jointscope.graphs.scoring.score_system import ScoreRows, Segment, rows_of, trial_system
+from jointscope.graphs.solving.shared_layout import SharedLayout
+
+Array = NDArray[np.float64]
+
+BATCH = 16  # columns at once: bounds the memory; with more, most of the time goes into asking for memory
+BLOCK = 0.5  # [s] of the robust variance
+DETERMINED = 0.5  # [prior sigma] a size known better than this is determined by the recordings
+
+
+@dataclass(frozen=True)
+class HypothesisScore:
+    """What the recordings say about one hypothesis without a refit.
+
+    Attributes:
+        hypothesis: effect, owner, shapes.
+        score: s' S^-1 s.
+        estimate: of the sizes, shape (k,).
+        sigma: their standard deviations, shape (k,).
+        S, s: profiled Hessian and gradient of the sizes, shape (k, k) and (k,).
+    """
+
+    hypothesis: EffectHypothesis
+    score: float
+    estimate: Array
+    sigma: Array
+    S: Array
+    s: Array
+
+    @property
+    def dof(self) -> int:
+        """Number of plausible sizes that the recordings determine; gauges are held by their prior alone."""
+        prior = np.array([size.prior_sigma for size in self.hypothesis.sizes])
+        determined = self.sigma < DETERMINED * prior
+        return max(int(np.sum(determined[list(self.plausible[1])])), 1)
+
+    @cached_property
+    def plausible(self) -> tuple[float, tuple[int, ...]]:
+        """Largest score of sizes that all have a possible sign, and which those are; (0, ()) if there are none."""
+        signed = [i for i, size in enumerate(self.hypothesis.sizes) if size.sign == "+"]
+        count = len(self.estimate)
+        if all(self.estimate[i] > 0 for i in signed):
+            return self.score, tuple(range(count))
+        best: tuple[float, tuple[int, ...]] = (0.0, ())
+        for size in range(count - 1, 0, -1):
+            for kept in combinations(range(count), size):
+                estimate, value = _fit(self.S[np.ix_(kept, kept)], self.s[list(kept)])
+                if all(estimate[kept.index(i)] > 0 for i in signed if i in kept):
+                    best = max(best, (value, kept))
+        return best
+
+
+@dataclass(frozen=True)
+class JointScores:
+    """Trials scored together.
+
+    Attributes:
+        scores: one per hypothesis.
+        p_values: block-robust, shape (hypotheses,).
+        S: profiled Hessian of all sizes, shape (k, k).
+        s: profiled gradient, shape (k,).
+        columns: sizes of each hypothesis among the k.
+    """
+
+    scores: list[HypothesisScore]
+    p_values: Array
+    S: Array
+    s: Array
+    columns: list[slice]
+
+    def correlation(self, a: int, b: int) -> float:
+        """Largest correlation between what two hypotheses can explain, 0 to 1."""
+        S = self.S
+        A, B = self.columns[a], self.columns[b]
+        Q_a, Q_b = (np.linalg.pinv(_root(S[c, c])) for c in (A, B))
+        return float(np.linalg.svd(Q_a.T @ S[A, B] @ Q_b, compute_uv=False)[0])
+
+
+class ScoreTest:
+    """Scores for recordings that were solved with the base model.
+
+    Args:
+        segments: recordings or pieces of them, each with its own biases.
+    """
+
+    def __init__(self, segments: Sequence[Segment]):
+        self._segments = segments
+        self._shared = SharedLayout.of(segments[0].calibration, BagProblem.owners([s.problem for s in segments]))
+
+    def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
+        """Scores one by one, in batches."""
+        found: list[HypothesisScore] = []
+        for batch in _batches(hypotheses):
+            S, s, columns, _, _ = self._profiled(batch)
+            found += [_score(hypothesis, S[c, c], s[c]) for hypothesis, c in zip(batch, columns, strict=True)]
+        return found
+
+    def together(self, hypotheses: Sequence[EffectHypothesis]) -> JointScores:
+        """Scores with confusions and robust p-values."""
+        S, s, columns, _, (blocks, information) = self._profiled(hypotheses, with_blocks=True)
+        scores = [_score(hypothesis, S[c, c], s[c]) for hypothesis, c in zip(hypotheses, columns, strict=True)]
+        p = [_robust_p(score, blocks[:, c], own) for score, c, own in zip(scores, columns, information, strict=True)]
+        return JointScores(scores, np.array(p), S, s, columns)
+
+    def step(self, hypothesis: EffectHypothesis) -> tuple[Array, Array, Array]:
+        """One linear step with a hypothesis: sizes, sigmas, and the response of the shared values, shape (shared, k).
+
+        The sigmas are those from blocks where these scatter more.
+        """
+        S, s, _, response, (blocks, information) = self._profiled([hypothesis], with_blocks=True)
+        score = _score(hypothesis, S, s)
+        at_estimate = blocks + information[0] @ score.estimate
+        count = max(len(at_estimate), 2)
+        inverse = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
+        robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
+        return score.estimate, np.maximum(score.sigma, np.sqrt(np.diag(robust))), response
+
+    def placebo(self, columns: Sequence[Array]) -> Array:
+        """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""
+        k = columns[0].shape[2]
+        parts = [
+            rows_of(segment, [Column(at_ticks=c[:, :, i]) for i in range(k)])
+            for segment, c in zip(self._segments, columns, strict=True)
+        ]
+        H, g = self._assembled(parts, k)[:2]
+        S, s, _ = self._profile(H, g, k)
+        seen = np.diag(S)
+        # a regressor of zeros, as the load of a rigid joint that carries no weight, explains nothing
+        return np.divide(s**2, seen, out=np.zeros(k), where=seen > 0.0)
+
+    def _profiled(
+        self, hypotheses: Sequence[EffectHypothesis], with_blocks: bool = False
+    ) -> tuple[Array, Array, list[slice], Array, tuple[Array, list[Array]]]:
+        parts, columns, k = [], [], 0
+        for hypothesis in hypotheses:
+            columns.append(slice(k, k + len(hypothesis.sizes)))
+            k += len(hypothesis.sizes)
+        for segment in self._segments:
+            regressors = [column for hypothesis in hypotheses for column in columns_of(hypothesis, segment.signals)]
+            parts.append(rows_of(segment, regressors))
+        H, g, W = self._assembled(parts, k)
+        S, s, response = self._profile(H, g, k)
+        S = S + np.diag([1.0 / size.prior_sigma**2 for hypothesis in hypotheses for size in hypothesis.sizes])
+        blocks = self._blocks(parts, W, response, columns) if with_blocks else (np.zeros((0, k)), [])
+        return S, s, columns, response, blocks
+
+    def _assembled(self, parts: Sequence[Sequence[ScoreRows]], k: int) -> tuple[Array, Array, list[Array]]:
+        """Hessian and gradient on all shared values and the hypotheses, over all segments, with priors."""
+        size, shared = self._shared.size, self._shared
+        H, g, Ws = np.zeros((size + k, size + k)), np.zeros(size + k), []
+        for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
+            system = trial_system(segment, rows, k)
+            index = np.concatenate([shared.indices(i), size + np.arange(k)])
+            H[np.ix_(index, index)] += system.H
+            g[index] += system.g
+            Ws.append(system.W)
+        calibration = self._segments[0].calibration
+        for prior in shared_priors(self._segments[0].problem.robot):
+            linear = prior.linearize((), calibration)
+            for block, J in linear.by_block.items():
+                c, J_white = shared.columns[block], J[0] / prior.sigmas[:, None]
+                H[c, c] += J_white.T @ J_white
+                g[c] += J_white.T @ (linear.residual[0] / prior.sigmas)
+        return H, g, Ws
+
+    def _profile(self, H: Array, g: Array, k: int) -> tuple[Array, Array, Array]:
+        """S and s of the hypotheses, and the response of the shared values to each size, shape (shared, k)."""
+        n = len(g) - k
+        factor = cho_factor(H[:n, :n])
+        response = -cho_solve(factor, H[:n, n:])
+        S = H[n:, n:] + H[n:, :n] @ response
+        return 0.5 * (S + S.T), g[n:] + response.T @ g[:n], response
+
+    def _blocks(
+        self,
+        parts: Sequence[Sequence[ScoreRows]],
+        Ws: Sequence[Array],
+        response: Array,
+        columns: Sequence[slice],
+    ) -> tuple[Array, list[Array]]:
+        """Scores, shape (blocks, k), and information of every hypothesis, shape (blocks, k_own, k_own)."""
+        k = response.shape[1]
+        scores = list[Array]()
+        information: list[list[Array]] = [[] for _ in columns]
+        for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
+            base, dp = segment.elimination, response[self._shared.indices(i)]
+            dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
+            ticks = segment.problem.timeline.ticks
+            block = ((ticks - ticks[0]) / BLOCK).astype(int)
+            count, blocks = int(block[-1]) + 1, self._shared.columns
+            total = np.zeros((count, k))
+            own = [np.zeros((count, c.stop - c.start, c.stop - c.start)) for c in columns]
+            for part in rows:
+                # residuals change with states and base parameters following along
+                moved = part.by_size + sum(J @ dp[blocks[b]] for b, J in part.by_block.items())
+                for j, J in enumerate(part.by_state):
+                    moved = moved + J @ dx[part.ticks + j]
+                sums = _sums_by(block[part.ticks])
+                sums(total, (part.residual[:, None] @ moved)[:, 0])
+                for c, target in zip(columns, own, strict=True):
+                    chosen = moved[:, :, c]
+                    sums(target, chosen.transpose(0, 2, 1) @ chosen)
+            scores.append(total)
+            for found, values in zip(information, own, strict=True):
+                found.append(values)
+        return np.vstack(scores), [np.vstack(values) for values in information]
+
+
+def _sums_by(block: NDArray[np.intp]) -> Callable[[Array, Array], None]:
+    """Adds samples to their blocks; samples are in the order of time."""
+    first = np.flatnonzero(np.diff(block, prepend=block[0] - 1))
+
+    def add(target: Array, values: Array) -> None:
+        target[block[first]] += np.add.reduceat(values, first, axis=0)
+
+    return add
+
+
+def _fit(S: Array, s: Array) -> tuple[Array, float]:
+    """Estimate and score of some sizes."""
+    estimate = -np.linalg.pinv(S, rcond=1e-12, hermitian=True) @ s
+    return estimate, float(-estimate @ s)
+
+
+def _score(hypothesis: EffectHypothesis, S: Array, s: Array) -> HypothesisScore:
+    covariance = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
+    estimate = -covariance @ s
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return HypothesisScore(hypothesis, float(s @ covariance @ s), estimate, sigma, S, s)
+
+
+def _robust_p(score: HypothesisScore, scores: Array, information: Array) -> float:
+    """P-value of the one-step estimate against the spread of what half-second blocks say about it.
+
+    A block's score at the estimate is its score at null plus information times estimate; where the effect is real
+    these scatter about zero however unevenly the evidence is spread over time. Hotelling's T^2 with as many degrees of
+    freedom as there are blocks that carry information. Only sizes with a possible sign count, 1 where there are none;
+    half where there is one size whose sign is known. NaN where too few blocks carry information.
+    """
+    kept = list(score.plausible[1])
+    if not kept:
+        return 1.0
+    estimate, _ = _fit(score.S[np.ix_(kept, kept)], score.s[kept])
+    scores, information = scores[:, kept], information[:, kept][:, :, kept]
+    k, total = score.dof, information.sum(axis=0)
+    weight = np.einsum("bii->b", information)
+    b = float(weight.sum() ** 2 / np.sum(weight**2)) if np.any(weight) else 0.0
+    if b <= k + 1.5:
+        return float("nan")
+    at_estimate = scores + information @ estimate
+    spread = at_estimate.T @ at_estimate * b / (b - 1.0)
+    pull = total @ estimate
+    statistic = max(float(pull @ np.linalg.pinv(spread, rcond=1e-10, hermitian=True) @ pull), 0.0)
+    p = float(fdtrc(k, b - k, statistic * (b - k) / (k * (b - 1.0))))
+    return 0.5 * p if len(kept) == 1 and score.hypothesis.sizes[kept[0]].sign == "+" else p
+
+
+def _batches(hypotheses: Sequence[EffectHypothesis]) -> list[list[EffectHypothesis]]:
+    batches: list[list[EffectHypothesis]] = [[]]
+    for hypothesis in hypotheses:
+        if batches[-1] and sum(len(t.sizes) for t in batches[-1]) + len(hypothesis.sizes) > BATCH:
+            batches.append([])
+        batches[-1].append(hypothesis)
+    return batches
+
+
+def _root(S: Array) -> Array:
+    """Symmetric square root."""
+    values, vectors = np.linalg.eigh(S)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Eliminates all states of a recording at once: banded Cholesky factorisation by LAPACK.
+
+A chain of states of size d has a Hessian of bandwidth 2d - 1. With A = L L' the shared values see the Schur complement
+
+    S = C - W' W,   W = L^-1 B,   s = g_p - W' w,   w = L^-1 g_x
+
+and the states follow as dx = -L^-T (w + W dp). The cost is linear in the number of ticks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.robots.errors import SolveError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """The factorised chain of one recording.
+
+    Attributes:
+        L: banded Cholesky factor as LAPACK stores it, shape (2d, m d).
+        W: L^-1 B, shape (m d, p).
+        w: L^-1 g_x, shape (m d,).
+        S: Hessian on the shared values after elimination, shape (p, p).
+        s: gradient on the shared values after elimination, shape (p,).
+        d: size of a state.
+    """
+
+    L: Array
+    W: Array
+    w: Array
+    S: Array
+    s: Array
+    d: int
+
+    def states(self, dp: Array) -> Array:
+        """Change of all states for a change dp of the shared values, shape (m, d)."""
+        return self.solve_transposed(-(self.w + self.W @ dp)[:, None])[:, 0].reshape(-1, self.d)
+
+    def blocks(self) -> tuple[Array, Array]:
+        """Blocks of L on and below the diagonal, shape (m, d, d) and (m - 1, d, d)."""
+        columns = self.L.T.reshape(-1, self.d, 2 * self.d)
+        m, d = len(columns), self.d
+        diagonal, below = np.zeros((m, d, d)), np.zeros((m - 1, d, d))
+        for b in range(d):
+            diagonal[:, b:, b] = columns[:, b, : d - b]
+            below[:, :, b] = columns[:-1, b, d - b : 2 * d - b]
+        return diagonal, below
+
+    def solve_transposed(self, right: Array) -> Array:
+        """L^-T times a matrix of shape (m d, k)."""
+        if right.shape[1] == 0:
+            return right
+        x, info = lapack.dtbtrs(self.L, right, uplo="L", trans="T")
+        _check(info)
+        return x
+
+
+def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick: int = 0) -> Elimination:
+    """Factorises the chain and forms the Schur complement.
+
+    Args:
+        system: normal equations.
+        damping: Levenberg-Marquardt lambda, relative to the diagonal; of all ticks, or of each, shape (m,).
+        first_tick: tick of the first state, for messages.
+
+    Raises:
+        SolveError: a state is not determined.
+    """
+    m, d, p = system.B.shape
+    L, info = lapack.dpbtrf(_banded(system, damping), lower=1, overwrite_ab=1)
+    if info > 0:
+        tick, component = divmod(info - 1, d)
+        raise SolveError(
+            f"the state at tick {first_tick + tick} (component {component} of {d}) is not determined by the recording: "
+            "its Hessian is not positive definite; either no sample sees it, or the estimate ran away because "
+            "the model contradicts the recording (a wrong sign, axis or unit, a sensor that stopped)"
+        )
+    _check(info)
+    right = np.empty((m * d, p + 1), order="F")
+    right[:, :p] = system.B.reshape(m * d, p)
+    right[:, p] = system.g_x.ravel()
+    Ww, info = lapack.dtbtrs(L, right, uplo="L", overwrite_b=1)
+    _check(info)
+    W, w = Ww[:, :p], Ww[:, p]
+    return Elimination(L, W, w, system.C - W.T @ W, system.g_p - W.T @ w, d)
+
+
+def _banded(system: NormalEquations, damping: float | Array) -> Array:
+    """Lower band of A, column by column, shape (2d, m d)."""
+    m, d = system.g_x.shape
+    columns = np.zeros((m, d, 2 * d))
+    for b in range(d):
+        columns[:, b, : d - b] = system.D[:, b:, b]
+        columns[:-1, b, d - b : 2 * d - b] = system.E[:, :, b]
+    if np.any(damping):
+        columns[:, :, 0] *= 1.0 + np.reshape(damping, (-1, 1))
+    return columns.reshape(m * d, 2 * d).T
+
+
+def _check(info: int) -> None:
+    if info != 0:
+        raise SolveError(f"the banded factorisation failed (LAPACK info {info}); are there NaN or infinite values?")

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Levenberg-Marquardt over the condensed GTSAM graph of all recordings.
+
+It minimises the same cost as the GTSAM graph of reference_graph.py, which has a factor for every sample; a test shows
+that both end in the same point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.priors import shared_priors
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.condensed_graph import CondensedGraph
+from jointscope.graphs.solving.convergence import (
+    Iteration,
+    has_converged,
+    is_crawling,
+    is_flat,
+    measured_rows,
+    short_step,
+)
+from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import NormalEquations, build, cost
+from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.state_damping import StateDamping
+from jointscope.graphs.solving.unobservable import unobservable
+from jointscope.robots.errors import SolveError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+LAMBDA_START = 1e-9
+LAMBDA_FACTOR = 30.0
+STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
+
+
+@dataclass
+class Solution:
+    """Result of a batch solve.
+
+    Attributes:
+        estimate: the minimum.
+        cost: half the sum of squared whitened residuals.
+        shared: layout of the shared values.
+        systems: normal equations of each recording at the estimate.
+        iterations: history.
+        converged: False if the iterations ended before the step became small.
+        flat: the iterations ended because a model that contradicts its recording gained nothing any more.
+    """
+
+    estimate: Estimate
+    cost: float
+    shared: SharedLayout
+    systems: list[NormalEquations]
+    iterations: list[Iteration] = field(default_factory=list)
+    converged: bool = False
+    flat: bool = False
+
+
+def solve(
+    problems: Sequence[BagProblem],
+    start: Estimate,
+    *,
+    max_iterations: int = 30,
+    step_tolerance: float = STEP_TOLERANCE,
+    hold: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Solution:
+    """Minimises the cost of all recordings together.
+
+    Args:
+        problems: factors of each recording, all of one robot.
+        start: where to begin.
+        max_iterations: linearizations at the most; the solution says whether it converged.
+        step_tolerance: largest step of a shared value, in its sigmas times the misfit, at which it has converged.
+        hold: blocks that stay at their start, for example "dynamics".
+        progress: called with a text and the share done.
+
+    Raises:
+        SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
+    """
+    graph, values = CondensedGraph.of(problems, start, hold)
+    cost, bends = graph.cost(values), StateDamping.of([problem.timeline.ticks for problem in problems])
+    descent = _Descent(graph, values, cost, graph.costs, bends)
+    if not np.isfinite(descent.cost):
+        raise SolveError("the cost at the start is not finite; check start values and recording")
+    descent.run(max_iterations, step_tolerance, measured_rows(problems), progress)
+    graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
+    estimate = graph.estimate(descent.values)
+    return Solution(
+        estimate,
+        descent.cost,
+        graph.shared,
+        graph.systems(estimate),
+        descent.iterations,
+        descent.converged,
+        descent.flat,
+    )
+
+
+@dataclass
+class _Descent:
+    """The iterations of one solve; attributes as in `Solution`, `costs` by tick and the damping that they ask for."""
+
+    graph: CondensedGraph
+    values: gtsam.Values
+    cost: float
+    costs: list[Array]
+    bends: StateDamping
+    iterations: list[Iteration] = field(default_factory=list)
+    converged: bool = False
+    flat: bool = False
+
+    def run(self, most: int, tolerance: float, measured: int, progress: Progress | None) -> None:
+        """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
+        damping = LAMBDA_START
+        for i in range(most):
+            if progress:
+                progress(f"iteration {i + 1}, cost {self.cost:.6g}", i / most)
+            accepted = self._lowered(damping, tolerance, measured)
+            if accepted is None:
+                return
+            self.converged = has_converged(self.iterations, tolerance, measured, accepted <= LAMBDA_START)
+            self.flat = not self.converged and is_flat(self.iterations, measured)
+            if self.converged or self.flat:
+                return
+            damping = max(accepted / LAMBDA_FACTOR, 1e-12)
+            self.bends.relaxed()
+        self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
+
+    def _lowered(self, damping: float, tolerance: float, measured: int) -> float | None:
+        """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
+        while True:
+            step = damped_step(self.graph, self.values, damping, self.bends.values)
+            cost, costs = self.graph.cost(step.values), self.graph.costs
+            if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
+                self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
+                self.values, self.cost, self.costs = step.values, cost, costs
+                return damping
+            if self.bends.raised(self.costs, costs):
+                continue
+            if 0.0 < step.in_sigmas < short_step(self.cost, tolerance, measured) and damping <= LAMBDA_START:
+                # there already: only states at a kink of the friction keep the cost from falling
+                self.converged = True
+                return None
+            damping *= LAMBDA_FACTOR
+            if damping > LARGEST:
+                self._end_stuck(step.in_sigmas, tolerance)
+                return None
+
+    def _end_stuck(self, in_sigmas: float, tolerance: float) -> None:
+        """No damping lowers the cost: a minimum within rounding, or an error."""
+        if in_sigmas >= max(tolerance, 0.1):
+            raise SolveError(
+                f"the cost {self.cost:.6g} cannot be lowered any further although the next step is "
+                f"{in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
+            )
+        self.converged = True
+
+
+@dataclass(frozen=True)
+class NewtonStep:
+    """A Gauss-Newton step.
+
+    Attributes:
+        estimate: where it leads.
+        in_sigmas: largest change of a shared value in sigmas.
+        dx: change of the states of each recording.
+        dp: change of the shared values, shape (s,).
+    """
+
+    estimate: Estimate
+    in_sigmas: float
+    dx: list[Array]
+    dp: Array
+
+
+def newton_step(
+    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
+) -> NewtonStep:
+    """One step from the solution's normal equations, not checked against the cost.
+
+    Args:
+        problems: factors of each recording.
+        solution: estimate with its normal equations.
+        hold: blocks that stay.
+        damping: Levenberg-Marquardt lambda, relative to the diagonal.
+    """
+    shared = solution.shared
+    free = free_indices(shared, hold)
+    eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
+    H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    try:
+        dp, in_sigmas = _solve_shared(H, g, free, damping)
+    except np.linalg.LinAlgError as err:
+        raise unobservable(H, free, shared, solution.estimate.calibrations[0]) from err
+    dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
+    return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
+
+
+def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
+    """Where one hardly damped step leads; for starts from which every step is an improvement."""
+    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
+    here = Solution(estimate, float("nan"), shared, _build(problems, estimate))
+    return newton_step(problems, here, hold, LAMBDA_START).estimate
+
+
+def _build(problems: Sequence[BagProblem], estimate: Estimate) -> list[NormalEquations]:
+    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
+    return [build(problem, x, calibration) for problem, x, calibration in bags]
+
+
+def _prior_cost(problem: BagProblem, calibration: Calibration) -> float:
+    residuals = [prior.residual((), calibration) / prior.sigmas for prior in shared_priors(problem.robot)]
+    return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
+
+
+def total_cost(problems: Sequence[BagProblem], estimate: Estimate) -> float:
+    """Cost of all recordings and of the priors they share."""
+    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
+    total = sum(cost(problem, x, calibration) for problem, x, calibration in bags)
+    return total + _prior_cost(problems[0], estimate.calibrations[0])
+
+
+def reduced_system(
+    problem: BagProblem,
+    systems: Sequence[NormalEquations],
+    eliminations: Sequence[Elimination],
+    shared: SharedLayout,
+    calibration: Calibration,
+) -> tuple[Array, Array]:
+    """Hessian and gradient on the shared values of all recordings, states eliminated, priors added."""
+    H, g = np.zeros((shared.size, shared.size)), np.zeros(shared.size)
+    for bag, elimination in enumerate(eliminations):
+        index = shared.indices(bag)
+        H[np.ix_(index, index)] += elimination.S
+        g[index] += elimination.s
+    for prior in shared_priors(problem.robot):
+        linear = prior.linearize((), calibration)
+        for block, J in linear.by_block.items():
+            columns = shared.columns[block]
+            J = J[0] / prior.sigmas[:, None]
+            H[columns, columns] += J.T @ J
+            g[columns] += J.T @ (linear.residual[0] / prior.sigmas)
+    return H, g
+
+
+def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
+    """Indices of the shared values that may change."""
+    held = np.zeros(shared.size, dtype=bool)
+    for bag in range(len(shared.owners)):
+        for block in hold:
+            held[shared.indices(bag)[shared.columns[block]]] = True
+    return np.flatnonzero(~held)
+
+
+def _solve_shared(H: Array, g: Array, free: NDArray[np.intp], damping: float) -> tuple[Array, float]:
+    """Damped step of the shared values, and the largest undamped one in sigmas."""
+    dp = np.zeros(len(g))
+    if len(free) == 0:
+        return dp, 0.0
+    block = H[np.ix_(free, free)]
+    if not (np.all(np.isfinite(block)) and np.all(np.isfinite(g))):
+        raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
+    factor = cho_factor(block + damping * np.diag(np.diag(block)))
+    dp[free] = -cho_solve(factor, g[free])
+    # Newton decrement per value: step over its conditional-free sigma
+    sigma = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(free)))), 0.0))
+    return dp, float(np.max(np.abs(dp[free]) / sigma))

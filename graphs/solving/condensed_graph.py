@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All recordings as one `gtsam.NonlinearFactorGraph` with its `gtsam.Values`.
+
+    X(0) ==== X(a) ==== X(b) ==== ...      ====  a condensed factor: hundreds of samples
+       |       |  |       |
+       +--- D, R(imu1), B(imu1), ... ---- P
+
+Every condensed factor touches the shared blocks, too; P are priors and biases, a factor each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.condensed import CondensedFactor
+from jointscope.factors.custom_factor import (
+    block_key,
+    extract_calibration,
+    insert_calibration,
+    stacked_factor,
+    state_key,
+)
+from jointscope.factors.factor import Factor
+from jointscope.factors.priors import shared_priors
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import NormalEquations, build
+from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.stretch import RecordingStretch, cut
+
+Array = NDArray[np.float64]
+
+STRETCH = 1000  # steps: as many as are linearised at once
+MOST_STRETCHES = 100  # GTSAM copies all values for every callback: time grows with the square of their number
+
+
+@dataclass(frozen=True)
+class CondensedGraph:
+    """The graph of some recordings.
+
+    Attributes:
+        problems: the recordings, or pieces of them.
+        graph: condensed factors, and one factor for each prior and bias.
+        stretches: of each piece, in the order of time.
+        blocks: names of the blocks that may change.
+        shared: where the shared values stand in one vector.
+        likes: calibration of each piece, for the blocks that are held.
+        held_cost: cost of priors whose block is held.
+    """
+
+    problems: tuple[BagProblem, ...]
+    graph: gtsam.NonlinearFactorGraph
+    stretches: tuple[tuple[RecordingStretch, ...], ...]
+    blocks: tuple[str, ...]
+    shared: SharedLayout
+    likes: tuple[Calibration, ...]
+    held_cost: float
+
+    @staticmethod
+    def of(
+        problems: Sequence[BagProblem], start: Estimate, hold: Sequence[str] = (), length: int = 0
+    ) -> tuple[CondensedGraph, gtsam.Values]:
+        """The graph, and the values of an estimate.
+
+        Args:
+            problems: factors of each recording, all of one robot.
+            start: where it is linearised first.
+            hold: blocks that stay as they are; they are no variables of the graph.
+            length: steps in one stretch; chosen by the number of samples if 0.
+        """
+        owners = BagProblem.owners(problems)
+        length = length or max(STRETCH, sum(len(p.dynamics) for p in problems) // MOST_STRETCHES)
+        like = start.calibrations[0]
+        # nothing is no variable: a robot may have no free parameter
+        blocks = tuple(block for block in like.blocks if block not in hold and like.block_size(block))
+        values = _shared_values(start, owners, blocks)
+        likes = tuple(
+            extract_calibration(values, calibration, blocks, owner)
+            for calibration, owner in zip(start.calibrations, owners, strict=True)
+        )
+        graph, stretches = gtsam.NonlinearFactorGraph(), []
+        for piece, (problem, x, like) in enumerate(zip(problems, start.states, likes, strict=True)):
+            cuts = tuple(cut(problem, x, like, length, blocks))
+            for stretch in cuts:
+                graph.add(CondensedFactor(stretch, piece, owners[piece], blocks, like).factor())
+            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts)):
+                values.insert(state_key(tick, piece), x[tick])
+            stretches.append(cuts)
+        held = _add_rows_without_states(graph, problems, owners, likes, blocks)
+        shared = SharedLayout.of(start.calibrations[0], owners)
+        return CondensedGraph(tuple(problems), graph, tuple(stretches), blocks, shared, likes, held), values
+
+    def cost(self, values: gtsam.Values) -> float:
+        """Half the sum of squared whitened residuals, priors of held blocks included."""
+        return float(self.graph.error(values)) + self.held_cost
+
+    @property
+    def costs(self) -> list[Array]:
+        """Cost of each tick of each piece where it was evaluated last, shape (m,)."""
+        return [_overlapped([stretch.system.costs for stretch in cuts]) for cuts in self.stretches]
+
+    def linearized(
+        self, values: gtsam.Values, damping: float = 0.0, bends: Sequence[Array] = ()
+    ) -> gtsam.GaussianFactorGraph:
+        """The Gaussian graph at some values.
+
+        Args:
+            values: where it is linearised.
+            damping: of all states, relative to the diagonal of their Hessian.
+            bends: larger ones for some states of each piece, shape (m,).
+        """
+        for piece, cuts in enumerate(self.stretches):
+            for stretch in cuts:
+                first, last = stretch.ticks
+                own = bends[piece][first : last + 1] if len(bends) else np.zeros(last + 1 - first)
+                stretch.damping = np.maximum(own, damping)
+        return self.graph.linearize(values)
+
+    @property
+    def states_ordering(self) -> gtsam.Ordering:
+        """The states between stretches, piece after piece."""
+        ordering = gtsam.Ordering()
+        for piece, cuts in enumerate(self.stretches):
+            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts)):
+                ordering.push_back(state_key(tick, piece))
+        return ordering
+
+    @property
+    def shared_ordering(self) -> gtsam.Ordering:
+        """All shared blocks that may change."""
+        ordering = gtsam.Ordering()
+        for key, _ in self.shared_keys:
+            ordering.push_back(key)
+        return ordering
+
+    @property
+    def shared_keys(self) -> list[tuple[int, NDArray[np.intp]]]:
+        """Keys of all shared blocks that may change, with their places in the vector of all shared values."""
+        found: dict[int, NDArray[np.intp]] = {}
+        for piece, owner in enumerate(self.shared.owners):
+            index = self.shared.indices(piece)
+            for block in self.blocks:
+                found[block_key(block, self.likes[piece], owner)] = index[self.shared.columns[block]]
+        return list(found.items())
+
+    def estimate(self, values: gtsam.Values) -> Estimate:
+        """All states and shared values where the graph was evaluated last, which must be at these values."""
+        calibrations = tuple(
+            extract_calibration(values, like, self.blocks, owner)
+            for like, owner in zip(self.likes, self.shared.owners, strict=True)
+        )
+        states = tuple(
+            np.vstack([cuts[0].states, *(stretch.states[1:] for stretch in cuts[1:])]) for cuts in self.stretches
+        )
+        return Estimate(states, calibrations)
+
+    def systems(self, estimate: Estimate) -> list[NormalEquations]:
+        """Normal equations of each piece where it was evaluated last, the states between stretches included."""
+        found = []
+        for problem, cuts, x, calibration in zip(
+            self.problems, self.stretches, estimate.states, estimate.calibrations, strict=True
+        ):
+            alone = replace(problem, placed=tuple(p for p in problem.placed if p.factor.states == 0))
+            system = _joined([stretch.system for stretch in cuts])
+            _add_shared(system, alone, x[:2], calibration)
+            found.append(system)
+        return found
+
+
+def _shared_values(start: Estimate, owners: Sequence[int], blocks: Sequence[str]) -> gtsam.Values:
+    """Values of all blocks that may change."""
+    everything, values = gtsam.Values(), gtsam.Values()
+    for piece, owner in enumerate(owners):
+        if owner not in owners[:piece]:
+            insert_calibration(everything, start.calibrations[piece], owner)
+        for block in blocks:
+            key = block_key(block, start.calibrations[piece], owner)
+            if values.exists(key):
+                continue
+            if block.endswith(".rotation"):
+                values.insert(key, everything.atRot3(key))
+            else:
+                values.insert(key, everything.atVector(key))
+    return values
+
+
+def _add_rows_without_states(
+    graph: gtsam.NonlinearFactorGraph,
+    problems: Sequence[BagProblem],
+    owners: Sequence[int],
+    likes: Sequence[Calibration],
+    blocks: Sequence[str],
+) -> float:
+    """Adds priors and what else touches no state; returns the cost of those whose block is held."""
+    alone: list[tuple[Factor, int]] = [(prior, 0) for prior in shared_priors(problems[0].robot)]
+    for piece, problem in enumerate(problems):
+        alone += [(placed.factor, piece) for placed in problem.placed if placed.factor.states == 0]
+    held = 0.0
+    for factor, piece in alone:
+        if set(factor.blocks) <= set(blocks):
+            graph.add(stacked_factor(factor, likes[piece], owners[piece]))
+        else:
+            residual = factor.residual((), likes[piece]) / factor.sigmas
+            held += 0.5 * float(np.sum(residual**2))
+    return held
+
+
+def _joined(parts: Sequence[NormalEquations]) -> NormalEquations:
+    """Systems of stretches side by side as one chain."""
+    if len(parts) == 1:
+        return replace(parts[0], C=parts[0].C.copy(), g_p=parts[0].g_p.copy())
+    D, B, g, costs = (_overlapped([getattr(part, name) for part in parts]) for name in ("D", "B", "g_x", "costs"))
+    E = np.concatenate([part.E for part in parts])
+    C, g_p = sum(part.C for part in parts), sum(part.g_p for part in parts)
+    return NormalEquations(D, E, B, np.asarray(C), g, np.asarray(g_p), sum(part.cost for part in parts), costs)
+
+
+def _overlapped(parts: Sequence[Array]) -> Array:
+    """Arrays one after the other; the last entry of each is the first one of the next."""
+    joined = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+    place = 0
+    for before, after in pairwise(parts):
+        place += len(before) - 1
+        joined[place] = before[-1] + after[0]
+    return joined
+
+
+def _add_shared(system: NormalEquations, alone: BagProblem, x: Array, calibration: Calibration) -> None:
+    """Adds the factors of a piece that touch no state."""
+    none = replace(alone, dynamics=alone.dynamics.select(slice(0, 0)))
+    rest = build(none, x, calibration)
+    system.C += rest.C
+    system.g_p += rest.g_p
+    system.cost += rest.cost

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When the iterations of a batch solve may end.
+
+Steps are measured in standard deviations that hold if the residuals have their stated size. Under a model that
+contradicts the recording they are larger by a factor, the misfit, and so is the true uncertainty: steps shorter than a
+part of that say nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from jointscope.graphs.problem.bag_problem import BagProblem
+
+SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
+SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
+COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
+CONTRADICTS = 2.0  # [sigma] root mean square residual from which a model contradicts its recording
+FLAT, FLAT_STEPS = 1e-5, 3  # relative fall of such a model's cost, so many times in a row, that ends the search
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """What happened in one iteration: cost before and after, damping, largest step in sigmas."""
+
+    cost_before: float
+    cost_after: float
+    damping: float
+    step_in_sigmas: float
+
+    @property
+    def fall(self) -> float:
+        """Relative fall of the cost."""
+        return (self.cost_before - self.cost_after) / max(self.cost_before, 1e-300)
+
+
+def measured_rows(problems: Sequence[BagProblem]) -> int:
+    """Number of measured values in all recordings."""
+    return sum(len(p.factor) * len(p.factor.rows) for problem in problems for p in problem.sensors)
+
+
+def misfit(cost: float, measured: int) -> float:
+    """Root mean square residual in sigmas, at least 1."""
+    return float(max(2.0 * cost / max(measured, 1), 1.0) ** 0.5)
+
+
+def short_step(cost: float, tolerance: float, measured: int) -> float:
+    """Length [sigma] below which a step says nothing, where the tolerance holds for residuals of the stated size."""
+    return tolerance * misfit(cost, measured)
+
+
+def has_converged(iterations: Sequence[Iteration], tolerance: float, measured: int, undamped: bool) -> bool:
+    """Whether the last step was short enough and the next ones will be shorter.
+
+    Args:
+        iterations: so far, at least one.
+        tolerance: step [sigma] that is short enough.
+        measured: number of measured values.
+        undamped: whether the last step was an undamped one.
+    """
+    last = iterations[-1]
+    enough = short_step(last.cost_after, tolerance, measured)
+    arrived = last.step_in_sigmas < enough and _remaining(iterations) < SLOW * enough
+    return (arrived and last.fall < SMALL_FALL) or (last.fall < COST_TOLERANCE and undamped)
+
+
+def is_flat(iterations: Sequence[Iteration], measured: int) -> bool:
+    """Whether a model that contradicts its recording gains nothing any more, although its values still move."""
+    last = iterations[-FLAT_STEPS:]
+    contradicts = misfit(last[-1].cost_after, measured) > CONTRADICTS
+    return contradicts and len(last) == FLAT_STEPS and all(i.fall < FLAT for i in last)
+
+
+def is_crawling(iterations: Sequence[Iteration], measured: int) -> bool:
+    """Whether such a model still gains, but so little that more iterations would not settle it."""
+    last = iterations[-1]
+    return misfit(last.cost_after, measured) > CONTRADICTS and last.fall < SMALL_FALL
+
+
+def _remaining(iterations: Sequence[Iteration]) -> float:
+    """How far the minimum may still be, in sigmas, if the steps go on shrinking as the last one did."""
+    last = iterations[-1].step_in_sigmas
+    if len(iterations) < 2:
+        return last
+    ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.97)
+    return last * ratio / (1.0 - ratio)

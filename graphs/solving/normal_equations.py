@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Gauss-Newton system of one recording, accumulated from factors in batches.
+
+States form a chain, so the Hessian is block tridiagonal with a border for the shared values:
+
+    [ A  B ] [dx]     [g_x]        A: D(k) on the diagonal, E(k) = d2/dX(k+1)dX(k) below it
+    [ B' C ] [dp] = - [g_p]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.factor import Factor, Linearization
+from jointscope.graphs.problem.bag_problem import BagProblem, Placed
+
+Array = NDArray[np.float64]
+
+Linearized = tuple[Factor, NDArray[np.intp], Linearization]
+"""Some samples of a factor, the first tick of each, and their linearization."""
+
+CHUNK = 1024  # samples linearised at once: large enough for numpy, small enough for the cache
+
+
+@dataclass
+class NormalEquations:
+    """Block tridiagonal Hessian with a border, and gradient.
+
+    Attributes:
+        D: diagonal blocks, shape (m, d, d).
+        E: blocks below the diagonal, shape (m - 1, d, d).
+        B: border, shape (m, d, p).
+        C: corner, shape (p, p).
+        g_x: gradient by the states, shape (m, d).
+        g_p: gradient by the shared values, shape (p,).
+        cost: half the sum of squared whitened residuals.
+        costs: the share of each tick in it, shape (m,).
+        D_next, g_next: the part of D and g_x that comes from factors reaching on to the next state; only where asked.
+    """
+
+    D: Array
+    E: Array
+    B: Array
+    C: Array
+    g_x: Array
+    g_p: Array
+    cost: float
+    costs: Array
+    D_next: Array | None = None
+    g_next: Array | None = None
+
+    @staticmethod
+    def zeros(m: int, d: int, p: int, split: bool = False) -> NormalEquations:
+        """An empty system for m states of size d and p shared values."""
+        parts = (np.zeros((m, d, d)), np.zeros((m, d))) if split else (None, None)
+        return NormalEquations(
+            np.zeros((m, d, d)),
+            np.zeros((m - 1, d, d)),
+            np.zeros((m, d, p)),
+            np.zeros((p, p)),
+            np.zeros((m, d)),
+            np.zeros(p),
+            0.0,
+            np.zeros(m),
+            *parts,
+        )
+
+
+def layout(calibration: Calibration) -> dict[str, slice]:
+    """Columns of each block among the shared values of one recording."""
+    start, columns = 0, {}
+    for block in calibration.blocks:
+        size = calibration.block_size(block)
+        columns[block] = slice(start, start + size)
+        start += size
+    return columns
+
+
+def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool = False) -> NormalEquations:
+    """Linearises all factors of a recording.
+
+    Args:
+        problem: the factors.
+        x: states, shape (m, 4n).
+        calibration: shared values, with the biases of this recording.
+        split: keep apart what reaches on to the next state, as a filter needs it.
+    """
+    return accumulate(linearize_all(problem, x, calibration), x, calibration, split)
+
+
+def accumulate(
+    linearized: Iterable[Linearized],
+    x: Array,
+    calibration: Calibration,
+    split: bool = False,
+    with_shared: bool = True,
+) -> NormalEquations:
+    """Sums linearised factors; arguments as in `build`.
+
+    Without shared values, which are known then, the linearizations must hold no derivatives by them.
+    """
+    columns = layout(calibration)
+    p = max(c.stop for c in columns.values()) if with_shared else 0
+    system = NormalEquations.zeros(len(x), x.shape[1], p, split)
+    for factor, ticks, linear in linearized:
+        _accumulate(system, factor, ticks, linear, columns)
+    return system
+
+
+def linearize_all(
+    problem: BagProblem, x: Array, calibration: Calibration, dynamics_only: bool = False
+) -> Iterator[Linearized]:
+    """All factors chunk by chunk: factor, first tick of each sample, linearization."""
+    m = len(problem.dynamics)
+    for start in range(0, m, CHUNK):
+        stop = min(start + CHUNK, m)
+        part = problem.dynamics.select(slice(start, stop))
+        yield part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
+    for placed in () if dynamics_only else problem.placed:
+        for factor, ticks in chunks(placed):
+            yield factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
+
+
+def cost(problem: BagProblem, x: Array, calibration: Calibration) -> float:
+    """Half the sum of squared whitened residuals."""
+    total = float(np.sum((problem.dynamics.residual((x[:-1], x[1:]), calibration) / problem.dynamics.sigmas) ** 2))
+    for placed in problem.placed:
+        residual = placed.factor.residual(states_of(placed.factor, placed.ticks, x), calibration)
+        total += float(np.sum((residual / placed.factor.sigmas) ** 2))
+    return 0.5 * total
+
+
+def chunks(placed: Placed) -> Iterable[tuple[Factor, NDArray[np.intp]]]:
+    """A placed factor in pieces."""
+    for start in range(0, len(placed.factor), CHUNK):
+        part = slice(start, start + CHUNK)
+        yield placed.factor.select(part), placed.ticks[part]
+
+
+def states_of(factor: Factor, ticks: NDArray[np.intp], x: Array) -> tuple[Array, ...]:
+    """The states that each sample touches."""
+    return tuple(x[ticks + i] for i in range(factor.states))
+
+
+def whitened(factor: Factor, linear: Linearization) -> tuple[Array, tuple[Array, ...], dict[str, Array]]:
+    """Residual and Jacobians divided by the sigmas."""
+    weight = 1.0 / np.broadcast_to(factor.sigmas, linear.residual.shape)
+    column = weight[:, :, None]
+    by_block = {block: J * column for block, J in linear.by_block.items()}
+    return linear.residual * weight, tuple(J * column for J in linear.by_state), by_block
+
+
+def _accumulate(
+    system: NormalEquations,
+    factor: Factor,
+    ticks: NDArray[np.intp],
+    linear: Linearization,
+    columns: dict[str, slice],
+) -> None:
+    r, J, by_block = whitened(factor, linear)
+    squares = 0.5 * np.einsum("kr,kr->k", r, r)
+    system.cost += float(np.sum(squares))
+    if J:
+        add_at(system.costs, ticks, squares)
+    _accumulate_shared(system, r, by_block, columns)
+    for i, J_i in enumerate(J):
+        transposed = J_i.transpose(0, 2, 1)
+        square, gradient = transposed @ J_i, (transposed @ r[:, :, None])[:, :, 0]
+        add_at(system.D, ticks + i, square)
+        add_at(system.g_x, ticks + i, gradient)
+        if len(J) == 2 and i == 0 and system.D_next is not None and system.g_next is not None:
+            add_at(system.D_next, ticks, square)
+            add_at(system.g_next, ticks, gradient)
+        for block, P in by_block.items():
+            add_at(system.B[:, :, columns[block]], ticks + i, transposed @ P)
+    if len(J) == 2:
+        add_at(system.E, ticks, J[1].transpose(0, 2, 1) @ J[0])
+
+
+def _accumulate_shared(
+    system: NormalEquations, r: Array, by_block: dict[str, Array], columns: dict[str, slice]
+) -> None:
+    """Corner and gradient of the shared values."""
+    flat = {block: P.reshape(P.shape[0] * P.shape[1], P.shape[2]) for block, P in by_block.items()}
+    for a, P_a in flat.items():
+        system.g_p[columns[a]] += P_a.T @ r.ravel()
+        for b, P_b in flat.items():
+            system.C[columns[a], columns[b]] += P_a.T @ P_b
+
+
+def add_at(target: Array, index: NDArray[np.intp], values: Array) -> None:
+    """Adds values to target[index] where an index may repeat; the indices are sorted."""
+    if len(index) == 0:
+        return
+    first = np.flatnonzero(np.diff(index, prepend=index[0] - 1))
+    if len(first) == len(index):
+        if index[-1] - index[0] == len(index) - 1:
+            target[index[0] : index[-1] + 1] += values
+        else:
+            target[index] += values
+    else:
+        target[index[first]] += np.add.reduceat(values, first, axis=0)

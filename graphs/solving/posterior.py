@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Uncertainty of states and shared values after a batch solve.
+
+With A = L L' the blocks of A^-1 that lie on and beside the diagonal follow from the last state backwards
+(Rauch-Tung-Striebel in information form):
+
+    P(k, k)   = N(k) + C(k)' P(k+1, k+1) C(k),    P(k, k+1) = -C(k)' P(k+1, k+1)
+    C(k)      = L(k+1, k) L(k, k)^-1,             N(k) = L(k, k)^-T L(k, k)^-1
+
+The shared values widen them: x moves by -X dp for a change dp, X = A^-1 B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from jointscope.factors.calibration import Calibration
+from jointscope.factors.factor import Factor
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
+from jointscope.graphs.solving.normal_equations import Linearized, layout, whitened
+from jointscope.graphs.solving.unobservable import unobservable
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StatePosterior:
+    """Covariance of one recording's states.
+
+    Attributes:
+        given_shared: covariance of each state for known shared values, shape (m, d, d).
+        neighbours: covariance of X(k) with X(k+1) for known shared values, shape (m - 1, d, d).
+        response: X = A^-1 B, change of each state against the shared values, shape (m, d, p).
+        shared: covariance of this recording's shared values, shape (p, p).
+    """
+
+    given_shared: Array
+    neighbours: Array
+    response: Array
+    shared: Array
+
+    @staticmethod
+    def of(elimination: Elimination, shared: Array) -> StatePosterior:
+        """Backward recursion over the factorised chain."""
+        L_diagonal, L_below = elimination.blocks()
+        d = elimination.d
+        L_inverse = np.linalg.solve(L_diagonal, np.broadcast_to(np.eye(d), L_diagonal.shape))
+        P = L_inverse.transpose(0, 2, 1) @ L_inverse
+        C = L_below @ L_inverse[:-1]
+        neighbours = np.empty_like(C)
+        C_transposed = np.ascontiguousarray(C.transpose(0, 2, 1))
+        for k in range(len(C) - 1, -1, -1):
+            across = C_transposed[k] @ P[k + 1]
+            neighbours[k] = across
+            P[k] += across @ C[k]
+        np.negative(neighbours, out=neighbours)
+        X = elimination.solve_transposed(elimination.W).reshape(len(P), d, elimination.W.shape[1])
+        return StatePosterior(P, neighbours, X, shared)
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviation of every state component, shape (m, d)."""
+        widened = np.einsum("kip,pq,kiq->ki", self.response, self.shared, self.response, optimize=True)
+        return np.sqrt(np.einsum("kii->ki", self.given_shared) + widened)
+
+    def covariance(self, tick: int) -> Array:
+        """Full covariance of one state, shape (d, d)."""
+        X = self.response[tick]
+        return self.given_shared[tick] + X @ self.shared @ X.T
+
+
+def posteriors(
+    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = ()
+) -> tuple[list[StatePosterior], Array]:
+    """Uncertainty of all recordings at a solution, and the covariance of all shared values.
+
+    Args:
+        problems: the recordings.
+        solution: where the solver ended.
+        hold: blocks that were held; they have no uncertainty.
+
+    Raises:
+        SolveError: the Hessian is not positive definite.
+    """
+    shared = solution.shared
+    eliminations = [eliminate(system) for system in solution.systems]
+    H, _ = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    free = free_indices(shared, hold)
+    covariance = np.zeros_like(H)
+    try:
+        covariance[np.ix_(free, free)] = cho_solve(cho_factor(H[np.ix_(free, free)]), np.eye(len(free)))
+    except np.linalg.LinAlgError as err:
+        raise unobservable(H, free, shared, solution.estimate.calibrations[0]) from err
+    found = []
+    for i, elimination in enumerate(eliminations):
+        index = shared.indices(i)
+        found.append(StatePosterior.of(elimination, covariance[np.ix_(index, index)]))
+    return found, covariance
+
+
+@dataclass(frozen=True)
+class ResidualPart:
+    """Whitened residuals of some samples of a factor and what the estimate makes of them.
+
+    Attributes:
+        factor: the samples.
+        ticks: first state of each sample.
+        residual: whitened, shape (m, r).
+        leverage: share of each row's variance that the fit absorbs, in [0, 1], shape (m, r).
+        by_shared: derivative of the residual by the shared values, with states following along, shape (m, r, p).
+    """
+
+    factor: Factor
+    ticks: NDArray[np.intp]
+    residual: Array
+    leverage: Array
+    by_shared: Array
+
+
+def residual_parts(
+    linearized: Iterable[Linearized], calibration: Calibration, posterior: StatePosterior
+) -> Iterator[ResidualPart]:
+    """Residuals of linearised factors with leverage and score.
+
+    Args:
+        linearized: factors of one recording, linearised at the estimate.
+        calibration: gives the layout of the shared values.
+        posterior: uncertainty of the recording's states.
+    """
+    columns = layout(calibration)
+    p = posterior.shared.shape[0]
+    for factor, ticks, linear in linearized:
+        r, J, by_block = whitened(factor, linear)
+        by_shared = np.zeros((*r.shape, p))
+        for block, J_block in by_block.items():
+            by_shared[:, :, columns[block]] = J_block
+        leverage = np.zeros(r.shape)
+        for i, J_i in enumerate(J):
+            by_shared -= J_i @ posterior.response[ticks + i]
+            leverage += np.einsum("kri,kri->kr", J_i @ posterior.given_shared[ticks + i], J_i)
+        if len(J) == 2:
+            leverage += 2.0 * np.einsum("kri,kri->kr", J[0] @ posterior.neighbours[ticks], J[1])
+        leverage += np.einsum("krp,krp->kr", by_shared @ posterior.shared, by_shared)
+        yield ResidualPart(factor, ticks, r, leverage, by_shared)

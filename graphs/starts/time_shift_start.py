@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Start values of delays and clock offsets: the ones at which the states fit best.
+
+A sample stands between two states near the instant at which the present delay puts it. From a delay that is off by
+several samples the iterations run into a valley of bent states and never come out of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.batch_solver import solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.errors import SolveError
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+TRIED = np.array([1.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 24.0]) * 1e-3  # [s], and their negatives
+ITERATIONS = 3
+REFINED = 5  # parabolas through the lowest values at the most
+NEAR = 2e-4  # [s]
+
+
+def with_best_shifts(
+    problems: Sequence[BagProblem], start: Estimate, hold: Sequence[str] = ()
+) -> tuple[list[BagProblem], Estimate]:
+    """Problems and estimate with every free delay and offset where the states fit best, one after the other.
+
+    Args:
+        problems: factors of each recording, or of windows of them.
+        start: where to begin.
+        hold: further blocks that stay.
+    """
+    best, estimate = list(problems), start
+    for name in () if DYNAMICS in hold else _shifts(problems[0].robot):
+        scan = _Scan(best, estimate, name, (DYNAMICS, *hold))
+        value = scan.lowest()
+        best, estimate = placed(best, {name: value}), _with_value(estimate, name, value)
+    return best, estimate
+
+
+@dataclass
+class _Scan:
+    """Cost of the states by the value of one shift; parameters are held, mountings and biases follow."""
+
+    problems: Sequence[BagProblem]
+    estimate: Estimate
+    name: str
+    hold: tuple[str, ...]
+    costs: dict[float, float] = field(default_factory=dict)
+
+    def lowest(self) -> float:
+        """The value at which the states fit best."""
+        robot = self.problems[0].robot
+        parameter = robot.parameters[self.name]
+        one_sided = parameter.positive or _one_sided(robot, self.name)
+        # all of them: far from the right one the cost has further valleys
+        for value in (parameter.value, *TRIED, *(() if one_sided else -TRIED)):
+            self._cost(float(value))
+        for _ in range(REFINED):
+            best = self._best()
+            between = self._vertex(best)
+            if between is None or abs(between - best) < NEAR:
+                break
+            self._cost(between)
+        return self._best()
+
+    def _best(self) -> float:
+        return min(self.costs, key=self.costs.__getitem__)
+
+    def _cost(self, value: float) -> float:
+        if value not in self.costs:
+            trial, moved = placed(self.problems, {self.name: value}), _with_value(self.estimate, self.name, value)
+            try:
+                self.costs[value] = solve(trial, moved, max_iterations=ITERATIONS, hold=self.hold).cost
+            except SolveError:
+                self.costs[value] = float("inf")
+        return self.costs[value]
+
+    def _vertex(self, best: float) -> float | None:
+        """Lowest point of the parabola through the best value and its neighbours."""
+        values = sorted(self.costs)
+        i = values.index(best)
+        if not 0 < i < len(values) - 1:
+            return None
+        near = values[i - 1 : i + 2]
+        a, b, _ = np.polyfit(np.array(near) - best, [self.costs[value] for value in near], 2)
+        return best - b / (2.0 * a) if np.isfinite(a) and a > 0.0 else None
+
+
+def placed(problems: Sequence[BagProblem], values: dict[str, float]) -> list[BagProblem]:
+    """The problems with their samples where some values put them."""
+    moved = [BagProblem.of(problem.robot.with_values(values), problem.recording) for problem in problems]
+    return [replace(new, owner=old.owner) for new, old in zip(moved, problems, strict=True)]
+
+
+def _shifts(robot: Robot) -> list[str]:
+    """Full names of the free delays and offsets of a robot."""
+    found = []
+    for here in robot.effects:
+        if isinstance(here.effect, TimeShift):
+            start = here.parameter("")
+            found += [n for n, p in robot.parameters.items() if n.startswith(start) and p.unit == "s" and not p.fixed]
+    return found
+
+
+def _one_sided(robot: Robot, name: str) -> bool:
+    """Whether only values above zero are physical."""
+    for here in robot.effects:
+        for p in here.effect.parameters_at(robot, here.owner):
+            if here.parameter(p.name) == name:
+                return p.sign == "+"
+    return False
+
+
+def _with_value(estimate: Estimate, name: str, value: float) -> Estimate:
+    """The estimate with another value of a parameter."""
+    calibrations = []
+    for calibration in estimate.calibrations:
+        i, dynamics = calibration.names.index(name), calibration.dynamics.copy()
+        dynamics[i] = np.log(value) if calibration.positive[i] else value
+        calibrations.append(replace(calibration, dynamics=dynamics))
+    return Estimate(estimate.states, tuple(calibrations))

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""M(q) a + c(q, v) + g(q) = tau of a tree of bodies, by pinocchio: for many samples, and for one at a time.
+
+Where every coordinate of the model is a joint of its own, pinocchio does all of it. Where coordinates are coupled,
+q_model = G q + offset, the same laws hold for what is left,
+
+    M = G' M_model G,    tau = G' tau_model,    a = M^-1 (tau - c - g),
+    da/dq = -M^-1 G' (dtau_model/dq_model at q, v, a) G,    likewise by v.
+
+pinocchio returns windows into its `data`, which its next call overwrites: everything that leaves here is a copy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.bodies.coupling import Coupling
+
+Array = NDArray[np.float64]
+Derivatives = tuple[Array, Array, Array, Array]
+
+
+class FreeEquations:
+    """Equations of a model whose coordinates are all free.
+
+    Args:
+        model: pinocchio model with one-axis joints.
+    """
+
+    def __init__(self, model: pin.Model):
+        self._model, self._data, self._pool = model, model.createData(), pin.ModelPool(model, 1)
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Accelerations of many samples; arguments and result of shape (m, n)."""
+        if len(q) == 1:
+            return self.acceleration_at(q[0], v[0], tau[0])[None]
+        a = np.empty(q.shape[::-1], order="F")
+        columns = (np.asfortranarray(part.T) for part in (q, v, tau))
+        pin.abaInParallel(1, self._pool, *columns, a)
+        return np.ascontiguousarray(a.T)
+
+    def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
+        """Accelerations, shape (m, n), and their derivatives by q, v and tau, each of shape (m, n, n)."""
+        m, n = q.shape
+        a, da_dq, da_dv, M_inverse = np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, n)), np.empty((m, n, n))
+        model, data, derivatives = self._model, self._data, pin.computeABADerivatives
+        for k in range(m):
+            da_dq[k], da_dv[k], M_inverse[k] = derivatives(model, data, q[k], v[k], tau[k])
+            a[k] = data.ddq
+        return a, da_dq, da_dv, M_inverse
+
+    def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
+        """Accelerations at one state, shape (n,)."""
+        return np.array(pin.aba(self._model, self._data, q, v, tau))
+
+    def derivatives_at(self, q: Array, v: Array, tau: Array) -> Derivatives:
+        """As `derivatives`, at one state."""
+        by_q, by_v, M_inverse = pin.computeABADerivatives(self._model, self._data, q, v, tau)
+        return self._data.ddq.copy(), by_q.copy(), by_v.copy(), M_inverse.copy()
+
+    def torque(self, q: Array, v: Array, a: Array) -> Array:
+        """Torques of given motion; arguments and result of shape (m, n)."""
+        tau = np.empty(q.shape[::-1], order="F")
+        columns = (np.asfortranarray(part.T) for part in (q, v, a))
+        pin.rneaInParallel(1, self._pool, *columns, tau)
+        return np.ascontiguousarray(tau.T)
+
+    def gravity_derivatives(self, q: Array) -> Array:
+        """Derivatives of the torques of gravity by q, shape (m, n, n)."""
+        by_q = np.empty((len(q), self._model.nv, self._model.nv))
+        for k in range(len(q)):
+            by_q[k] = pin.computeGeneralizedGravityDerivatives(self._model, self._data, q[k])
+        return by_q
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M(q), shape (m, n, n)."""
+        M = np.empty((len(q), self._model.nv, self._model.nv))
+        for k in range(len(q)):
+            M[k] = pin.crba(self._model, self._data, q[k])
+        return M
+
+
+class CoupledEquations:
+    """Equations of a model whose coordinates follow fewer joints, or are in another order.
+
+    Args:
+        model: pinocchio model with one-axis joints.
+        coupling: its coordinates from those of the joints.
+    """
+
+    def __init__(self, model: pin.Model, coupling: Coupling):
+        self._model, self._data = model, model.createData()
+        self._coupling, self._G = coupling, coupling.G
+        self._free = FreeEquations(model)
+
+    def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """As `FreeEquations.acceleration`."""
+        bias = self.torque(q, v, np.zeros_like(q))
+        return np.asarray(np.linalg.solve(self.mass_matrix(q), (tau - bias)[:, :, None])[:, :, 0], float)
+
+    def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
+        """As `FreeEquations.derivatives`."""
+        coupling, G = self._coupling, self._G
+        M_inverse = np.asarray(np.linalg.inv(self.mass_matrix(q)), dtype=np.float64)
+        a = (M_inverse @ (tau - self.torque(q, v, np.zeros_like(q)))[:, :, None])[:, :, 0]
+        by_q, by_v = np.empty((2, len(q), len(G), len(G)))
+        motion = coupling.positions(q), coupling.rates(v), coupling.rates(a)
+        model, data, derivatives = self._model, self._data, pin.computeRNEADerivatives
+        for k, (q_model, v_model, a_model) in enumerate(zip(*motion, strict=True)):
+            by_q[k], by_v[k], _ = derivatives(model, data, q_model, v_model, a_model)
+        return a, -M_inverse @ (G.T @ by_q @ G), -M_inverse @ (G.T @ by_v @ G), M_inverse
+
+    def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
+        """As `FreeEquations.acceleration_at`."""
+        q_model, G = self._coupling.positions(q), self._G
+        bias = G.T @ pin.nonLinearEffects(self._model, self._data, q_model, self._coupling.rates(v))
+        return np.asarray(np.linalg.solve(G.T @ pin.crba(self._model, self._data, q_model) @ G, tau - bias), float)
+
+    def derivatives_at(self, q: Array, v: Array, tau: Array) -> Derivatives:
+        """As `FreeEquations.derivatives_at`."""
+        q_model, v_model, G = self._coupling.positions(q), self._coupling.rates(v), self._G
+        bias = G.T @ pin.nonLinearEffects(self._model, self._data, q_model, v_model)
+        M_inverse = np.linalg.inv(G.T @ pin.crba(self._model, self._data, q_model) @ G)
+        a = M_inverse @ (tau - bias)
+        by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._data, q_model, v_model, G @ a)
+        return a, -M_inverse @ (G.T @ by_q @ G), -M_inverse @ (G.T @ by_v @ G), M_inverse
+
+    def torque(self, q: Array, v: Array, a: Array) -> Array:
+        """As `FreeEquations.torque`."""
+        coupling = self._coupling
+        return coupling.torques(self._free.torque(coupling.positions(q), coupling.rates(v), coupling.rates(a)))
+
+    def gravity_derivatives(self, q: Array) -> Array:
+        """As `FreeEquations.gravity_derivatives`."""
+        return self._G.T @ self._free.gravity_derivatives(self._coupling.positions(q)) @ self._G
+
+    def mass_matrix(self, q: Array) -> Array:
+        """As `FreeEquations.mass_matrix`."""
+        return self._G.T @ self._free.mass_matrix(self._coupling.positions(q)) @ self._G
+
+
+Equations = FreeEquations | CoupledEquations
+
+
+def equations_of(model: pin.Model, coupling: Coupling | None) -> Equations:
+    """The equations of a model."""
+    return FreeEquations(model) if coupling is None else CoupledEquations(model, coupling)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From the logged commands to those that act: delays, lags and dead bands need the whole history of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.command_effect import CommandEffect, CommandLaw
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+
+Array = NDArray[np.float64]
+
+
+class CommandPath:
+    """Commands of one recording and the effects that change them, one after the other.
+
+    Args:
+        edges: edges of the steps, shape (m + 1,) [s].
+        u: logged commands, shape (m, n), SI unit of the command.
+        effects: effects of the robot; others than those of commands are ignored.
+        joints: names of the joints.
+    """
+
+    def __init__(self, edges: Array, u: Array, effects: Sequence[EffectAt], joints: tuple[str, ...]):
+        self._edges, self._u, self._joints = edges, u, joints
+        self._effects = [here for here in effects if isinstance(here.effect, CommandEffect)]
+        self._cache: tuple[tuple[float, ...], tuple[Array, dict[str, Array]]] | None = None
+
+    @property
+    def changes(self) -> bool:
+        """Whether any effect changes the commands."""
+        return bool(self._effects)
+
+    def acting(self, values: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
+        """Mean command that acts in each step, and its derivatives by the effects' parameters.
+
+        Args:
+            values: parameters of the robot by full name.
+
+        Returns:
+            Shape (m, n), and the same shape for each full name.
+        """
+        own = [[(p.name, values[here.parameter(p.name)]) for p in here.effect.parameters] for here in self._effects]
+        key = tuple(value for part in own for _, value in part)
+        if self._cache is None or self._cache[0] != key:
+            self._cache = (key, self._evaluate([dict(part) for part in own]))
+        return self._cache[1]
+
+    def _evaluate(self, own: list[dict[str, float]]) -> tuple[Array, dict[str, Array]]:
+        u, slopes = self._u.copy(), dict[str, Array]()
+        for here, p in zip(self._effects, own, strict=True):
+            before = u.copy()
+            joints = range(len(self._joints)) if here.owner == "robot" else (self._joints.index(here.owner),)
+            for j in joints:
+                u[:, j], by = law_of(here)(self._edges, before[:, j], p)
+                for name, slope in by.items():
+                    slopes.setdefault(here.parameter(name), np.zeros_like(u))[:, j] = slope
+        return u, slopes
+
+
+def law_of(here: EffectAt) -> CommandLaw:
+    """The law of a command effect."""
+    assert isinstance(here.effect, CommandEffect)
+    return here.effect.law

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""dx/dt of many states side by side with fixed parameters: the equations of `ElasticJoints` without their derivatives.
+
+Predictions evaluate it thousands of times for a few hundred states at once, so whatever does not change from one time
+to the next is found when it is built. A test holds it against `ElasticJoints`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.dynamics.carried_weight import CarriedWeight
+from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
+from jointscope.robots.dynamics.motor_torques import MotorTorques
+from jointscope.robots.dynamics.state_rates import linear_torques
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
+from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
+from jointscope.robots.model.joint_parameters import JointParameters
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.structured_tree import StructuredTree
+
+Array = NDArray[np.float64]
+
+
+class RatesOfMany:
+    """The motion of one robot with its present parameters.
+
+    Args:
+        robot: tree, drives, effects and parameters.
+
+    Attributes:
+        layout: of the states.
+    """
+
+    def __init__(self, robot: Robot):
+        robot.need_link_dynamics()
+        self.layout = layout = robot.layout
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        parameters, tree = JointParameters(robot), StructuredTree(robot)
+        self._bodies, self._scale = tree.bodies(values), values.get(tree.coriolis_scale or "", 1.0)
+        springs, motors = JointSprings(layout, parameters), MotorTorques(robot, parameters)
+        self._linear = linear_torques(robot, parameters, springs, motors, values).T
+        self._gain = motors.of_command(np.ones((1, robot.n)), values)[0]
+        self._coulomb, self._sharpness = parameters.of(values, "coulomb_torque"), robot.friction_sharpness(values)
+        self._friction = layout.joint_v if robot.choices.friction_velocity == "link" else layout.motor_v
+        own = [robot.joints.index(joint) for joint in layout.motors]
+        n, m = layout.n_link, layout.n_motor
+        self._inertia, self._motors = parameters.of(values, "inertia")[own], slice(n, n + m)
+        at_rest = springs.at(np.zeros((1, layout.size)), values)
+        weight = CarriedWeight(robot)
+        laws = [_LawOfMany(h, robot, at_rest, values, weight) for h in robot.effects if _is_law(h)]
+        for law in laws:
+            self._linear = self._linear + law.linear
+        self._laws = [law for law in laws if not law.is_linear]
+        self._weight = weight if any(law.needs_weight for law in self._laws) else None
+
+    def torque_of(self, u: Array) -> Array:
+        """Torque of the motors for commands in their SI unit, shape (m, n) [N m]."""
+        return self._gain * u
+
+    def rates(self, x: Array, command_torque: Array) -> Array:
+        """dx/dt.
+
+        Args:
+            x: states, shape (m, d).
+            command_torque: of the motors, shape (m, n) [N m].
+
+        Returns:
+            Shape (m, d).
+        """
+        layout = self.layout
+        tau = x @ self._linear
+        tau[:, layout.motor_row] += command_torque - self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
+        load = None if self._weight is None else self._weight.torque(x)
+        for law in self._laws:
+            law.add(x, tau, load)
+        n = layout.n_link
+        rate = np.empty_like(x)
+        rate[:, layout.positions] = x[:, layout.velocities]
+        rate[:, layout.v_link] = self._acceleration(x[:, layout.q_link], x[:, layout.v_link], tau[:, :n])
+        rate[:, layout.v_motor] = tau[:, self._motors] / self._inertia
+        rate[:, layout.memory] = tau[:, n + layout.n_motor :]
+        return rate
+
+    def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
+        """Of the links, with the share of the Coriolis terms that the model has, shape (m, n_link)."""
+        moving = self._bodies.acceleration(q, v, tau)
+        if self._scale == 1.0:
+            return moving
+        still = self._bodies.acceleration(q, np.zeros_like(v), tau)
+        return still + self._scale * (moving - still)
+
+
+class _LawOfMany:
+    """The law of one effect with fixed parameters.
+
+    Attributes:
+        needs_weight: whether it asks for the weight that a rigid joint carries.
+        is_linear: whether it is linear in the state, as viscous friction is.
+        linear: its torques per state if it is linear, else zero, shape (d, r).
+    """
+
+    def __init__(
+        self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float], weight: CarriedWeight
+    ):
+        layout, effect = robot.layout, here.effect
+        self._layout, self._effect, self._p = layout, effect, here.own(values)
+        self._joint = j = robot.joints.index(here.owner) if here.owner in robot.joints else 0
+        self._joints, self._springs, self._sharpness = robot.joints, springs, robot.friction_sharpness(values)
+        self.needs_weight = False
+        if isinstance(effect, JointTorque):
+            link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
+            rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
+            self._rows = rows[effect.side]
+            self._memory = layout.memories.index(here.label) if effect.memory is not None else -1
+            self.needs_weight = weight.on(here.owner, effect, self._p) is not None
+        self.linear = self._slopes()
+        self.is_linear = bool(np.any(self.linear))
+
+    def add(self, x: Array, tau: Array, load: Array | None) -> None:
+        """Adds torques and rates of memories.
+
+        Args:
+            x: states, shape (m, d).
+            tau: receives them, shape (m, r).
+            load: torque of the weight that rigid joints carry, shape (m, n) [N m]; None where no law needs it.
+        """
+        effect, layout = self._effect, self._layout
+        if isinstance(effect, RobotTorque):
+            found = effect.law(self._of_robot(x), self._p)
+            for rows, torque in zip((layout.joint_link, layout.motor_row), found, strict=True):
+                for j, row in enumerate(rows.tolist()):
+                    tau[:, row] += np.real(torque[:, j])
+            return
+        assert isinstance(effect, JointTorque)
+        at = self._of_joint(x, load)
+        value = np.real(effect.law(at, self._p))
+        for row, sign in self._rows:
+            tau[:, row] += sign * value
+        if effect.memory is not None:
+            tau[:, layout.n_link + layout.n_motor + self._memory] += np.real(effect.memory.rate(at, self._p))
+
+    def _of_joint(self, x: Array, load: Array | None) -> JointSignals:
+        j, layout, springs = self._joint, self._layout, self._springs
+        q_link, v_link = x[:, layout.joint_q[j]], x[:, layout.joint_v[j]]
+        q_motor, v_motor = x[:, layout.motor_q[j]], x[:, layout.motor_v[j]]
+        tau: Any
+        if self.needs_weight and load is not None:
+            tau = load[:, j]
+        else:
+            tau = springs.stiffness[j] * (q_link - q_motor) + springs.damping[j] * (v_link - v_motor)
+        memory = x[:, layout.memory.start + self._memory] if self._memory >= 0 else 0.0
+        return JointSignals(
+            q_link,
+            v_link,
+            q_motor,
+            v_motor,
+            tau,
+            springs.stiffness[j],
+            sharpness=float(self._sharpness[j]),
+            memory=memory,
+        )
+
+    def _of_robot(self, x: Array) -> RobotSignals:
+        layout = self._layout
+        return RobotSignals(
+            q_link=x[:, layout.joint_q],
+            v_link=x[:, layout.joint_v],
+            q_motor=x[:, layout.motor_q],
+            v_motor=x[:, layout.motor_v],
+            stiffness=self._springs.stiffness,
+            damping=self._springs.damping,
+            joints=self._joints,
+            owner=self._joint,
+            sharpness=self._sharpness,
+        )
+
+    def _slopes(self) -> Array:
+        """Torques per unit of each state; zero for a law that is not linear."""
+        layout = self._layout
+        found = np.zeros((layout.size, layout.n_rates))
+        if self.needs_weight:
+            return found
+        self.add(np.eye(layout.size), found, None)
+        x = np.random.default_rng(1).normal(size=(8, layout.size)) * 10.0 ** np.arange(-4.0, 4.0)[:, None]
+        torque = np.zeros((8, layout.n_rates))
+        self.add(x, torque, None)
+        exact = 1e-12 * (np.abs(x) @ np.abs(found)) + 1e-300
+        return found if np.all(np.abs(torque - x @ found) <= exact) else np.zeros_like(found)
+
+
+def _is_law(here: EffectAt) -> bool:
+    return isinstance(here.effect, JointTorque | RobotTorque)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""dx/dt of one state with its Jacobian: the equations of `ElasticJoints`, as fast as a control loop needs them.
+
+Parameters are fixed when it is built, so everything linear is one matrix; laws of effects are evaluated once for their
+value and all their slopes, by complex steps side by side. A test holds it against `ElasticJoints`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.dynamics.bearing_springs import BearingSprings
+from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
+from jointscope.robots.dynamics.law_at_one_state import CoupledLawAtOneState, JointLawAtOneState, LawAtOneState
+from jointscope.robots.dynamics.motor_torques import MotorTorques
+from jointscope.robots.dynamics.torque_terms import TorqueTerms
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.robot_torque import RobotTorque
+from jointscope.robots.model.joint_parameters import JointParameters
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.structured_tree import StructuredTree
+
+Array = NDArray[np.float64]
+
+
+class StateRates:
+    """The motion of one robot with its present parameters.
+
+    Args:
+        robot: tree, drives, effects and parameters.
+        values: other values than the robot's own, by full name.
+
+    Attributes:
+        layout: of the state.
+        friction_columns: columns of the velocities that the friction of each joint depends on, shape (n,).
+        sharpness: k of the friction law of each joint, shape (n,) [s/rad].
+    """
+
+    def __init__(self, robot: Robot, values: Mapping[str, float] | None = None):
+        self.layout = layout = robot.layout
+        named = {name: parameter.value for name, parameter in robot.parameters.items()} | dict(values or {})
+        parameters, tree = JointParameters(robot), StructuredTree(robot)
+        motors = MotorTorques(robot, parameters)
+        bodies = tree.bodies(named)
+        self._equations = bodies.equations
+        # share of the Coriolis terms that the model has; accelerations are linear in it, beyond 0 and 1, too
+        self._scale = named[tree.coriolis_scale] if tree.coriolis_scale else float(bodies.coriolis)
+        springs = JointSprings(layout, parameters)
+        self._linear = linear_torques(robot, parameters, springs, motors, named)
+        self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
+        self._coulomb = parameters.of(named, "coulomb_torque")
+        self.sharpness = robot.friction_sharpness(named)
+        on_link = robot.choices.friction_velocity == "link"
+        self.friction_columns = layout.joint_v if on_link else layout.motor_v
+        self._rows = layout.motor_row
+        n = layout.n_link
+        # a slice where all motors have equations of their own: quicker
+        own_rows = np.array_equal(self._rows, np.arange(n, n + robot.n))
+        self._added = slice(n, n + robot.n) if own_rows else self._rows
+        own = [layout.joints.index(joint) for joint in layout.motors]
+        self._inertia = parameters.of(named, "inertia")[own]
+        self._laws = _laws(robot, springs.at(np.zeros((1, layout.size)), named), named)
+        self._kinematic = np.zeros((layout.size, layout.size))
+        self._kinematic[layout.positions, layout.velocities] = 1.0
+        n, m = layout.n_link, layout.n_motor
+        self._n, self._motor_rows, self._memory_rows = n, slice(n, n + m), slice(n + m, layout.n_rates)
+        self._no_velocity, self._weights = np.zeros(n), (1.0 / self._inertia)[:, None]
+        self._by_torque = np.zeros((layout.size, robot.n))
+        self._on_links = [(j, row) for j, row in enumerate(self._rows.tolist()) if row < n]
+        for j, row in enumerate(self._rows.tolist()):
+            if row >= n:
+                self._by_torque[layout.v_motor.start + row - n, j] = 1.0 / self._inertia[row - n]
+
+    @property
+    def has_laws(self) -> bool:
+        """Whether effects add torques of their own."""
+        return bool(self._laws)
+
+    def command_torque(self, u: Array) -> Array:
+        """Torque of the motors for a command in its SI unit, shape (n,) [N m]."""
+        return self._torque_of_command * u
+
+    def rates(self, x: Array, command_torque: Array) -> Array:
+        """dx/dt.
+
+        Args:
+            x: state, shape (d,).
+            command_torque: of the motors, shape (n,) [N m].
+
+        Returns:
+            Shape (d,).
+        """
+        tau = self._linear @ x
+        tau[self._added] += command_torque - self._coulomb * np.tanh(self.sharpness * x[self.friction_columns])
+        for law in self._laws:
+            law.add(x, tau, None)
+        layout = self.layout
+        q, v, torque = x[layout.q_link], x[layout.v_link], tau[: self._n]
+        s, acceleration = self._scale, self._equations.acceleration_at
+        a = acceleration(q, v if s != 0.0 else self._no_velocity, torque)
+        if s not in (0.0, 1.0):
+            still = acceleration(q, self._no_velocity, torque)
+            a = still + s * (a - still)
+        return self._rate(x, tau, a)
+
+    def with_jacobian(self, x: Array, command_torque: Array) -> tuple[Array, Array, Array]:
+        """dx/dt, its derivative by the state, and by the torque of each motor.
+
+        Args:
+            x: state, shape (d,).
+            command_torque: of the motors, shape (n,) [N m].
+
+        Returns:
+            Shapes (d,), (d, d) and (d, n).
+        """
+        layout, n = self.layout, self._n
+        tau, by_state = self._linear @ x, self._linear.copy()
+        smooth_sign = np.tanh(self.sharpness * x[self.friction_columns])
+        tau[self._added] += command_torque - self._coulomb * smooth_sign
+        by_state[self._rows, self.friction_columns] -= self._coulomb * self.sharpness * (1.0 - smooth_sign**2)
+        for law in self._laws:
+            law.add(x, tau, by_state)
+        a, by_q, by_v, M_inverse = self._rigid(x[layout.q_link], x[layout.v_link], tau[:n])
+        A = self._kinematic.copy()
+        A[layout.v_link] = M_inverse @ by_state[:n]
+        A[layout.v_link, layout.q_link] += by_q
+        A[layout.v_link, layout.v_link] += by_v
+        A[layout.v_motor] = by_state[self._motor_rows] * self._weights
+        A[layout.memory] = by_state[self._memory_rows]
+        by_torque = self._by_torque
+        if self._on_links:
+            by_torque = by_torque.copy()
+            for j, row in self._on_links:
+                by_torque[layout.v_link, j] = M_inverse[:, row]
+        return self._rate(x, tau, a), A, by_torque
+
+    def _rigid(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array, Array, Array]:
+        """Accelerations of the links and their derivatives by q, v and tau."""
+        s, derivatives = self._scale, self._equations.derivatives_at
+        if s == 0.0:
+            a, by_q, by_v, M_inverse = derivatives(q, self._no_velocity, tau)
+            return a, by_q, np.zeros_like(by_v), M_inverse
+        moving = derivatives(q, v, tau)
+        if s == 1.0:
+            return moving
+        still = derivatives(q, self._no_velocity, tau)
+        a, by_q = (still[i] + s * (moving[i] - still[i]) for i in (0, 1))
+        return a, by_q, s * moving[2], moving[3]
+
+    def _rate(self, x: Array, tau: Array, a_link: Array) -> Array:
+        layout, rate = self.layout, np.empty_like(x)
+        rate[layout.q_link], rate[layout.q_motor] = x[layout.v_link], x[layout.v_motor]
+        rate[layout.v_link] = a_link
+        rate[layout.v_motor] = tau[self._motor_rows] / self._inertia
+        rate[layout.memory] = tau[self._memory_rows]
+        return rate
+
+
+def linear_torques(
+    robot: Robot, parameters: JointParameters, springs: JointSprings, motors: MotorTorques, values: Mapping[str, float]
+) -> Array:
+    """Torques per state of springs, dampers, bearings and back-EMF, shape (r, d)."""
+    x = np.zeros((1, robot.layout.size))
+    without_friction = {name: 0.0 if name.endswith(".coulomb_torque") else value for name, value in values.items()}
+    terms = TorqueTerms.zeros(1, robot.layout, len(parameters.names), derivatives=True)
+    springs.add(terms, springs.at(x, values))
+    motors.add(terms, x, without_friction)
+    BearingSprings(robot.effects, robot.layout, parameters.names).add(terms, x, values)
+    assert terms.by_state is not None
+    return terms.by_state[0]
+
+
+def _laws(robot: Robot, springs: Springs, values: Mapping[str, float]) -> list[LawAtOneState]:
+    """All torque laws among the robot's effects."""
+    laws: list[LawAtOneState] = []
+    for here in robot.effects:
+        if isinstance(here.effect, JointTorque):
+            laws.append(JointLawAtOneState(here, robot, springs, values))
+        elif isinstance(here.effect, RobotTorque):
+            laws.append(CoupledLawAtOneState(here, robot, springs, values))
+    return laws

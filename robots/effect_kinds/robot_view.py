@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an effect may ask of the robot that it acts on, so that robots can be made of effects without a circle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.parts.model_choices import ModelChoices
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.sensors import Gyro, LinkEncoder, Topic
+
+
+class RobotView(Protocol):
+    """The part of a `Robot` that effects see; its attributes are described there."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, base to tip."""
+
+    @property
+    def tree(self) -> RigidTree:
+        """Rigid bodies."""
+
+    @property
+    def choices(self) -> ModelChoices:
+        """Choices of the model."""
+
+    @property
+    def constants(self) -> Mapping[str, float]:
+        """Known numbers by name."""
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Parameters by full name."""
+
+    @property
+    def command(self) -> Topic:
+        """Where the commands are, and their unit."""
+
+    @property
+    def gyros(self) -> Sequence[Gyro]:
+        """All gyroscopes."""
+
+    @property
+    def link_encoder(self) -> LinkEncoder | None:
+        """The encoders on the links, if there are any."""
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter by full name."""
+
+    def unit_at(self, owner: str, unit: str) -> str:
+        """The unit of something at an owner, where joints may slide."""

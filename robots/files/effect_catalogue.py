@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All physical effects that are known: those of `robots/effects/`, of installed packages, and of the user's files."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jointscope.robots import effects as folder
+from jointscope.robots.effect_kinds.effect import Effect
+from jointscope.robots.effect_kinds.groups import GROUPS, group_of
+from jointscope.robots.errors import EffectError
+from jointscope.robots.files.effect_check import check_effect
+from jointscope.robots.files.effect_file import effects_of_file
+from jointscope.robots.yaml_section import did_you_mean
+
+if TYPE_CHECKING:
+    from jointscope.robots.model.robot import Robot
+
+ENTRY_POINTS = "jointscope.effects"
+
+_of_files: dict[Path, dict[str, Effect]] = {}
+
+
+def catalogue() -> dict[str, Effect]:
+    """All known effects by id, those of the motor side first and numerics last.
+
+    Raises:
+        EffectError: an installed package offers something that is no effect, or an id twice.
+    """
+    known = {**_own(), **_of_packages()}
+    for found in _of_files.values():
+        known |= found
+    return {e.id: e for e in sorted(known.values(), key=lambda e: (GROUPS.index(group_of(e)), e.id))}
+
+
+def add_user_effects(path: str | Path) -> tuple[Effect, ...]:
+    """Adds the effects of a Python file: every effect that the file makes at its top level.
+
+    Adding a file again replaces what it held.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The effects that it holds.
+
+    Raises:
+        EffectError: the file cannot be read or run, holds no effect, or one that cannot be used.
+    """
+    file = Path(path).resolve()
+    others = {**_own(), **_of_packages()}
+    for other, content in _of_files.items():
+        if other != file:
+            others |= content
+    found: dict[str, Effect] = {}
+    for effect, place in effects_of_file(Path(path)):
+        if any(effect is other for other in others.values()):
+            continue  # imported from somewhere else, to be changed or combined
+        check_effect(effect, place)
+        if effect.id in others or effect.id in found:
+            raise EffectError(f"{place}: the id {effect.id!r} is taken by another effect; give this one another id")
+        found[effect.id] = effect
+    if not found:
+        raise EffectError(
+            f"{path}: no effect in it; expected a constant at the top level such as EFFECT = JointTorque(...)"
+        )
+    _of_files[file] = found
+    return tuple(found.values())
+
+
+def find_effect(effect_id: str) -> Effect:
+    """The effect of that id.
+
+    Raises:
+        EffectError: there is none; the message offers the nearest.
+    """
+    known = catalogue()
+    if effect_id not in known:
+        hint = did_you_mean(effect_id, list(known))
+        if "did you mean" not in hint:
+            hint = "; `jointscope effects` lists all, --effects FILE.py adds your own"
+        raise EffectError(f"no effect {effect_id!r}{hint}")
+    return known[effect_id]
+
+
+def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
+    """An effect and its owner from ID@OWNER.
+
+    Args:
+        text: for example "cogging@joint2".
+        robot: whose joints and gyros can be owners.
+
+    Returns:
+        The effect and the owner.
+
+    Raises:
+        EffectError: text of another form, unknown id, or an owner on which the effect cannot act.
+    """
+    effect_id, at, owner = text.partition("@")
+    if not at or not effect_id or not owner or "@" in owner:
+        example = f"{effect_id or 'cogging'}@{robot.joints[0]}"
+        raise EffectError(f"effect {text!r}: expected ID@OWNER, for example {example}")
+    effect = find_effect(effect_id)
+    reason = effect.may_act_on(robot, owner)
+    if reason:
+        hint = did_you_mean(owner, effect.owners_of(robot))
+        raise EffectError(f"effect {text!r}: {effect_id} {reason}{hint if 'did you mean' in hint else ''}")
+    return effect, owner
+
+
+@cache
+def _own() -> dict[str, Effect]:
+    """The effects of this package; a broken file here is a bug."""
+    modules = (importlib.import_module(f"{folder.__name__}.{m.name}") for m in pkgutil.iter_modules(folder.__path__))
+    return {module.EFFECT.id: module.EFFECT for module in modules}
+
+
+@cache
+def _of_packages() -> dict[str, Effect]:
+    """The effects that installed packages offer."""
+    return _loaded(entry_points(group=ENTRY_POINTS))
+
+
+def _loaded(points: Iterable[EntryPoint]) -> dict[str, Effect]:
+    """The effects behind entry points such as `drag = "my_package.drag:EFFECT"`."""
+    found: dict[str, Effect] = {}
+    for point in points:
+        place = f"entry point {point.name!r} ({point.value})"
+        try:
+            effect = point.load()
+        except Exception as err:
+            raise EffectError(f"{place}: {type(err).__name__}: {err}; repair or uninstall that package") from err
+        if not isinstance(effect, Effect):
+            raise EffectError(f"{place}: expected an effect, got {type(effect).__name__}")
+        check_effect(effect, place)
+        if effect.id in _own() or effect.id in found:
+            raise EffectError(f"{place}: the id {effect.id!r} is taken by another effect; uninstall one of the two")
+        found[effect.id] = effect
+    return found

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The section of a robot file about process noise: densities of the random torques that the estimator grants."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.yaml_section import Section
+
+Array = NDArray[np.float64]
+
+SMALLEST_TURNING, SMALLEST_SLIDING = 1e-3, 1e-5  # [rad/s/sqrt(s)], [m/s/sqrt(s)]
+HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
+
+
+def process_noise(section: Section, robot: Robot) -> ProcessNoise:
+    """Process noise in the order of the robot's layout; the file lists joints, and what effects bring by name.
+
+    Args:
+        section: `noise` of the robot file.
+        robot: the robot with its effects.
+
+    Raises:
+        RobotError: densities that are missing, too many or not positive.
+    """
+    if robot.free_links:
+        layout = robot.layout
+        return ProcessNoise(False, "integrated", np.ones(layout.n_link), np.ones(layout.n_motor))
+    model = section.text("model", "integrated", ("integrated", "independent"))
+    layout, n = robot.layout, robot.n
+    own = section.section("effects", {})
+    added = [name for name in layout.links if name not in layout.joints]
+    hinges = {name: own.number(name, HINGE_DENSITY, positive=True) for name in added}
+    joints = {key: section.array(key, (n,)) for key in ("link_velocity", "motor_velocity")}
+    for key, values in joints.items():
+        if np.any(values <= 0):
+            raise RobotError(f"{section.place}.{key}: expected numbers above zero, got {values.tolist()}")
+    link = dict(zip(layout.joints, joints["link_velocity"], strict=True)) | hinges
+    motor = dict(zip(layout.joints, joints["motor_velocity"], strict=True))
+    memory = [own.number(label, m.noise, positive=True) for label, m in robot.memories.items()]
+    own.finish()
+    return ProcessNoise(
+        estimate=section.flag("estimate", True),
+        model=model,
+        link_velocity=np.array([link[name] for name in layout.links]),
+        motor_velocity=np.array([motor[name] for name in layout.motors]),
+        position=section.number("position", positive=True) if model == "independent" else 0.0,
+        memory=np.array(memory),
+        smallest=smallest_densities(robot),
+    )
+
+
+def smallest_densities(robot: Robot) -> Array:
+    """Densities below which none is estimated, link before motor, shape (n_link + n_motor,)."""
+    slides = np.isin([*robot.layout.links, *robot.layout.motors], robot.tree.slides)
+    return np.where(slides, SMALLEST_SLIDING, SMALLEST_TURNING)

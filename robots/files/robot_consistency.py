@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What only a whole robot shows: sensors sit on its links, every law has its parameters, in the right unit."""
+
+from __future__ import annotations
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.files.needed_spring import needed_spring
+from jointscope.robots.model.robot import SHARPNESS, Robot
+from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
+from jointscope.robots.yaml_section import did_you_mean
+
+DRIVE_PARAMETERS = {"k_pwm": "N m/V", "k_mi": "N m s/rad", "torque_constant": "N m/A", "inertia": "kg m2"}
+JOINT_PARAMETERS = {"coulomb_torque": "N m", "stiffness": "N m/rad", "damping": "N m s/rad"}
+MAY_HAVE = {SHARPNESS: "s/rad"}  # beside what the model says for all joints
+
+
+def check_robot(robot: Robot) -> None:
+    """Checks that the parts of a robot file fit together.
+
+    Raises:
+        RobotError: a sensor on no link, no encoder, a parameter that is missing, unknown or in another unit.
+    """
+    place = robot.path.name
+    for gyro in robot.gyros:
+        if gyro.body not in robot.tree.bodies:
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.body: no link {gyro.body!r}{did_you_mean(gyro.body, robot.tree.bodies)}"
+            )
+        others = [g.name for g in robot.gyros if g.name != gyro.name]
+        if gyro.reference is not None and gyro.reference not in others:
+            known = ", ".join(others) or "there is none"
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
+            )
+    _check_names(robot, place)
+    _check_stamps(robot, place)
+    _check_positions(robot, place)
+    _check_gyro_forms(robot, place)
+    if not any(isinstance(sensor, MotorEncoder) for sensor in robot.sensors.values()):
+        raise RobotError(f"{place}: sensors: none of kind motor_encoder; the motor positions are needed")
+    if robot.command.unit == "duty" and "motor.supply_voltage" not in robot.constants:
+        raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
+    _check_links(robot, place)
+    _check_springs(robot, place)
+    _check_parameters(robot, place)
+
+
+def _check_links(robot: Robot, place: str) -> None:
+    """What a robot with free links needs, and what only such a robot can use."""
+    if robot.free_links:
+        if robot.link_encoder is None:
+            raise RobotError(f"{place}: model.link_dynamics: free needs a sensor of kind link_encoder, got none")
+        springs = [joint for joint in robot.joints if joint not in robot.choices.rigid_joints]
+        if springs:
+            raise RobotError(
+                f"{place}: model.link_dynamics: free begins with rigid joints; list {', '.join(springs)} under "
+                "rigid_joints, and their springs as effects joint_elasticity@JOINT"
+            )
+        return
+    if not robot.motor_encoder.zero_known:
+        raise RobotError(f"{place}: sensors.{robot.motor_encoder.name}.zero: unknown needs link_dynamics: free")
+    if robot.torque_sensor is not None:
+        raise RobotError(
+            f"{place}: sensors.{robot.torque_sensor.name}: joint_torque is used with link_dynamics: free only; "
+            "remove the sensor, or set model.link_dynamics"
+        )
+
+
+def _check_springs(robot: Robot, place: str) -> None:
+    """Effects that act in a spring have one."""
+    for here in robot.effects:
+        spring = needed_spring(robot, here)
+        if spring:
+            raise RobotError(
+                f"{place}: effects: {here.label} acts in a spring, and {here.owner} is declared rigid; take "
+                f"{here.label} and its parameters out, then `jointscope add` brings it with {spring}"
+            )
+
+
+def _check_stamps(robot: Robot, place: str) -> None:
+    """Joints have their stamps from sensors that exist and that are stamped by themselves."""
+    held = {"command": robot.command} | ({} if robot.controller is None else {"controller": robot.controller.source})
+    for where, source in held.items():
+        if source.stamped_by:
+            raise RobotError(
+                f"{place}: {where}.stamped_by: expected only at encoders and torques, which are interpolated; a "
+                "command acts from its stamp until the next one"
+            )
+    sources = {f"sensors.{name}": s.source for name, s in robot.sensors.items()}
+    known = [name for name, sensor in robot.sensors.items() if not sensor.source.stamped_by]
+    for where, source in sources.items():
+        for name in source.stamped_by:
+            if name not in (BY_MESSAGE, *known):
+                raise RobotError(
+                    f"{place}: {where}.stamped_by: expected {BY_MESSAGE!r} or a sensor with stamps of its own, got "
+                    f"{name!r}{did_you_mean(name, known)}"
+                )
+
+
+def _check_names(robot: Robot, place: str) -> None:
+    """Sensors have names of their own, and there is one motor encoder."""
+    taken = {"command", "motor", "robot", *robot.joints}
+    for name in robot.sensors:
+        if name in taken:
+            raise RobotError(f"{place}: sensors.{name}: the name {name!r} is taken; give the sensor another one")
+    encoders = [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder)]
+    for kind in (LinkEncoder, TorqueSensor):
+        same = [name for name, sensor in robot.sensors.items() if isinstance(sensor, kind)]
+        if len(same) > 1:
+            raise RobotError(f"{place}: sensors: expected at most one of each kind but gyro, got {', '.join(same)}")
+    if len(encoders) > 1:
+        raise RobotError(f"{place}: sensors: expected one of kind motor_encoder, got {', '.join(encoders)}")
+
+
+def _check_positions(robot: Robot, place: str) -> None:
+    """Encoders measure angles of joints that turn and lengths of those that slide."""
+    for sensor in robot.sensors.values():
+        if not isinstance(sensor, MotorEncoder | LinkEncoder):
+            continue
+        given = sensor.source.bag_units(robot.n)
+        for joint, unit, got in zip(robot.joints, sensor.units, given, strict=True):
+            if unit != robot.unit_at(joint, "rad"):
+                kind, wanted = ("prismatic", "m or mm") if unit == "rad" else ("no prismatic joint", "rad, deg or turn")
+                raise RobotError(
+                    f"{place}: sensors.{sensor.name}.unit: {joint} is {kind} in {robot.tree.urdf.name}; expected "
+                    f"{wanted} for it, got {got!r}; where joints differ give one unit for each, as unit: [rad, m]"
+                )
+
+
+def _check_gyro_forms(robot: Robot, place: str) -> None:
+    """The forms of the paper hold only where the first joint, and no other, moves the gyro or its reference."""
+    by_name = {gyro.name: gyro for gyro in robot.gyros}
+    for gyro in robot.gyros:
+        seat = (
+            gyro if gyro.form == "vertical" else by_name.get(str(gyro.reference)) if gyro.form == "relative" else None
+        )
+        if seat is not None and robot.tree.joints_below(seat.body) != (0,):
+            raise RobotError(
+                f"{place}: sensors.{gyro.name}.form: {gyro.form} needs {seat.name} on the body that {robot.joints[0]} "
+                f"moves, got {seat.body!r}; use form full"
+            )
+
+
+def _check_parameters(robot: Robot, place: str) -> None:
+    """All parameters known, in their units, and none missing."""
+    turning = next((joint for joint in robot.joints if joint not in robot.tree.slides), robot.joints[0])
+    units = {f"motor.{name}": robot.unit_at(turning, unit) for name, unit in DRIVE_PARAMETERS.items()}
+    for joint in robot.joints:
+        for name, unit in (DRIVE_PARAMETERS | JOINT_PARAMETERS | MAY_HAVE).items():
+            units[f"{joint}.{name}"] = robot.unit_at(joint, unit)
+    of_effects = {
+        here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_at(robot, here.owner)
+    }
+    units |= of_effects
+    for name, parameter in robot.parameters.items():
+        if name not in units:
+            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
+        if parameter.unit != units[name]:
+            raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
+    if robot.free_links:
+        return
+    needed = (*robot.drive_laws, "inertia")
+    for joint in robot.joints:
+        for name in needed:
+            if not {f"{joint}.{name}", f"motor.{name}"} & set(robot.parameters):
+                raise RobotError(f"{place}: parameters: 'motor.{name}' is missing, or '{joint}.{name}'")
+        for name in JOINT_PARAMETERS:
+            if joint in robot.choices.rigid_joints and name != "coulomb_torque":
+                continue
+            if f"{joint}.{name}" not in robot.parameters:
+                raise RobotError(f"{place}: parameters: '{joint}.{name}' is missing")
+    for name in of_effects:
+        if name not in robot.parameters:
+            raise RobotError(f"{place}: parameters: '{name}' is missing; its effect is listed under effects")

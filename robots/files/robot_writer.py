@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes a calibrated robot as a robot file again: same document, same comments, new numbers and their origin."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from jointscope.robots.files.robot_file import dump_document, urdf_reference
+from jointscope.robots.model.robot import Robot
+
+
+def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None = None) -> str:
+    """The robot file of a robot.
+
+    Args:
+        robot: a calibrated robot; its `document` gives layout and comments.
+        folder: where the file will lie; the URDF is named relative to it.
+        provenance: how the numbers came about (bags with hashes, version, date); becomes the section `calibration`.
+
+    Returns:
+        YAML text.
+    """
+    document = copy.deepcopy(robot.document)
+    document["urdf"] = urdf_reference(robot.tree.urdf, folder)
+    _write_locked(document, (robot.as_filed or robot.tree).locked)
+    if robot.command.held is not None:
+        document["command"]["held"] = robot.command.held
+    for name, parameter in robot.parameters.items():
+        if parameter.fixed:
+            continue
+        entry = document["parameters"][name]
+        entry["value"] = _rounded(parameter.value)
+        if parameter.sigma is not None:
+            entry["sigma"] = _rounded(parameter.sigma, 3)
+        entry.setdefault("prior", _rounded(parameter.prior))
+        entry.setdefault("prior_sigma", _rounded(parameter.prior_sigma))
+    for encoder in (robot.motor_encoder, robot.link_encoder):
+        if encoder is not None:
+            _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)
+    for gyro in robot.gyros:
+        entry = document["sensors"][gyro.name]
+        bias = entry.setdefault("bias", _flow({}))
+        bias["value"] = _row(gyro.bias)
+        rotation = entry["R_imu_body"]
+        if "prior" not in rotation:
+            rotation.insert(1, "prior", _matrix(gyro.R_prior))
+        rotation["value"] = _matrix(gyro.R_imu_body)
+        if gyro.bias_sigma is not None:
+            bias["sigma"] = _row(gyro.bias_sigma, 3)
+        if gyro.R_sigma is not None:
+            rotation.pop("sigma", None)
+            rotation.insert(1, "sigma", _row(gyro.R_sigma, 3))
+    if not robot.free_links:
+        _write_noise(document["noise"], robot)
+    if provenance is not None:
+        document["calibration"] = _plain(provenance)
+    return dump_document(document)
+
+
+def _write_locked(document: Any, locked: Mapping[str, float]) -> None:
+    """Where other joints are locked; entries that are there already stay as they are."""
+    new = {joint: _rounded(position) for joint, position in locked.items()}
+    if "locked" in document:
+        for joint, position in new.items():
+            if document["locked"].get(joint) != position:
+                document["locked"][joint] = position
+    elif new:
+        keys = list(document)
+        # behind the joints, unless a comment hangs there that belongs to what follows
+        place = keys.index("joints") + 1 if "joints" not in document.ca.items else len(keys)
+        document.insert(place, "locked", _flow(new))
+
+
+def _write_sigmas(entry: Any, sigmas: np.ndarray) -> None:
+    """Sigmas of an encoder, as they stand in the document where they have not changed; a list where they differ."""
+    if np.allclose(np.broadcast_to(np.asarray(entry["sigma"], float), sigmas.shape), sigmas, rtol=1e-6, atol=0.0):
+        return
+    entry["sigma"] = _rounded(sigmas[0], 3) if np.ptp(sigmas) == 0.0 else _row(sigmas, 3)
+
+
+def _write_noise(section: Any, robot: Robot) -> None:
+    """Densities of the joints as lists, those that effects bring along by name."""
+    layout, noise = robot.layout, robot.noise
+    section["link_velocity"] = _row(noise.link_velocity[layout.joint_link], 4)
+    motors = dict(zip(layout.motors, noise.motor_velocity, strict=True))
+    before = dict(zip(layout.joints, section["motor_velocity"], strict=True))
+    section["motor_velocity"] = _row(np.array([motors.get(joint, before[joint]) for joint in layout.joints]), 4)
+    own = {name: v for name, v in zip(layout.links, noise.link_velocity, strict=True) if name not in layout.joints}
+    own |= dict(zip(layout.memories, noise.memory, strict=True))
+    if own:
+        section["effects"] = _flow({name: _rounded(value, 4) for name, value in own.items()})
+
+
+def _rounded(value: float, digits: int = 9) -> float:
+    """A number without the digits that nobody can measure."""
+    return float(f"{float(value):.{digits}g}")
+
+
+def _row(values: np.ndarray, digits: int = 9) -> CommentedSeq:
+    row = CommentedSeq([_rounded(v, digits) for v in values])
+    row.fa.set_flow_style()
+    return row
+
+
+def _matrix(values: np.ndarray) -> CommentedSeq:
+    matrix = CommentedSeq([_row(row) for row in values])
+    matrix.fa.set_flow_style()
+    return matrix
+
+
+def _flow(content: Mapping[str, Any]) -> CommentedMap:
+    mapping = CommentedMap(content)
+    mapping.fa.set_flow_style()
+    return mapping
+
+
+def _plain(value: Any) -> Any:
+    """Python values as YAML nodes."""
+    if isinstance(value, Mapping):
+        return CommentedMap({key: _plain(v) for key, v in value.items()})
+    if isinstance(value, list | tuple):
+        return CommentedSeq([_plain(v) for v in value])
+    return value

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sections of a robot file that say where a signal is recorded and what a sensor is like."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.parts.sensors import (
+    BY_MESSAGE,
+    RIGHT_FROM_LEFT,
+    Gyro,
+    LinkEncoder,
+    MotorEncoder,
+    Sensor,
+    Topic,
+    TorqueSensor,
+)
+from jointscope.robots.units import UNITS, si_unit
+from jointscope.robots.yaml_section import Section
+
+Array = NDArray[np.float64]
+
+GYRO_FORMS = ("full", "vertical", "relative")
+KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro")
+UNKNOWN = "unknown"
+
+
+def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = (), scaled: bool = False) -> Topic:
+    """Where a signal is in a recording.
+
+    Args:
+        section: with topic, type, field, unit and names.
+        joints: names to expect where the signal has one channel per joint.
+        units: units to choose from; all known ones if empty.
+        scaled: whether each joint may have a factor of its own, such as the ratio of its gear.
+
+    Raises:
+        RobotError: another number of names, or of sensors with stamps, than of joints.
+    """
+    known = units or tuple(UNITS)
+    each = _unit_of_each(section, joints, known) if scaled else ()
+    unit = each[0] if each else section.text("unit", choices=known)
+    names = section.texts("names", joints)
+    if joints and len(names) != len(joints):
+        raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
+    scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
+    wraps = section.number("wraps", None, positive=True) if scaled else None
+    place = section.text("topic"), section.text("type"), section.text("field")
+    return Topic(*place, unit, names, scale, wraps or 0.0, each, _stamped_by(section, joints))
+
+
+def _stamped_by(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
+    """The sensor with the stamps of each joint; empty where the message has those of all."""
+    sensors = section.texts("stamped_by", ()) if joints else ()
+    if sensors and len(sensors) != len(joints):
+        raise RobotError(
+            f"{section.place}.stamped_by: expected a sensor, or {BY_MESSAGE!r}, for each of the {len(joints)} joints, "
+            f"got {len(sensors)}"
+        )
+    return sensors if any(sensor != BY_MESSAGE for sensor in sensors) else ()
+
+
+def _unit_of_each(section: Section, joints: tuple[str, ...], known: tuple[str, ...]) -> tuple[str, ...]:
+    """Units given joint by joint, as turning and sliding ones need; empty where there is one for all."""
+    if isinstance(section.raw("unit"), str) or "unit" not in section:
+        return ()
+    each = section.texts("unit")
+    wrong = [unit for unit in each if unit not in known]
+    if wrong or len(each) != len(joints):
+        got = repr(wrong[0]) if wrong else f"{len(each)} units"
+        raise RobotError(f"{section.place}.unit: expected one unit or {len(joints)} of {', '.join(known)}, got {got}")
+    return each
+
+
+def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
+    """What makes a sensor of its section.
+
+    Args:
+        name: of the sensor.
+        joints: names of the robot's joints.
+    """
+
+    def make(section: Section) -> Sensor:
+        kind = section.text("kind", choices=KINDS)
+        if kind == "gyro":
+            return _gyro(name, section)
+        if kind == "joint_torque":
+            return _torque_sensor(name, section, joints)
+        return (_motor_encoder if kind == "motor_encoder" else _link_encoder)(name, section, joints)
+
+    return make
+
+
+def _position(section: Section, joints: tuple[str, ...]) -> tuple[Topic, Array]:
+    """Topic of an encoder, and its sigma for each joint: one number for all, or a list."""
+    source = topic(section, joints, scaled=True)
+    for unit in source.bag_units(len(joints)):
+        if si_unit(unit) not in ("rad", "m"):
+            raise RobotError(f"{section.place}.unit: an encoder measures an angle or a length, got {unit!r}")
+    if not isinstance(section.raw("sigma"), Sequence):
+        return source, np.full(len(joints), section.number("sigma", positive=True))
+    sigmas = section.array("sigma", (len(joints),))
+    if np.any(sigmas <= 0.0):
+        raise RobotError(f"{section.place}.sigma: expected numbers above zero, got {sigmas.tolist()}")
+    return source, sigmas
+
+
+def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
+    source, sigmas = _position(section, joints)
+    zero_known = section.raw("zero") != UNKNOWN
+    zero = section.array("zero", (len(joints),), np.zeros(len(joints))) if zero_known else np.zeros(len(joints))
+    return MotorEncoder(name, source, sigmas, zero, joints, zero_known, section.flag("estimate_sigma", True))
+
+
+def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:
+    source, sigmas = _position(section, joints)
+    zero = section.array("zero", (len(joints),), np.zeros(len(joints)))
+    return LinkEncoder(name, source, sigmas, zero, joints, section.flag("estimate_sigma", True))
+
+
+def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> TorqueSensor:
+    source = topic(section, joints)
+    if source.unit != "N m":
+        raise RobotError(f"{section.place}.unit: expected 'N m', got {source.unit!r}")
+    return TorqueSensor(name, source, section.number("sigma", positive=True), joints)
+
+
+def _gyro(name: str, section: Section) -> Gyro:
+    source = topic(section)
+    if si_unit(source.unit) != "rad/s":
+        raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {source.unit!r}")
+    left_handed = section.flag("left_handed", False)
+    if left_handed:
+        source = replace(source, scale=RIGHT_FROM_LEFT)
+    form = section.text("form", "full", GYRO_FORMS)
+    bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
+    rotation = section.section("R_imu_body")
+    R = _rotation(rotation.array("value", (3, 3)), rotation.place)
+    gyro = Gyro(
+        name=name,
+        source=source,
+        body=section.text("body"),
+        form=form,
+        sigma=section.number("sigma", positive=True),
+        bias=bias.array("value", (3,)),
+        bias_prior_sigma=bias.number("prior_sigma", 0.1, positive=True),
+        R_imu_body=R,
+        R_prior=_rotation(rotation.array("prior", (3, 3), R), rotation.place),
+        R_prior_sigma=rotation.number("prior_sigma", 0.1, positive=True),
+        reference=section.text("reference") if form == "relative" else None,
+        bias_sigma=bias.array("sigma", (3,), None),
+        R_sigma=rotation.array("sigma", (3,), None),
+        left_handed=left_handed,
+    )
+    bias.finish()
+    rotation.finish()
+    return gyro
+
+
+def _rotation(R: Array, place: str) -> Array:
+    """The rotation nearest to a printed matrix, which has few digits."""
+    U, _, Vt = np.linalg.svd(R)
+    nearest = U @ Vt
+    if np.linalg.det(nearest) < 0 or np.abs(nearest - R).max() > 0.02:
+        mirrored = np.linalg.det(R) < -0.9
+        hint = "; axes that are left-handed: negate the first row and set `left_handed: true`" if mirrored else ""
+        raise RobotError(
+            f"{place}: not a rotation matrix (determinant {np.linalg.det(R):.3f}); expected R R^T = 1{hint}"
+        )
+    return nearest

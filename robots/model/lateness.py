@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How late the stamps of a sensor's channels are, summed over a robot's effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import MotorEncoder
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """Lateness of m samples.
+
+    Attributes:
+        effects: what makes them late.
+        stamps: times since the start of the recording, shape (m,) [s].
+        anchor: lateness at which the samples were placed, shape (m,) [s].
+    """
+
+    effects: tuple[EffectAt, ...]
+    stamps: Array
+    anchor: Array
+
+    @staticmethod
+    def of(robot: Robot, effects: tuple[EffectAt, ...], stamps: Array) -> Lateness:
+        """Samples placed where the robot's present values say."""
+        nowhere = Lateness(effects, stamps, np.zeros(len(stamps)))
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        return replace(nowhere, anchor=nowhere.since_anchor(values)[0])
+
+    def since_anchor(self, values: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
+        """Lateness beyond the anchor and its derivatives by parameters, by full name, shape (m,) each [s]."""
+        late, slopes = -self.anchor, dict[str, Array]()
+        for here in self.effects:
+            assert isinstance(here.effect, TimeShift)
+            own = {p.name: values[here.parameter(p.name)] for p in here.effect.parameters}
+            added, by = here.effect.late(self.stamps, own)
+            late = late + added
+            slopes |= {here.parameter(name): slope for name, slope in by.items()}
+        return late, slopes
+
+
+def late_channels(robot: Robot, name: str) -> list[tuple[NDArray[np.intp], tuple[EffectAt, ...]]]:
+    """Channels of a sensor in groups that share the same lateness, and what makes each group late."""
+    sensor = robot.sensors[name]
+    groups: dict[tuple[str, ...], tuple[list[int], tuple[EffectAt, ...]]] = {}
+    for j in range(len(sensor.channels)):
+        effects = tuple(here for here in robot.effects if shifts(here, robot, name, j))
+        groups.setdefault(tuple(here.label for here in effects), ([], effects))[0].append(j)
+    return [(np.array(channels, dtype=np.intp), effects) for channels, effects in groups.values()]
+
+
+def shifts(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
+    """Whether an effect makes a channel late."""
+    if not isinstance(here.effect, TimeShift):
+        return False
+    encoder = isinstance(robot.sensors[name], MotorEncoder)
+    if here.owner == "robot":
+        return here.effect.sensors == "all" or (here.effect.sensors == "encoder") == encoder
+    return (encoder and robot.joints[channel] == here.owner) or here.owner == name

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the sensors read at one state, with Jacobians: the equations of the sensor factors, fast enough for a loop.
+
+    encoder  q_motor + zero + errors of effects, or q_link + zero
+    gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
+
+A test holds it against the factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Gyro, MotorEncoder, Sensor
+
+Array = NDArray[np.float64]
+STEP = 1e-30  # [unit of the signal] of complex derivatives
+
+
+class ReadingsAtOneState:
+    """Predicted readings of all sensors of a robot.
+
+    Args:
+        robot: sensors, effects and their parameters.
+    """
+
+    def __init__(self, robot: Robot):
+        self._layout, tree = robot.layout, robot.kinematic_tree
+        self._model, self._data = tree.model, tree.model.createData()
+        self._zeros, self._coupling = np.zeros(tree.model.nv), tree.coupling
+        self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
+        encoder = robot.motor_encoder
+        self._encoder = np.zeros((robot.n, robot.layout.size))
+        self._encoder[np.arange(robot.n), robot.layout.motor_q] = 1.0
+        self._zero = np.asarray(encoder.zero, dtype=float)
+        self._link_encoder = robot.link_encoder
+        self._links = np.zeros((robot.n, robot.layout.size))
+        self._links[np.arange(robot.n), robot.layout.joint_q] = 1.0
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._errors = {name: _errors_of(robot, sensor, values) for name, sensor in robot.sensors.items()}
+        self._at: Array | None = None
+
+    def read(self, name: str, x: Array, time: float) -> tuple[Array, Array]:
+        """Reading of a sensor without its bias, and its derivative by the state.
+
+        Args:
+            name: of the sensor.
+            x: state, shape (d,).
+            time: stamp of the sample [s].
+
+        Returns:
+            Shapes (c,) and (c, d).
+        """
+        if name in self._gyros:
+            reading, J = self._rate(name, x)
+            offset: Array | float = 0.0
+        elif self._link_encoder is not None and name == self._link_encoder.name:
+            reading, J, offset = self._links @ x, self._links, self._link_encoder.zero
+        else:
+            reading, J, offset = self._encoder @ x, self._encoder, self._zero
+        for here, channels, p in self._errors[name]:
+            reading, J = _disturbed(here, channels, p, reading, J, time)
+        return reading + offset, J
+
+    def _rate(self, name: str, x: Array) -> tuple[Array, Array]:
+        layout, coupling = self._layout, self._coupling
+        if self._at is not x:  # all gyros at one state share the kinematics
+            q, v = x[layout.q_link], x[layout.v_link]
+            if coupling is not None:
+                q, v = coupling.positions(q), coupling.rates(v)
+            pin.computeForwardKinematicsDerivatives(self._model, self._data, q, v, self._zeros)
+            self._at = x
+        frame, R = self._gyros[name]
+        local = pin.ReferenceFrame.LOCAL
+        by_q, by_v = pin.getFrameVelocityDerivatives(self._model, self._data, frame, local)
+        omega_body = pin.getFrameVelocity(self._model, self._data, frame, local).angular
+        J = np.zeros((3, layout.size))
+        by_q, by_v = R @ by_q[3:], R @ by_v[3:]
+        if coupling is not None:
+            by_q, by_v = by_q @ coupling.G, by_v @ coupling.G
+        J[:, layout.q_link], J[:, layout.v_link] = by_q, by_v
+        return R @ omega_body, J
+
+
+def _errors_of(
+    robot: Robot, sensor: Sensor, values: Mapping[str, float]
+) -> list[tuple[ReadingEffect, NDArray[np.intp], dict[str, float]]]:
+    """Effects on a sensor's reading, the channels that each acts on, and its parameters."""
+    if isinstance(sensor, Gyro):
+        seats = {sensor.name: np.arange(len(sensor.channels))}
+    elif isinstance(sensor, MotorEncoder):
+        seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
+    else:
+        seats = {}
+    return [
+        (here.effect, seats[here.owner], here.own(values))
+        for here in robot.effects
+        if isinstance(here.effect, ReadingEffect) and here.owner in seats
+    ]
+
+
+def _disturbed(
+    effect: ReadingEffect, channels: NDArray[np.intp], p: Mapping[str, float], reading: Array, J: Array, time: float
+) -> tuple[Array, Array]:
+    """Reading and derivative with one more effect; errors add up, each a function of the reading before it."""
+    c = len(channels)
+    moves = 1j * STEP * np.vstack([np.zeros((1, c)), np.eye(c)])
+    found = np.asarray(effect.law(reading[channels] + moves, np.full(c + 1, time), p))
+    changed, by_state = reading.copy(), J.copy()
+    changed[channels] += found[0].real
+    by_state[channels] += (found[1:].imag / STEP).T @ J[channels]
+    return changed, by_state

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot with elastic joints: rigid tree, drives, sensors, parameters and their priors.
+
+A Robot is immutable; a calibration returns a new one. It is read from and written to a robot file (robot_file.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.effect_kinds.effect import Effect
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.errors import RobotError
+from jointscope.robots.model.structured_tree import bearing_names, with_bearings
+from jointscope.robots.parts.model_choices import ModelChoices
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.position_controller import PositionController
+from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
+from jointscope.robots.parts.state_layout import StateLayout
+from jointscope.robots.units import joined, of_slide
+
+SHARPNESS = "friction_sharpness"  # of a joint whose dry friction turns over as its own parameter says
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProcessNoise:
+    """Random torques, as the random walk of the velocities that they cause.
+
+    Attributes:
+        estimate: whether a calibration estimates the densities.
+        model: "integrated" (the positions follow from the velocities) or "independent" (eq. 36).
+        link_velocity: density of the torque on each link coordinate over its inertia at zero angles, shape (n_link,)
+            [rad/s/sqrt(s)].
+        motor_velocity: density of each motor equation, shape (n_motor,) [rad/s/sqrt(s)].
+        memory: density of each memory of the state, shape (n_memory,).
+        position: density of the positions for model "independent" [rad/sqrt(s)].
+        smallest: of link and motor velocities, below which rounding in the Hessian and the integration error take over,
+            shape (n_link + n_motor,).
+    """
+
+    estimate: bool
+    model: str
+    link_velocity: Array
+    motor_velocity: Array
+    position: float = 0.0
+    memory: Array = field(default_factory=lambda: np.zeros(0))
+    smallest: Array = field(default_factory=lambda: np.array(1e-3))
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Everything that is known about a robot.
+
+    Attributes:
+        name: short name.
+        description: one sentence.
+        tree: rigid bodies.
+        joints: names of the joints, base to tip.
+        choices: model choices.
+        constants: known numbers by name ("motor.supply_voltage" [V]).
+        command: where the commands are; its unit is "duty", "V", "A" or "N m".
+        sensors: by name.
+        parameters: by full name, in the order of the file.
+        noise: process noise, in the order of `layout`.
+        effects: physical effects that were added to the base model.
+        controller: that of drives which are commanded by a position; None for others, or where it is not known.
+        path: the file it was read from.
+        document: the file's content with comments, for writing it again.
+        held_at_mean: joints in `locked` that move in recordings, and are held on the user's word.
+        as_filed: the rigid bodies as the file has them, where `tree` is in another posture.
+    """
+
+    name: str
+    description: str
+    tree: RigidTree
+    joints: tuple[str, ...]
+    choices: ModelChoices
+    constants: Mapping[str, float]
+    command: Topic
+    sensors: Mapping[str, Sensor]
+    parameters: Mapping[str, Parameter]
+    noise: ProcessNoise
+    path: Path
+    document: Any
+    effects: tuple[EffectAt, ...] = ()
+    controller: PositionController | None = None
+    as_filed: RigidTree | None = None
+    held_at_mean: tuple[str, ...] = ()
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def motor_encoder(self) -> MotorEncoder:
+        """The encoders on the motors."""
+        for sensor in self.sensors.values():
+            if isinstance(sensor, MotorEncoder):
+                return sensor
+        raise RobotError(f"robot {self.name!r} has no sensor of kind motor_encoder")
+
+    @property
+    def link_encoder(self) -> LinkEncoder | None:
+        """The encoders on the links, where there are any."""
+        return next((sensor for sensor in self.sensors.values() if isinstance(sensor, LinkEncoder)), None)
+
+    @property
+    def torque_sensor(self) -> TorqueSensor | None:
+        """The sensors of the torques in the joints, where there are any."""
+        return next((sensor for sensor in self.sensors.values() if isinstance(sensor, TorqueSensor)), None)
+
+    @property
+    def free_links(self) -> bool:
+        """Whether the links' masses are not known, so that there are no equations of motion."""
+        return self.choices.link_dynamics == "free"
+
+    def need_link_dynamics(self) -> None:
+        """Complains about a robot without equations of motion.
+
+        Raises:
+            RobotError: its links are free.
+        """
+        if self.free_links:
+            raise RobotError(
+                f"{self.name} has link_dynamics: free, so there are no equations of motion to predict with; "
+                "`calibrate` and `discover` compare motors, links and gyros without them"
+            )
+
+    @property
+    def gyros(self) -> tuple[Gyro, ...]:
+        """All gyroscopes."""
+        return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, Gyro))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of all measured channels."""
+        return tuple(channel for sensor in self.sensors.values() for channel in sensor.channels)
+
+    @cached_property
+    def layout(self) -> StateLayout:
+        """Where everything is in a state vector."""
+        soft = [here.owner for here in self.effects if _is(here.effect, "bearing")]
+        elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
+        links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
+        motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
+        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(self.memories))
+
+    @cached_property
+    def kinematic_tree(self) -> RigidTree:
+        """The rigid bodies with the hinges of soft bearings, and with Coriolis terms where an effect scales them."""
+        soft = tuple(here.owner for here in self.effects if _is(here.effect, "bearing"))
+        tree = self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
+        return tree.with_coriolis(True) if any(_is(here.effect, "coriolis") for here in self.effects) else tree
+
+    @property
+    def memories(self) -> dict[str, Memory]:
+        """States that effects bring along, by the label of the effect, in the order of the layout."""
+        laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
+        return {label: law.memory for label, law in laws if law.memory is not None}
+
+    def unit_at(self, owner: str, unit: str) -> str:
+        """The unit of a quantity at an owner, where `unit` is that at a joint that turns."""
+        return of_slide(unit) if owner in self.tree.slides else unit
+
+    def unit(self, unit: str) -> str:
+        """The units of a quantity of all joints, where `unit` is that at joints that turn: "rad", "m" or "rad, m"."""
+        return joined([self.unit_at(joint, unit) for joint in self.joints])
+
+    def has_effect(self, effect_id: str, owner: str) -> bool:
+        """Whether an effect is part of the robot."""
+        return any(here.effect.id == effect_id and here.owner == owner for here in self.effects)
+
+    @property
+    def command_volts(self) -> float:
+        """Volts per unit of command, where the command is a duty cycle or a voltage."""
+        return self.constants.get("motor.supply_voltage", 1.0) if self.command.unit == "duty" else 1.0
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name.
+
+        Raises:
+            RobotError: there is none; the message lists the names.
+        """
+        if name not in self.parameters:
+            raise RobotError(f"robot {self.name!r} has no parameter {name!r}; it has {', '.join(self.parameters)}")
+        return self.parameters[name]
+
+    @property
+    def command_held(self) -> bool:
+        """Whether a value of the drive signal acts until the next one; a measured one runs on between its samples.
+
+        One that comes with the positions, in the same message, was measured, unless the robot file says otherwise.
+        """
+        if self.command.held is not None:
+            return self.command.held
+        return self.command.topic not in (sensor.source.topic for sensor in self.sensors.values())
+
+    @property
+    def drive_gain(self) -> str | None:
+        """Law that turns commands into torques: of a voltage, of a current; None where the command is a torque."""
+        return {"N m": None, "A": "torque_constant"}.get(self.command.unit, "k_pwm")
+
+    def friction_sharpness(self, values: Mapping[str, float] | None = None) -> Array:
+        """Sharpness k in tanh(k v) of the dry friction of every joint, shape (n,) [s/rad, of joints that slide s/m].
+
+        Args:
+            values: parameters by full name that count before the robot's own.
+        """
+        return np.array([self.sharpness_of(joint, values) for joint in self.joints])
+
+    def sharpness_of(self, joint: str, values: Mapping[str, float] | None = None) -> float:
+        """The same of one joint: its own parameter if it has one, else that of the model's choices."""
+        name = f"{joint}.{SHARPNESS}"
+        if values is not None and name in values:
+            return values[name]
+        own = self.parameters.get(name)
+        return self.choices.friction_sharpness if own is None else own.value
+
+    @property
+    def drive_laws(self) -> tuple[str, ...]:
+        """The gain, where there is one, and the back-EMF of a motor that is driven by a voltage."""
+        gain = self.drive_gain
+        return () if gain is None else (gain, "k_mi") if gain == "k_pwm" else (gain,)
+
+    def drive_parameter(self, joint: str, name: str) -> Parameter:
+        """A parameter of a joint's drive: the joint's own if it has one, else the one all motors share."""
+        own = f"{joint}.{name}"
+        return self.parameters[own] if own in self.parameters else self.parameter(f"motor.{name}")
+
+    def with_values(self, values: Mapping[str, float]) -> Robot:
+        """The same robot with other parameter values, given by full name."""
+        parameters = dict(self.parameters)
+        for name, value in values.items():
+            parameters[name] = replace(self.parameter(name), value=float(value))
+        return replace(self, parameters=parameters)
+
+    def in_posture(self, positions: Mapping[str, float]) -> Robot:
+        """The same robot with other joints held as in a recording, beside or instead of where its file locks them.
+
+        Args:
+            positions: of joints of the URDF [rad] or [m]; others than those that matter are left out.
+        """
+        filed = self.as_filed or self.tree
+        held = filed.locked | filed.posture(positions)
+        if held == self.tree.locked:
+            return self
+        return replace(self, tree=filed.locked_at(held), as_filed=filed)
+
+    def locked_as_in(self, positions: Mapping[str, float]) -> Robot:
+        """The same robot whose file locks joints it does not name yet as in a recording."""
+        filed = self.as_filed or self.tree
+        locked = filed.posture(positions) | filed.locked
+        return replace(self, tree=filed.locked_at(locked), as_filed=None)
+
+    def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
+        """The same robot with some sensors replaced."""
+        return replace(self, sensors={**self.sensors, **sensors})
+
+
+def _is(effect: Effect, form: str) -> bool:
+    return isinstance(effect, Structure) and effect.form == form

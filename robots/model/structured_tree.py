@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rigid bodies as the model has them now: soft bearings inserted, inertias and Coriolis terms as parameters.
+
+Accelerations are M^-1 (tau - s c - g) with the scale s of the Coriolis terms; they are linear in s, and M is linear in
+every inertia parameter, so the derivatives by both follow from differences that are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
+from jointscope.robots.effect_kinds.structure import Structure
+
+if TYPE_CHECKING:
+    from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # of an inertia in pinocchio's dynamic parameters
+UNIT_CHANGE = 1e-3  # [kg m2] size of the change whose torque is taken as a difference; the torque is linear in it
+
+
+@dataclass(frozen=True)
+class InertiaChange:
+    """How one parameter changes one body.
+
+    Attributes:
+        name: full name of the parameter.
+        joint: index of the joint in pinocchio's model.
+        direction: change of the ten dynamic parameters per unit of the parameter, shape (10,).
+        offset: value of the parameter at which nothing changes.
+    """
+
+    name: str
+    joint: int
+    direction: Array
+    offset: float = 0.0
+
+
+class StructuredTree:
+    """Accelerations of a robot's link coordinates for given parameter values.
+
+    Args:
+        robot: the robot.
+
+    Attributes:
+        kinematics: the bodies with the inertias of the URDF.
+        coriolis_scale: name of the parameter that scales the Coriolis terms; None where they are all there, or none.
+    """
+
+    def __init__(self, robot: Robot):
+        self.kinematics: RigidTree = robot.kinematic_tree
+        self._changes = inertia_changes(robot, self.kinematics.model)
+        # name of the rotor's inertia, its row among the links, its coordinate in the model
+        self._armature = [
+            (
+                robot.drive_parameter(joint, "inertia").name,
+                int(robot.layout.joint_link[i]),
+                self.kinematics.coordinate(joint),
+            )
+            for i, joint in enumerate(robot.joints)
+            if joint not in robot.layout.motors
+        ]
+        self.coriolis_scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
+        self._cache: tuple[tuple[float, ...], RigidTree] | None = None
+
+    @property
+    def varies(self) -> bool:
+        """Whether any parameter changes the tree."""
+        return bool(self._changes or self._armature or self.coriolis_scale)
+
+    def acceleration(self, q: Array, v: Array, tau: Array, values: Mapping[str, float]) -> Array:
+        """Accelerations, shape (m, n_link) [rad/s^2]; arguments as those of `RigidTree.acceleration`."""
+        tree = self.bodies(values)
+        if self.coriolis_scale is None:
+            return tree.acceleration(q, v, tau)
+        s = values[self.coriolis_scale]
+        still = tree.acceleration(q, np.zeros_like(v), tau)
+        return still if s == 0.0 else still + s * (tree.acceleration(q, v, tau) - still)
+
+    def acceleration_derivatives(
+        self, q: Array, v: Array, tau: Array, values: Mapping[str, float]
+    ) -> tuple[Array, Array, Array, Array]:
+        """As `RigidTree.acceleration_derivatives`."""
+        tree = self.bodies(values)
+        if self.coriolis_scale is None:
+            return tree.acceleration_derivatives(q, v, tau)
+        s = values[self.coriolis_scale]
+        moving = tree.acceleration_derivatives(q, v, tau)
+        still = tree.acceleration_derivatives(q, np.zeros_like(v), tau)
+        a, da_dq = (still[i] + s * (moving[i] - still[i]) for i in (0, 1))
+        return a, da_dq, s * moving[2], moving[3]
+
+    def by_parameter(
+        self, q: Array, v: Array, tau: Array, a: Array, M_inverse: Array, values: Mapping[str, float]
+    ) -> dict[str, Array]:
+        """Derivatives of the accelerations by parameters of the tree, by name, shape (m, n_link) each."""
+        tree = self.bodies(values)
+        found: dict[str, Array] = {}
+        for change in self._changes:
+            torque = inertia_torque(
+                tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale]
+            )
+            found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
+        for name, link, _ in self._armature:
+            found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]
+        if self.coriolis_scale is not None:
+            found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
+        return found
+
+    def bodies(self, values: Mapping[str, float]) -> RigidTree:
+        """The bodies at these values."""
+        if not (self._changes or self._armature):
+            return self.kinematics
+        key = tuple([values[c.name] for c in self._changes] + [values[name] for name, *_ in self._armature])
+        if self._cache is None or self._cache[0] != key:
+            model = self.kinematics.model.copy()
+            for change in self._changes:
+                _change(model, change, values[change.name] - change.offset)
+            armature = np.array(model.armature)
+            for name, _, coordinate in self._armature:
+                armature[coordinate] = values[name]
+            model.armature = armature
+            self._cache = (key, self.kinematics.with_model(model))
+        return self._cache[1]
+
+
+def inertia_torque(tree: RigidTree, change: InertiaChange, q: Array, v: Array, a: Array, coriolis: float) -> Array:
+    """Torque that a unit of a parameter asks for at given motion, shape (m, n_link) [N m]."""
+    model = tree.model.copy()
+    size = UNIT_CHANGE / max(float(np.abs(change.direction).max()), 1e-12)
+    _change(model, change, size)
+    other = tree.with_model(model)
+
+    def more(velocity: Array) -> Array:
+        return (other.torque(q, velocity, a) - tree.torque(q, velocity, a)) / size
+
+    share = coriolis if tree.coriolis else 0.0
+    if share == 1.0:
+        return more(v)
+    still = more(np.zeros_like(v))
+    return still if share == 0.0 else still + share * (more(v) - still)  # linear in the share, beyond 0 and 1, too
+
+
+def inertia_changes(robot: Robot, model: pin.Model) -> list[InertiaChange]:
+    """All parameters of the robot's effects that change a body."""
+    found = []
+    for here in robot.effects:
+        joint = model.getJointId(here.owner) if model.existJointName(here.owner) else 0
+        if isinstance(here.effect, InertiaEffect):
+            present = inertia_about_joint(model, joint)
+            for name, direction in here.effect.change(present).items():
+                found.append(InertiaChange(here.parameter(name), joint, np.asarray(direction, float)))
+        elif _form(here.effect) == "bearing":
+            present = inertia_about_joint(model, joint)
+            for name, (i, k) in hidden_inertias(model, joint).items():
+                direction = np.zeros(10)
+                direction[4 + ENTRIES.index((min(i, k), max(i, k)))] = 1.0
+                found.append(InertiaChange(here.parameter(name), joint, direction, float(present[i, k])))
+    return found
+
+
+def hidden_inertias(model: pin.Model, joint: int) -> dict[str, tuple[int, int]]:
+    """Entries of a body's inertia that turning about its joint alone never shows, by the parameter that holds them.
+
+    x and y are the coordinate axes of the joint's frame across its axis, z is the third one.
+    """
+    x, y = across_axes(model, joint)
+    z = 3 - x - y
+    return {"inertia_x": (x, x), "inertia_y": (y, y), "product_xy": (x, y), "product_xz": (x, z), "product_yz": (y, z)}
+
+
+def inertia_about_joint(model: pin.Model, joint: int) -> Array:
+    """Inertia of the body that a joint moves, about the origin of its joint frame, shape (3, 3) [kg m2]."""
+    xx, xy, yy, xz, yz, zz = model.inertias[joint].toDynamicParameters()[4:]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:
+    """The two coordinate axes of a joint's frame that lie across its axis, in order."""
+    first, second = np.sort(np.argsort(np.abs(joint_axis(model, joint)))[:2])
+    return int(first), int(second)
+
+
+def joint_axis(model: pin.Model, joint: int) -> Array:
+    """Axis of a revolute joint in its own frame, shape (3,); zero for a prismatic one."""
+    return joint_motion_axis(model, joint)[3:]
+
+
+def joint_motion_axis(model: pin.Model, joint: int) -> Array:
+    """What a joint does at unit velocity, in its own frame: linear, then angular, shape (6,)."""
+    jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
+    # a single column comes back as a vector
+    return np.array(jacobian.reshape(6, model.nv)[:, model.joints[joint].idx_v])
+
+
+def bearing_names(joint: str) -> tuple[str, str]:
+    """Names of the two hinges of a soft bearing."""
+    return f"{joint}.bearing_x", f"{joint}.bearing_y"
+
+
+def with_bearings(model: pin.Model, joints: tuple[str, ...]) -> pin.Model:
+    """The model with two hinges, across the axis, before each of the joints."""
+    hinges = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+    new = pin.Model()
+    new.name, new.gravity = model.name, model.gravity
+    ids = {0: 0}
+    for j in range(1, model.njoints):
+        name, parent, placement = model.names[j], ids[model.parents[j]], model.jointPlacements[j]
+        if name in joints:
+            for hinge, k in zip(bearing_names(name), across_axes(model, j), strict=True):
+                parent = new.addJoint(parent, hinges[k](), placement, hinge)
+                placement = pin.SE3.Identity()
+        ids[j] = new.addJoint(parent, model.joints[j], placement, name)
+        new.appendBodyToJoint(ids[j], model.inertias[j], pin.SE3.Identity())
+    for frame in list(model.frames)[1:]:
+        if frame.type == pin.FrameType.BODY:
+            new.addFrame(pin.Frame(frame.name, ids[frame.parentJoint], 0, frame.placement, frame.type), False)
+    return new
+
+
+def _change(model: pin.Model, change: InertiaChange, amount: float) -> None:
+    parameters = model.inertias[change.joint].toDynamicParameters() + amount * change.direction
+    model.inertias[change.joint] = pin.Inertia.FromDynamicParameters(parameters)
+
+
+def _form(effect: object) -> str:
+    return effect.form if isinstance(effect, Structure) else ""

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Can this recording be a measurement of this robot? Errors for what cannot be, notices for what looks odd."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.encoder_gyro_scale import check_scales
+from jointscope.robots.recordings.gyro_plausibility import check_gyros
+from jointscope.robots.recordings.held_joints import about_bodies
+from jointscope.robots.recordings.joint_motion import JointMotion, joint_motion
+from jointscope.robots.recordings.motor_zero import with_motor_zero
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
+from jointscope.robots.recordings.resting_joints import (
+    MOVED_ANGLE,
+    joints_without_motion,
+    must_move,
+    what_it_cannot_tell,
+)
+from jointscope.robots.recordings.wrapped_counter import wrapping_jump
+from jointscope.robots.units import UNITS, si_factor, si_unit
+
+Array = NDArray[np.float64]
+
+MIN_SECONDS = 0.3  # [s]
+FROZEN_SAMPLES, FROZEN_SECONDS = 20, 0.1  # [1], [s] a gyro does not repeat itself that often by chance
+MIN_SAMPLES = 100  # of each sensor
+BEYOND_LIMIT = 1.2  # times the robot's limit: odd
+IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
+DUTY_LIMIT = 1.0 + 1e-6
+PERCENT = 100.0
+OVER_VOLTAGE = 1.2  # times the supply
+
+
+def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
+    """Screens a recording.
+
+    Args:
+        recording: what was measured.
+        robot: what it was measured on.
+        every_joint: demand that every joint moves, as a calibration from this recording alone does; otherwise a
+            joint at rest is a notice.
+
+    Returns:
+        What looks odd.
+
+    Raises:
+        RecordingError: a stream is empty, too short, not finite, constant, outside the others' time or in the wrong
+            unit, or nothing moves.
+    """
+    for stream in recording.streams.values():
+        _check_samples(stream)
+    for sensor in (robot.motor_encoder, robot.link_encoder):
+        if sensor is not None:
+            _check_wraps(recording.streams[sensor.name], sensor.units)
+    recording = with_motor_zero(recording, robot)
+    notices = [*about_bodies(recording, robot), *_check_overlap(recording)]
+    robot = robot.in_posture(recording.posture)
+    _check_command(recording.command, robot)
+    motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
+    for name in robot.sensors:
+        _check_changes(recording, recording.streams[name], robot)
+    for gyro in robot.gyros:
+        _check_frozen(recording.streams[gyro.name])
+    notices += _check_limits(motion, robot)
+    notices += _check_motion(recording, robot, every_joint)
+    odd = check_gyros(recording, robot, motion)
+    return notices + odd + check_scales(recording, robot, suspected={notice.stream for notice in odd})
+
+
+def _check_samples(stream: Stream) -> None:
+    """Checks one stream by itself."""
+    if not len(stream):
+        raise RecordingError(f"{stream.name} is empty: it holds no sample")
+    bad = ~np.isfinite(stream.values)
+    for column, channel in zip(bad.T, stream.channels, strict=True):
+        if column.any():
+            first = stream.times[np.argmax(column)]
+            raise RecordingError(
+                f"{channel} holds {np.count_nonzero(column)} values that are not finite (NaN or infinite), the first "
+                f"at {first:.3f} s; expected a number in every sample: check the field, or remove those messages"
+            )
+    if stream.name != "command" and len(stream) < MIN_SAMPLES:
+        raise RecordingError(f"{stream.name} is too short: {len(stream)} samples; expected at least {MIN_SAMPLES}")
+
+
+def _check_frozen(stream: Stream) -> None:
+    """A gyro whose noise stops repeats its last sample: the sensor or its driver has died."""
+    same = np.all(stream.values[1:] == stream.values[:-1], axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
+    starts, stops = edges[::2], edges[1::2]
+    if len(starts) == 0:
+        return
+    lengths = stops - starts
+    longest = int(np.argmax(lengths))
+    t0, t1 = float(stream.times[starts[longest]]), float(stream.times[stops[longest]])
+    if lengths[longest] >= FROZEN_SAMPLES and t1 - t0 > FROZEN_SECONDS:
+        raise RecordingError(
+            f"{stream.name} repeats one sample from {t0:.3f} to {t1:.3f} s: the sensor has stopped; use the part of "
+            "the recording before or after it"
+        )
+
+
+def _check_wraps(stream: Stream, units: Sequence[str]) -> None:
+    """A position does not cross its whole range between two samples; a counter that begins anew does."""
+    for channel, column, unit in zip(stream.channels, stream.values.T, units, strict=True):
+        jump = wrapping_jump(stream.times, column)
+        if jump > 10.0 * MOVED_ANGLE:
+            raise RecordingError(
+                f"{channel} jumps by {jump:.4g} {unit} from one sample to the next, nearly its whole range: it looks "
+                f"like a counter that begins anew; set `wraps` of sensors.{stream.name} in the robot file to its period"
+            )
+
+
+def _check_overlap(recording: Recording) -> list[Notice]:
+    """All streams must show the same stretch of time; a command holds until the next one."""
+    first = {name: float(s.times[0]) for name, s in recording.streams.items()}
+    last = {name: float(s.times[-1]) for name, s in recording.streams.items()}
+    late, early = max(first, key=first.__getitem__), min(last, key=last.__getitem__)
+    common = last[early] - first[late]
+    if common <= 0:
+        raise RecordingError(
+            f"{early} ends at {last[early]:.3f} s, before {late} begins at {first[late]:.3f} s; expected streams of "
+            "the same stretch of time: check that both are stamped by the same clock"
+        )
+    if common < MIN_SECONDS:
+        raise RecordingError(f"the recording is too short: {common:.3f} s; expected at least {MIN_SECONDS:g} s")
+    whole = recording.duration
+    if common < 0.95 * whole:
+        text = (
+            f"all streams together cover only {common:.3f} of {whole:.3f} s: {late} begins late or {early} ends early"
+        )
+        return [Notice(late, "info", 0, text)]
+    return []
+
+
+def _check_command(command: Stream, robot: Robot) -> None:
+    largest = np.abs(command.values).max(axis=0)
+    if not largest.any():
+        raise RecordingError("the command is zero in all samples; expected a robot that is driven: check the topic")
+    channel, value = command.channels[int(np.argmax(largest))], float(largest.max())
+    unit = robot.command.unit
+    if unit == "duty" and value > DUTY_LIMIT:
+        hint = "it looks like percent: divide by 100" if 2.0 < value <= PERCENT else "check `command.unit`"
+        raise RecordingError(f"{channel} reaches {value:.4g}; expected a duty cycle from -1 to 1; {hint}")
+    supply = robot.constants.get("motor.supply_voltage", np.inf)
+    if unit == "V" and value > OVER_VOLTAGE * supply:
+        raise RecordingError(
+            f"{channel} reaches {value:.4g} V; the supply gives {supply:g} V; check `command.unit` or "
+            "`motor.supply_voltage`"
+        )
+
+
+def _check_changes(recording: Recording, stream: Stream, robot: Robot) -> None:
+    """No channel may be dead; a joint that nobody drives may stand still."""
+    constant = np.ptp(stream.values, axis=0) == 0
+    if stream.name == robot.motor_encoder.name:
+        constant &= np.ptp(recording.command.values, axis=0) > 0
+    units = robot.sensors[stream.name].units
+    for dead, channel, unit, value in zip(constant, stream.channels, units, stream.values[0], strict=True):
+        if dead:
+            raise RecordingError(
+                f"{channel} never changes: {value:.6g} {unit} in all {len(stream)} samples; expected at least "
+                "noise: the sensor is dead or another field holds its values"
+            )
+
+
+def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
+    """Angles and speeds against the limits of the URDF: degrees instead of radians show here."""
+    limits = robot.tree.limits
+    notices = []
+    for what, turning_unit, seen, allowed in (
+        ("spans", "rad", np.ptp(motion.q, axis=0), limits[:, 1] - limits[:, 0]),
+        ("moves at", "rad/s", np.abs(motion.v).max(axis=0), robot.tree.velocity_limits),
+    ):
+        share = seen / allowed
+        k = int(np.argmax(share))
+        channel, unit = f"{robot.joints[k]}.motor_position", robot.unit_at(robot.joints[k], turning_unit)
+        text = f"{channel} {what} {seen[k]:.4g} {unit}; {robot.tree.urdf.name} allows {allowed[k]:.4g} {unit}"
+        if share[k] > IMPOSSIBLE:
+            raise RecordingError(f"{text}; {_unit_hint(robot, k, float(share[k]))}")
+        if share[k] > BEYOND_LIMIT:
+            notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
+    return notices
+
+
+def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
+    """Which unit would bring the positions of a joint back to what is allowed."""
+    encoder = robot.motor_encoder
+    now = encoder.source.bag_units(robot.n)[joint]
+    place = f"`unit` of sensors.{encoder.name} in the robot file (now {now})"
+    for unit in UNITS:
+        if si_unit(unit) == si_unit(now) and excess * si_factor(unit) / si_factor(now) <= BEYOND_LIMIT:
+            word = {"deg": "degrees", "rad": "radians"}.get(unit, unit)
+            return f"the {'angles' if si_unit(now) == 'rad' else 'positions'} look like {word}: set {place} to {unit}"
+    return f"check {place}"
+
+
+def _check_motion(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:
+    resting = joints_without_motion(recording, robot)
+    if not resting:
+        return []
+    if len(resting) == robot.n:
+        raise RecordingError("no joint moves in this recording; expected motion: nothing can be learned from rest")
+    if every_joint:
+        must_move(robot, [recording])
+    text = what_it_cannot_tell(robot, resting)
+    return [Notice(robot.motor_encoder.name, "info", len(resting), text)]

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The graph of a calibration in the hands of a user: print it, add to it, solve it with GTSAM."""
+
+from __future__ import annotations
+
+import gtsam
+import numpy as np
+import pytest
+
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
+from jointscope.robots.errors import SolveError
+
+
+@pytest.fixture(scope="module")
+def calibrated(simulated, doggy):
+    """A calibration of two seconds in motion."""
+    return calibrate(doggy, [simulated.recording.between(4.0, 6.0)])
+
+
+def _about(name, graph, value, sigma):
+    """A user's factor: a data sheet says what a parameter is, give or take a share of it."""
+    i = graph.coordinate(name)
+
+    def error(this, values, H):
+        dynamics = values.atVector(graph.keys["dynamics"])
+        if H is not None:
+            H[0] = np.asfortranarray(np.eye(len(dynamics))[i : i + 1])
+        return dynamics[i : i + 1] - np.log(value)
+
+    return gtsam.CustomFactor(gtsam.noiseModel.Isotropic.Sigma(1, sigma), [graph.keys["dynamics"]], error)
+
+
+def test_the_graph_of_a_calibration_is_printed_on_one_screen(calibrated):
+    text = CalibrationGraph.of(calibrated).describe()
+    assert len(text.splitlines()) < 12
+    assert "dynamics, imu1.rotation, imu2.rotation, imu1.bias, imu2.bias" in text
+
+
+def test_gtsams_optimizer_stays_where_the_calibration_ended(calibrated):
+    graph = CalibrationGraph.of(calibrated)
+    found = graph.parameters(graph.optimize())
+    for parameter in calibrated.parameters:
+        if parameter.name in found:
+            assert found[parameter.name] == pytest.approx(parameter.value, abs=1e-3 * parameter.sigma)
+
+
+@pytest.mark.parametrize("per_sample", [False, True], ids=["condensed", "a factor per sample"])
+def test_gtsams_marginals_are_the_sigmas_of_the_calibration(calibrated, per_sample):
+    graph = CalibrationGraph.of(calibrated, per_sample)
+    sigmas = graph.sigmas(graph.values)
+    for parameter in calibrated.parameters:
+        if parameter.name in sigmas:
+            plain = parameter.sigma / calibrated.sigma_inflation[parameter.name]
+            assert sigmas[parameter.name] == pytest.approx(plain, rel=1e-4)
+
+
+@pytest.mark.parametrize("states", ["with states", "states eliminated"])
+def test_a_users_factor_moves_its_parameter_as_the_covariance_says(calibrated, states):
+    graph = CalibrationGraph.of(calibrated)
+    name, sigmas = "joint2.stiffness", graph.sigmas(graph.values)
+    value = graph.parameters(graph.values)[name]
+    mine = sigmas[name] / value  # a data sheet as sure as the recording, one percent higher
+    factor = _about(name, graph, 1.001 * value, mine)
+    if states == "with states":
+        graph.graph.add(factor)
+        found = graph.parameters(graph.optimize())
+    else:
+        linear, shared = graph.without_states()
+        linear.add(factor)
+        found = graph.parameters(gtsam.LevenbergMarquardtOptimizer(linear, shared).optimize())
+    assert np.log(found[name] / value) == pytest.approx(0.5 * np.log(1.001), rel=0.05)
+
+
+def test_condensed_and_plain_factors_cost_the_same(calibrated):
+    condensed = CalibrationGraph.of(calibrated)
+    plain = CalibrationGraph.of(calibrated, per_sample=True)
+    assert condensed.graph.error(condensed.values) == pytest.approx(plain.graph.error(plain.values), rel=1e-9)
+    assert condensed.graph.size() < 12 < 2000 < plain.graph.size()
+
+
+def test_a_factor_with_a_key_that_the_graph_lacks_is_an_error(calibrated):
+    graph = CalibrationGraph.of(calibrated)
+    graph.graph.add(gtsam.PriorFactorVector(gtsam.symbol("q", 7), np.zeros(2), gtsam.noiseModel.Unit.Create(2)))
+    with pytest.raises(SolveError, match=r"touches q7, which the graph's values lack; insert a start value.*dynamics"):
+        graph.optimize()
+
+
+def test_a_parameter_that_is_not_free_is_an_error(calibrated):
+    with pytest.raises(SolveError, match=r"no free parameter 'joint9.stiffness' in the graph; it has motor.k_pwm"):
+        CalibrationGraph.of(calibrated).coordinate("joint9.stiffness")

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Estimations that fail name what looked odd in their recordings."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+
+from jointscope.graphs.calibration import failures_with_notices as suspicions
+from jointscope.graphs.calibration.failures_with_notices import names_notices, with_notices
+from jointscope.graphs.discovery.diagnose import diagnose
+from jointscope.graphs.discovery.discover import discover
+from jointscope.robots.errors import SolveError
+from jointscope.robots.recordings.recording import Notice, Recording
+
+diagnose_module = import_module("jointscope.graphs.discovery.diagnose")
+SWAPPED = Notice("imu2", "axes", 0, "imu2: the axes seem swapped")
+GAP = Notice("command", "gap", 1, "command: one gap")
+CALM = Notice("command", "info", 1, "command: nothing to worry about")
+
+
+def recording(*notices):
+    return Recording("run.mcap", "", 0, {}, list(notices))
+
+
+def test_a_failure_names_what_the_reader_and_the_screening_saw():
+    text = with_notices("it ran away", [recording(GAP, CALM)], [SWAPPED])
+    assert text == "it ran away; imu2: the axes seem swapped; command: one gap"
+
+
+def test_nothing_is_named_twice():
+    once = with_notices("it ran away", [recording()], [SWAPPED])
+    assert with_notices(once, [recording()], [SWAPPED]) == once
+
+
+@pytest.mark.parametrize("depth", [1, 2])
+def test_what_fails_inside_is_named_once(monkeypatch, depth):
+    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+
+    def fails(robot, recordings):
+        raise SolveError("it ran away")
+
+    for _ in range(depth):
+        fails = names_notices(fails)
+    with pytest.raises(SolveError, match=r"^it ran away; imu2: the axes seem swapped$"):
+        fails("robot", [recording()])
+
+
+@pytest.mark.parametrize("verb", [diagnose, discover])
+def test_verbs_that_learn_name_their_suspicions(monkeypatch, verb, doggy):
+    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+    place = {"diagnose": "jointscope.graphs.discovery.diagnose", "discover": "jointscope.graphs.discovery.discover"}[
+        verb.__name__
+    ]
+
+    def no_base(*args, **kwargs):
+        raise SolveError("it ran away")
+
+    monkeypatch.setattr(f"{place}.BaseModel.of", no_base)
+    with pytest.raises(SolveError, match="it ran away; imu2: the axes seem swapped"):
+        verb(doggy, [recording()])
+
+
+def test_the_robot_is_screened_as_it_was_before_its_calibration(monkeypatch):
+    """A mounting that was calibrated with swapped axes fits them, and no longer looks odd."""
+    monkeypatch.setattr(diagnose_module, "screen", lambda recording, robot: [SWAPPED] if robot == "before" else [])
+    result = SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())])
+    base = SimpleNamespace(recordings=[recording()], robot="after", result=result)
+    assert diagnose_module._suspicions(base) == [f"{diagnose_module.SUSPICION}: {SWAPPED.text}."]

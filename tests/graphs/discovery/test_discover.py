@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The search for several effects: once for real, and its bookkeeping with computations that are made up."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from jointscope.graphs.discovery import discover as search
+from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
+from jointscope.graphs.discovery.discover import discover
+from jointscope.graphs.discovery.discovery_result import SavedStep
+from jointscope.robots.files.effect_editing import add_effect
+
+FIRST, SECOND = "motor_viscous@joint2", "torque_offset@joint1"
+
+
+def test_discover_adds_the_hidden_effect_and_the_held_out_error_falls_to_its_floor(discovered):
+    steps = discovered.result.steps
+    assert [step.label for step in steps] == ["base model", f"+ {discovered.label}"]
+    assert steps[1].train_error < 0.2 * steps[0].train_error
+    assert steps[1].heldout_error < 0.6 * steps[0].heldout_error
+    assert steps[1].heldout_error == pytest.approx(steps[1].floor, rel=0.1)
+    assert discovered.result.adequate
+    assert discovered.result.stop_reason == (
+        "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
+    )
+    assert discovered.result.robot.parameters["joint2.load_dependent_friction.coefficient"].value == pytest.approx(
+        discovered.coefficient, rel=0.1
+    )
+
+
+def test_discover_saves_every_step_once(discovered):
+    assert discovered.saved == [(0, "base model"), (1, f"+ {discovered.label}")]
+    assert discovered.result.robot_file == "step1.yaml"
+
+
+def test_the_json_of_a_discovery_has_the_promised_keys(discovered):
+    content = json.loads(json.dumps(discovered.result.to_json(), allow_nan=False))
+    assert set(content) == {"steps", "stop_reason", "adequate", "robot_file"}
+    for step in content["steps"]:
+        assert {"added", "removed", "train_error", "heldout_error", "floor"} <= set(step)
+    assert content["steps"][0]["added"] is None
+    assert content["steps"][1]["added"] == discovered.label
+
+
+class MadeUp:
+    """Calibrations, diagnoses and errors without computing: the error halves with each effect that is really there."""
+
+    def __init__(self, patch, hidden, idle=()):
+        self.hidden, self.idle, self.calibrated, self.diagnosed = hidden, idle, [], []
+        patch.setattr(search, "BaseModel", SimpleNamespace(of=self.calibrate))
+        patch.setattr(search, "diagnose", self.diagnose)
+        patch.setattr(search, "compare_model", lambda label, robot, recording: self.compare(robot))
+        patch.setattr(search, "judged_error", lambda base, robot, *rest: SimpleNamespace(error=self.error(robot)))
+        patch.setattr(search, "fit_and_judge", lambda base: ([], []))
+
+    def labels(self, robot):
+        return [here.label for here in robot.effects]
+
+    def error(self, robot):
+        return 8.0 * 0.5 ** len(set(self.labels(robot)) & set(self.hidden))
+
+    def compare(self, robot):
+        return SimpleNamespace(judged_error=self.error(robot), judged_floor=1.0)
+
+    def calibrate(self, robot, recordings, start=None):
+        self.calibrated.append(self.labels(robot))
+        for here in robot.effects:
+            gone = here.label in self.idle and len(robot.effects) > 1
+            for p in here.effect.parameters_of(robot, here.owner):
+                known = robot.parameters[here.parameter(p.name)]
+                robot.parameters[known.name] = replace(known, value=p.null if gone else 1.0, sigma=0.1)
+        return SimpleNamespace(robot=robot, calibrations=(), spans=lambda: ([], []))
+
+    def diagnose(self, robot, recordings, holdout, **known):
+        have = self.labels(robot)
+        self.diagnosed.append(have)
+        candidates, refits = [], {}
+        for label in (FIRST, SECOND):
+            if label in have:
+                continue
+            effect, owner = label.split("@")
+            parameters = {"size": EffectEstimate(1.0, 0.1, "N m")}
+            candidates.append(Candidate(effect, owner, 100.0, 1, 1e-9, parameters, "missing"))
+            refits[label] = add_effect(robot, label)
+        return SimpleNamespace(
+            candidates=candidates, refits=refits, adequate=not candidates, unexplained_share=0.25, robot=robot
+        )
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    return lambda hidden, idle=(): MadeUp(monkeypatch, hidden, idle)
+
+
+def run(doggy, **options):
+    saved = []
+
+    def save(number, step):
+        saved.append((number, step.label))
+        return f"step{number}.yaml"
+
+    return discover(doggy, [object()], object(), save=save, **options), saved
+
+
+def test_effects_are_added_one_after_the_other_and_each_step_is_saved(doggy, made_up):
+    computed = made_up([FIRST, SECOND])
+    found, saved = run(doggy)
+    assert saved == [(0, "base model"), (1, f"+ {FIRST}"), (2, f"+ {SECOND}")]
+    assert [step.train_error for step in found.steps] == [8.0, 4.0, 2.0]
+    assert computed.calibrated == [[], [FIRST], [FIRST, SECOND]]
+    assert found.robot_file == "step2.yaml"
+
+
+def test_what_does_not_lower_the_error_with_all_data_is_refused_and_the_reason_is_stated(doggy, made_up):
+    made_up([SECOND])
+    found, saved = run(doggy)
+    assert saved == [(0, "base model"), (1, f"+ {SECOND}")]
+    assert found.stop_reason == "what helped on validation blocks did not hold when calibrated with all data"
+    assert not found.adequate
+
+
+def test_an_effect_that_falls_back_to_null_is_taken_out(doggy, made_up):
+    computed = made_up([FIRST, SECOND], idle=[FIRST])
+    computed.error = lambda robot: {(): 8.0, (FIRST,): 4.0}.get(tuple(computed.labels(robot)), 2.0)
+    found, saved = run(doggy, max_steps=2)
+    assert saved[:4] == [(0, "base model"), (1, f"+ {FIRST}"), (2, f"+ {SECOND}"), (3, f"- {FIRST}")]
+    assert found.steps[3].paragraph == f"{FIRST} fell back to null and was taken out."
+    assert [here.label for here in found.steps[3].robot.effects] == [SECOND]
+
+
+def test_the_largest_number_of_effects_is_a_stop_reason(doggy, made_up):
+    made_up([FIRST, SECOND])
+    found, saved = run(doggy, max_steps=1)
+    assert saved == [(0, "base model"), (1, f"+ {FIRST}")]
+    assert found.stop_reason == "1 effects were added, the largest number allowed"
+
+
+def test_a_resumed_discovery_goes_on_without_doing_the_first_steps_again(doggy, made_up):
+    computed = made_up([FIRST, SECOND])
+    first = SavedStep(None, None, doggy, "step0.yaml", 8.0, 8.0, 1.0, "The base model.")
+    second = SavedStep(FIRST, None, add_effect(doggy, FIRST), "step1.yaml", 4.0, 4.0, 1.0)
+    found, saved = run(doggy, resume=[first, second])
+    assert saved == [(2, f"+ {SECOND}")]
+    assert computed.calibrated == [[FIRST], [FIRST, SECOND]]
+    assert computed.diagnosed == [[FIRST], [FIRST, SECOND]]
+    assert [step.robot_file for step in found.steps] == ["step0.yaml", "step1.yaml", "step2.yaml"]
+    assert [step.train_error for step in found.steps] == [8.0, 4.0, 2.0]
+
+
+def test_progress_never_goes_beyond_the_whole(doggy, made_up):
+    made_up([FIRST, SECOND])
+    shares = []
+    run(doggy, progress=lambda text, share: shares.append(share))
+    assert np.all(np.array(shares) <= 1.0)

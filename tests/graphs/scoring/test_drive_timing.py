@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A drive signal that was measured a little before or after the positions: found, said, and put right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from slow_pendulum import TRUTH, pendulum, recorded, swing
+
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.tools.presentation.judgement import judge
+
+SIGMA, EFFORT_NOISE = 1e-5, 0.002  # [rad], [1] of the largest current
+DELAY = "robot.command_delay.delay"
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    """A current that is a smooth function of time, sampled with the positions."""
+    return swing(6.0, 100.0, smooth_drive=True)
+
+
+@pytest.fixture(scope="module")
+def held():
+    """Currents that act until the next one."""
+    return swing(6.0, 100.0)
+
+
+def measured(found, late):
+    """Positions with noise, and currents with noise that were so a time `late` before their stamp [s]."""
+    stamps, currents, angles = found
+    rng = np.random.default_rng(5)
+    noise = EFFORT_NOISE * np.abs(currents).max() * rng.standard_normal(currents.shape)
+    past = CubicSpline(stamps, currents)(stamps - late)
+    return recorded(stamps, past + noise, angles + SIGMA * rng.standard_normal(angles.shape))
+
+
+def commanded(found, late):
+    """Positions with noise, and the commands with stamps from which it takes a time `late` until they act [s]."""
+    stamps, currents, angles = found
+    rng = np.random.default_rng(6)
+    recording = recorded(stamps, currents, angles + SIGMA * rng.standard_normal(angles.shape))
+    command = recording.streams["command"]
+    earlier = type(command)(command.name, command.times - late, command.values, command.channels, command.unit)
+    return type(recording)("swing.mcap", "", 0, {**recording.streams, "command": earlier})
+
+
+def deviations(result):
+    """Of the values with a truth: in sigmas and in shares."""
+    table = {p.name: p for p in result.parameters}
+    return {n: ((table[n].value - t) / table[n].sigma, table[n].value / t - 1.0) for n, t in TRUTH.items()}
+
+
+def is_right(result):
+    return all(abs(sigmas) < 3.5 or abs(share) < 0.01 for sigmas, share in deviations(result).values())
+
+
+def same_time(result):
+    return next(check for check in judge(result).checks if check.name.endswith("at the same time"))
+
+
+def test_noise_of_the_measured_current_alone_is_no_harm(tmp_path, smooth):
+    result = calibrate(pendulum(tmp_path, SIGMA, topic="/js"), [measured(smooth, 0.0)])
+    assert is_right(result)
+    assert same_time(result).level == "good"
+    assert abs(result.timing.delay) < 4.0 * result.timing.sigma
+    assert judge(result).level in ("good", "warn")
+
+
+@pytest.mark.parametrize("late", [2e-3, -2e-3])
+def test_a_current_of_another_time_than_the_positions_is_not_called_good(tmp_path, smooth, late):
+    result = calibrate(pendulum(tmp_path, SIGMA, topic="/js"), [measured(smooth, late)])
+    assert not is_right(result)
+    # the torque acts before its stamp where the current is old
+    assert result.timing.delay == pytest.approx(-late, rel=0.1)
+    check = same_time(result)
+    assert check.level == "warn" and judge(result).level != "good"
+    assert ("before" if late > 0.0 else "after") in check.text
+    assert "`jointscope add pendulum.yaml command_delay@robot -o OUT.yaml`" in check.text
+
+
+@pytest.mark.parametrize("late", [-2e-3, 12e-3])
+def test_what_the_verdict_says_to_type_puts_the_values_right(tmp_path, smooth, late):
+    robot = add_effect(pendulum(tmp_path, SIGMA, topic="/js"), "command_delay@robot")
+    result = calibrate(robot, [measured(smooth, late)])
+    assert is_right(result)
+    delay = result.robot.parameters[DELAY]
+    assert abs(delay.value + late) < 3.5 * delay.sigma < 1e-3
+    assert judge(result).level in ("good", "warn")
+    assert result.timing is None and same_time(result).level == "info"
+
+
+def test_commands_that_act_at_their_stamps_are_not_accused(tmp_path, held):
+    result = calibrate(pendulum(tmp_path, SIGMA), [commanded(held, 0.0)])
+    assert is_right(result)
+    assert same_time(result).level == "good"
+
+
+def test_commands_that_act_late_are_not_called_good(tmp_path, held):
+    result = calibrate(pendulum(tmp_path, SIGMA), [commanded(held, 2e-3)])
+    assert not is_right(result)
+    assert result.timing.delay == pytest.approx(2e-3, rel=0.2)
+    assert same_time(result).level == "warn"

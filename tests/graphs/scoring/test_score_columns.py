@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every regressor against the numerical derivative of the residuals of the model that really has the effect.
+
+This catches wrong signs, owners, equations and units. Bearings and springs of rigid joints bring coordinates along that
+a derivative at null does not have; they have a test of their own beside this one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linearised_motion import base, one_trial_each, regressors, residuals
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect
+
+SMALL = 1e-4  # of the example size
+TRAPEZOID = 0.03  # relative difference between the two rules along this motion
+SLIGHT = 0.1  # of the largest change: equations that change less are held against that
+
+QUASI_STATIC = ("bearing_flexibility", "joint_elasticity")
+CASES = [case for case in one_trial_each("doggy") if case[1].here.effect.id not in QUASI_STATIC]
+CASES += one_trial_each("without Coriolis terms", ("coriolis",))
+OTHERS = ("motor_viscous", "torque_offset", "motor_lag", "link_viscous", "gravity_imbalance", "kinematic_coupling")
+OTHERS += ("inertia_error", "gyro_scale", "gyro_delay", "encoder_delay", "encoder_eccentricity")
+CASES += one_trial_each("joint 2 rigid", OTHERS)
+CASES += one_trial_each("soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis"))
+
+
+def test_every_effect_has_a_case():
+    tested = {hypothesis.here.effect.id for _, hypothesis in CASES} | set(QUASI_STATIC)
+    assert set(catalogue()) - tested == {"integration_error"}, "that one has no parameter; its test is below"
+
+
+@pytest.mark.parametrize("name, hypothesis", CASES, ids=[f"{hypothesis.label} ({name})" for name, hypothesis in CASES])
+def test_a_regressor_is_the_derivative_of_the_residuals(name, hypothesis):
+    segment, x = base(name)
+    columns, without = regressors(segment, hypothesis), residuals(segment.problem, x, segment.calibration)
+    seen = []
+    for k, size in enumerate(hypothesis.sizes):
+        amount = SMALL * abs(hypothesis.here.effect.example[size.name])
+        sizes = {s.name: amount if s is size else s.null for s in hypothesis.sizes}
+        robot = add_effect(segment.problem.robot, hypothesis.label, {**sizes, **hypothesis.shapes})
+        problem = BagProblem.of(robot, segment.problem.recording)
+        states, calibration = robot.layout.carried_over(x, segment.problem.robot.layout), Calibration.of(robot)
+        if robot.layout.memories:
+            states = with_memory(problem, states, calibration)
+        changed = residuals(problem, states, calibration)
+        pairs = []
+        for row, before in without.items():
+            derivative = (changed[row] - before) / amount
+            column = columns[row][:, k] if row in columns else np.zeros(len(before))
+            inside = np.isfinite(derivative)
+            assert np.mean(inside) > 0.98
+            pairs.append((row, derivative[inside], column[inside]))
+        largest = max(np.linalg.norm(derivative) for _, derivative, _ in pairs)
+        seen.append(largest > 0.0)
+        for row, derivative, column in pairs:
+            allowed = TRAPEZOID * max(np.linalg.norm(derivative), SLIGHT * largest, 1e-6)
+            off = np.linalg.norm(derivative - column)
+            assert off <= allowed, f"{size.name} in {row}: off by {off / max(np.linalg.norm(derivative), 1e-300):.3g}"
+    assert any(seen), "no size changes any residual"
+
+
+def test_the_regressor_of_the_integration_error_is_what_the_better_rule_changes():
+    segment, x = base("Euler")
+    ((_, hypothesis),) = one_trial_each("Euler", ("integration_error",))
+    columns, without = regressors(segment, hypothesis), residuals(segment.problem, x, segment.calibration)
+    better = BagProblem.of(add_effect(segment.problem.robot, hypothesis.label), segment.problem.recording)
+    changed = residuals(better, x, segment.calibration)
+    for row, before in without.items():
+        column = columns[row][:, 0] if row in columns else np.zeros(len(before))
+        np.testing.assert_allclose(column, changed[row] - before, rtol=1e-9, atol=1e-9, err_msg=row)
+
+
+def with_memory(problem, x, calibration):
+    """The states with the memories of effects integrated along the motion, by Heun's rule."""
+    layout, h = problem.robot.layout, problem.timeline.h
+    full, values = x.copy(), calibration.values
+    model, u = problem.dynamics.model, problem.dynamics.command(values)
+    for k in range(len(h)):
+        here, ahead = full[k : k + 1], full[k + 1 : k + 2].copy()
+        first = model.accelerations(here, u[k : k + 1], values)[:, -1]
+        ahead[:, layout.memory] = here[:, layout.memory] + h[k] * first
+        last = model.accelerations(ahead, u[k : k + 1], values)[:, -1]
+        full[k + 1, layout.memory] = here[0, layout.memory] + 0.5 * h[k] * (first + last)
+    return full

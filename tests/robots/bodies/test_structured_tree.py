@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Slopes of accelerations by parameters of the bodies, with any share of the Coriolis terms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from robots_to_compare import READY, _rigid, _with, _without_coriolis, mimicking, states
+
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.files.effect_catalogue import catalogue
+
+COUNT = 6
+
+
+def changed_bodies(robot):
+    """Its bodies depend on parameters: inertias, a rotor on a link, a soft bearing, the share of the Coriolis terms."""
+    robot = _rigid(_without_coriolis(robot), "joint2")
+    for name in ("inertia_error", "payload", "bearing_flexibility", "coriolis"):
+        robot = _with(catalogue()[name], robot)
+    return robot
+
+
+@pytest.mark.parametrize("scale", [-0.2, 0.0, 0.37, 1.0, 1.3])
+@pytest.mark.parametrize("base", [READY, mimicking(READY, READY.joints)], ids=["doggy", "mimic joints"])
+def test_slopes_by_parameters_of_the_bodies_are_those_of_differences(base, scale):
+    robot = changed_bodies(base).with_values({"robot.coriolis.scale": scale})
+    joints, x = ElasticJoints(robot), states(robot, COUNT)
+    x[:, robot.layout.v_link] += 1.0
+    u, values = np.zeros((COUNT, robot.n)), np.array([robot.parameters[name].value for name in joints.names])
+    slopes = joints.with_derivatives(x, u, values).by_parameter
+    of_bodies = ("inertia_error", "payload", "inertia", "bearing_flexibility", "coriolis")
+    for k, name in enumerate(joints.names):
+        if any(part in name.split(".") for part in of_bodies):
+            step = 1e-5 * max(abs(values[k]), 1e-2) * np.eye(len(values))[k]
+            ahead, behind = (joints.accelerations(x, u, values + sign * step) for sign in (1, -1))
+            expected = (ahead - behind) / (2.0 * step[k])
+            size = max(np.abs(expected).max(), 1.0)
+            np.testing.assert_allclose(slopes[:, :, k], expected, rtol=1e-5, atol=1e-6 * size, err_msg=name)

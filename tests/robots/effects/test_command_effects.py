@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects on the command: the mean over each step and its derivatives, for equal and unequal steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_check import null_values
+from jointscope.robots.files.robot_file import load_robot
+
+DOGGY = load_robot("doggy")
+COMMANDS = [effect for effect in catalogue().values() if isinstance(effect, CommandEffect)]
+
+
+def of(effects):
+    return pytest.mark.parametrize("effect", effects, ids=lambda effect: effect.id)
+
+
+def null(effect) -> dict[str, float]:
+    return null_values(effect.parameters)
+
+
+def held_commands(equal: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of the steps and commands that jump, with zeros among them."""
+    rng = np.random.default_rng(2)
+    steps = np.full(60, 1e-3) if equal else rng.uniform(0.3e-3, 4e-3, 60)
+    return 0.2 + np.append(0.0, np.cumsum(steps)), np.where(rng.random(60) < 0.2, 0.0, rng.uniform(-0.9, 0.9, 60))
+
+
+@of(COMMANDS)
+@pytest.mark.parametrize("equal", [True, False])
+def test_at_null_the_command_comes_back(effect, equal):
+    edges, commands = held_commands(equal)
+    acting, by = effect.law(edges, commands, null(effect))
+    assert np.array_equal(acting, commands) and acting is not commands
+    ((name, slope),) = by.items()
+    h = 1e-9
+    near = (effect.law(edges, commands, {name: h})[0] - commands) / h
+    np.testing.assert_allclose(slope, near, rtol=1e-5, atol=1e-4)
+
+
+@of(COMMANDS)
+@pytest.mark.parametrize("equal", [True, False])
+def test_derivatives_of_commands_agree_with_differences(effect, equal):
+    edges, commands = held_commands(equal)
+    for factor in (0.02, 0.31, 1.0, 7.3):
+        (name,) = effect.example
+        value = factor * 1.0137 * effect.example[name]
+        _, by = effect.law(edges, commands, {name: value})
+        h = 1e-6 * value
+        up, down = (effect.law(edges, commands, {name: value + side})[0] for side in (h, -h))
+        np.testing.assert_allclose(by[name], (up - down) / (2 * h), rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("effect_id", ["command_delay", "motor_lag"])
+def test_at_null_a_late_command_changes_with_the_jump_over_the_step(effect_id):
+    edges, commands = held_commands(equal=False)
+    effect = catalogue()[effect_id]
+    _, by = effect.law(edges, commands, null(effect))
+    jump = np.diff(commands, prepend=commands[0])
+    np.testing.assert_allclose(next(iter(by.values())), -jump / np.diff(edges), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "value"), [("command_delay", 0.4e-3), ("command_delay", 9.7e-3), ("motor_lag", 3e-3)]
+)
+def test_the_mean_command_of_each_step_agrees_with_a_fine_grid(effect_id, value):
+    edges, commands = held_commands(equal=False)
+    effect = catalogue()[effect_id]
+    (name,) = effect.example
+    acting, _ = effect.law(edges, commands, {name: value})
+    fine = 400
+    t = (edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(fine) + 0.5) / fine).ravel()
+    if effect_id == "command_delay":
+        held = commands[np.clip(np.searchsorted(edges, t - value, side="right") - 1, 0, None)]
+    else:
+        held, y = np.empty_like(t), commands[0]
+        dt = np.repeat(np.diff(edges) / fine, fine)
+        for k, u in enumerate(np.repeat(commands, fine)):
+            middle = u + (y - u) * np.exp(-0.5 * dt[k] / value)
+            held[k], y = middle, u + (y - u) * np.exp(-dt[k] / value)
+    np.testing.assert_allclose(
+        acting, held.reshape(-1, fine).mean(axis=1), atol=2.5e-3 if "delay" in effect_id else 1e-6
+    )
+
+
+def test_a_long_lag_forgets_nothing():
+    edges, commands = held_commands(equal=True)
+    acting, by = catalogue()["motor_lag"].law(edges, commands, {"time_constant": 1e3})
+    np.testing.assert_allclose(acting, commands[0], atol=1e-4)
+    assert np.all(np.isfinite(by["time_constant"]))
+
+
+def test_the_deadband_swallows_small_commands():
+    u = np.array([-0.5, -0.01, 0.0, 0.01, 0.5])
+    acting, by = catalogue()["pwm_deadband"].law(np.arange(6.0), u, {"width": 0.02})
+    np.testing.assert_allclose(acting, [-0.48, 0, 0, 0, 0.48])
+    assert np.array_equal(by["width"], [1, 0, 0, 0, -1])
+
+
+def test_the_deadband_is_measured_in_the_unit_of_the_command():
+    effect = catalogue()["pwm_deadband"]
+    for unit, start in (("duty", 0.02), ("V", 0.64), ("N m", 0.2)):
+        robot = replace(DOGGY, command=replace(DOGGY.command, unit=unit))
+        (width,) = effect.parameters_of(robot, "joint1")
+        assert (width.unit, width.start) == ("1" if unit == "duty" else unit, pytest.approx(start))

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`init`: which joints are the robot's, where all others are held, and what to type where that cannot be known."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arm_bags import ArmMotion, write_arm_bag, write_urdf
+
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags import read_recording
+from jointscope.tools.command_line import main
+
+ARM = {"shoulder": None, "elbow": "shoulder", "wrist": "elbow"}
+CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
+needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("arms")
+
+
+@pytest.fixture(scope="module")
+def arm(folder):
+    return write_urdf(folder / "arm.urdf", ARM)
+
+
+@pytest.fixture(scope="module")
+def held(arm):
+    """Shoulder and elbow move, the wrist stands."""
+    return ArmMotion(arm, ("shoulder", "elbow"), {"wrist": -1.019})
+
+
+@pytest.fixture(scope="module")
+def free(arm):
+    """All three move."""
+    return ArmMotion(arm, tuple(ARM))
+
+
+def init(*arguments):
+    return main(["init", *map(str, arguments)])
+
+
+def test_a_joint_that_stands_is_locked_where_it_stands_though_it_is_commanded(arm, held, tmp_path, capsys):
+    topics = {"/joint_states": held.states(), "/motor_command": held.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == ("shoulder", "elbow")
+    assert robot.tree.locked == {"wrist": pytest.approx(-1.019, abs=1e-4)}
+    assert "locked: wrist -1.019 (stand still in the recording)" in capsys.readouterr().out
+
+
+def test_commands_for_some_joints_drive_those(arm, held, tmp_path):
+    topics = {"/joint_states": held.states(), "/motor_command": held.commands(("elbow", "shoulder"))}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == ("shoulder", "elbow") and "wrist" in robot.tree.locked
+    np.testing.assert_allclose(read_recording(bag, robot).command.values, held.torque)
+
+
+def test_joints_that_the_bag_does_not_know_are_assumed_at_zero_and_said(arm, held, tmp_path, capsys):
+    states = held.states(("shoulder", "elbow"))
+    bag = write_arm_bag(
+        tmp_path / "a.mcap", held.times, {"/joint_states": states, "/cmd": held.commands(("shoulder", "elbow"))}
+    )
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    assert load_robot(tmp_path / "a.yaml").tree.locked == {"wrist": 0.0}
+    assert "wrist (assumed at 0: not in the bag)" in capsys.readouterr().out
+
+
+def test_a_joint_that_creeps_within_its_noise_and_gives_way_a_little_stands(arm, held, tmp_path, capsys):
+    states = held.states()
+    column = states["names"].index("wrist")
+    sag = 0.004 * np.sin(5.0 * held.times) + 0.003 * held.times / held.times[-1]
+    states["position"][:, column] += sag
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, {"/joint_states": states, "/cmd": held.commands(tuple(ARM))})
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    mean = load_robot(tmp_path / "a.yaml").tree.locked["wrist"]
+    assert mean == pytest.approx(-1.019 + sag.mean(), abs=1e-4)
+    assert re.search(r"wrist: .* # GUESS: stands still there, moves by 0\.01", (tmp_path / "a.yaml").read_text())
+
+
+def commands_in(message):
+    """What an error says to type."""
+    return [shlex.split(part) for part in re.findall(r"type: (jointscope [^;]*)", message)]
+
+
+def test_a_moving_joint_that_is_left_out_is_refused_with_commands_that_work(arm, free, tmp_path, capsys):
+    bag = write_arm_bag(
+        tmp_path / "a b.mcap", free.times, {"/joint_states": free.states(), "/cmd": free.commands(tuple(ARM))}
+    )
+    assert init(arm, bag, "--joints", "shoulder,elbow", "-o", tmp_path / "a.yaml") == 1
+    message = capsys.readouterr().err
+    assert "wrist (by " in message and "--joints leaves it out" in message
+    assert not (tmp_path / "a.yaml").exists()
+    use, hold = commands_in(message)
+    assert main(use[1:]) == 0 and load_robot(tmp_path / "a.yaml").joints == tuple(ARM)
+    assert main(hold[1:]) == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == ("shoulder", "elbow")
+    assert robot.tree.locked["wrist"] == pytest.approx(free.position["wrist"].mean(), abs=1e-3)
+    assert "--lock says so" in (tmp_path / "a.yaml").read_text()
+
+
+def test_a_moving_joint_that_nothing_drives_is_refused_with_a_command_that_works(arm, free, tmp_path, capsys):
+    bag = write_arm_bag(
+        tmp_path / "a.mcap",
+        free.times,
+        {"/joint_states": free.states(), "/cmd": free.commands(("shoulder", "elbow"))},
+    )
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    message = capsys.readouterr().err
+    assert "nothing in the bag drives it" in message
+    (hold,) = commands_in(message)
+    assert main(hold[1:]) == 0
+    assert load_robot(tmp_path / "a.yaml").joints == ("shoulder", "elbow")
+
+
+def test_joints_on_other_branches_do_not_matter(tmp_path):
+    urdf = write_urdf(tmp_path / "two.urdf", {"a1": None, "a2": "a1", "b1": None, "b2": "b1"})
+    motion = ArmMotion(urdf, ("a1", "a2", "b1"), {"b2": 0.3})
+    topics = {"/joint_states": motion.states(), "/cmd": motion.commands(("a1", "a2"))}
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, topics)
+    assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == ("a1", "a2") and robot.tree.locked == {}
+
+
+def test_a_recording_in_which_nobody_moves_is_refused(arm, tmp_path, capsys):
+    motion = ArmMotion(arm, ("shoulder",), {"elbow": 1.0, "wrist": 0.2})
+    motion.position["shoulder"] = np.full(len(motion.times), 0.4) + 1e-5 * np.sin(np.arange(len(motion.times)))
+    bag = write_arm_bag(
+        tmp_path / "a.mcap", motion.times, {"/joint_states": motion.states(), "/cmd": motion.commands(("shoulder",))}
+    )
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    assert "no joint moves in the recording" in capsys.readouterr().err
+
+
+def test_names_that_end_alike_are_matched_whatever_their_order(arm, held, tmp_path):
+    states = {"shoulder": "robot::arm/Shoulder", "elbow": "robot::arm/Elbow", "wrist": "robot::arm/Wrist"}
+    commands = {"shoulder": "SHOULDER_joint", "elbow": "ELBOW_joint"}
+    topics = {
+        "/joint_states": held.states(("wrist", "elbow", "shoulder"), states),
+        "/cmd": held.commands(("elbow", "shoulder"), commands),
+    }
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    recording = read_recording(bag, robot)
+    np.testing.assert_allclose(recording.command.values, held.torque)
+    np.testing.assert_allclose(recording.streams["motor_encoder"].values, held.q, atol=1e-3)
+    assert robot.tree.locked["wrist"] == pytest.approx(-1.019, abs=1e-4)
+
+
+def test_names_that_could_be_two_joints_are_refused_until_one_is_named(tmp_path, capsys):
+    urdf = write_urdf(tmp_path / "two.urdf", {"left_joint1": None, "right_joint1": None})
+    motion = ArmMotion(urdf, ("left_joint1",))
+    called = {"left_joint1": "joint1"}
+    topics = {
+        "/joint_states": motion.states(called=called),
+        "/cmd": motion.commands(("left_joint1",), called),
+    }
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, topics)
+    assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 1
+    message = capsys.readouterr().err
+    assert "joint1 of /joint_states could be left_joint1 or right_joint1 of the URDF" in message
+    assert "--joints left_joint1=joint1" in message
+    assert init(urdf, bag, "--joints", "left_joint1=joint1", "-o", tmp_path / "a.yaml") == 0
+    assert load_robot(tmp_path / "a.yaml").motor_encoder.source.names == ("joint1",)
+
+
+def test_an_array_of_commands_is_taken_in_the_order_of_the_urdf_and_marked(arm, held, tmp_path):
+    values = held.commands(("shoulder", "elbow", "wrist"))["effort"]
+    for name, data in (("all", values), ("moving", values[:, :2])):
+        topics = {"/joint_states": held.states(), "/effort_controller/commands": {"data": data}}
+        bag = write_arm_bag(tmp_path / f"{name}.mcap", held.times, topics)
+        assert init(arm, bag, "-o", tmp_path / f"{name}.yaml") == 0
+        robot = load_robot(tmp_path / f"{name}.yaml")
+        np.testing.assert_allclose(read_recording(bag, robot).command.values, held.torque)
+        text = (tmp_path / f"{name}.yaml").read_text()
+        assert re.search(r"command: .* # GUESS: .* its columns are taken in the order of the URDF", text)
+
+
+def test_an_array_of_commands_in_another_order_is_put_in_that_of_the_motion(arm, held, free, tmp_path):
+    for name, motion, order in (("three", free, ("wrist", "shoulder", "elbow")), ("two", held, ("elbow", "shoulder"))):
+        topics = {
+            "/joint_states": motion.states(),
+            "/effort_controller/commands": {"data": motion.commands(order)["effort"]},
+        }
+        bag = write_arm_bag(tmp_path / f"{name}.mcap", motion.times, topics)
+        assert init(arm, bag, "-o", tmp_path / f"{name}.yaml") == 0
+        np.testing.assert_allclose(
+            read_recording(bag, load_robot(tmp_path / f"{name}.yaml")).command.values, motion.torque
+        )
+        assert "the motion asks for this order" in (tmp_path / f"{name}.yaml").read_text()
+
+
+def test_commands_on_a_topic_for_each_joint_are_named(arm, held, tmp_path, capsys):
+    topics = {"/joint_states": held.states()}
+    for joint in ("shoulder", "elbow"):
+        topics[f"/{joint}_controller/command"] = {"data": held.commands((joint,))["effort"]}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    assert "commands come joint by joint, on /elbow_controller/command, /shoulder_" in capsys.readouterr().err
+
+
+def test_arrays_of_motors_are_read(arm, held, tmp_path):
+    names = ("shoulder", "elbow", "wrist")
+    low = {"type": "own_msgs/msg/LowState", "position": held.states(names)["position"]}
+    low["effort"] = held.commands(names)["effort"]
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, {"/lowstate": low})
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.motor_encoder.source.field == "motor_state.*.q"
+    recording = read_recording(bag, robot)
+    np.testing.assert_allclose(recording.streams["motor_encoder"].values, held.q, atol=1e-3)
+    np.testing.assert_allclose(recording.command.values, held.torque, atol=1e-4)
+    assert robot.tree.locked["wrist"] == pytest.approx(-1.019, abs=1e-4)
+
+
+def test_states_that_name_interfaces_are_read(arm, held, tmp_path):
+    names = ("wrist", "elbow", "shoulder")
+    state = {**held.states(names), **held.commands(names), "type": "control_msgs/msg/DynamicJointState"}
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, {"/dynamic_joint_states": state})
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    recording = read_recording(bag, robot)
+    np.testing.assert_allclose(recording.streams["motor_encoder"].values, held.q, atol=1e-3)
+    np.testing.assert_allclose(recording.command.values, held.torque)
+
+
+def test_mimic_joints_are_no_joints_of_the_robot(tmp_path, capsys):
+    parents = {"shoulder": None, "finger_1": "shoulder", "finger_2": "shoulder"}
+    urdf = write_urdf(tmp_path / "hand.urdf", parents, {"finger_2": "finger_1"})
+    motion = ArmMotion(urdf, ("shoulder", "finger_1"))
+    motion.position["finger_2"] = -motion.position["finger_1"]
+    topics = {"/joint_states": motion.states(), "/cmd": motion.commands(("shoulder", "finger_1"))}
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, topics)
+    assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 0
+    assert load_robot(tmp_path / "a.yaml").joints == ("shoulder", "finger_1")
+    assert "finger_2 follows finger_1" in capsys.readouterr().out
+    assert init(urdf, bag, "--joints", "shoulder,finger_2", "-o", tmp_path / "b.yaml") == 1
+    assert "finger_2 follows finger_1 and is modelled with it" in capsys.readouterr().err
+
+
+@needs_cases
+@pytest.mark.parametrize(
+    ("name", "urdf", "joints", "locked"),
+    [
+        ("arm_held_wrist", "arm_held_wrist", ("shoulder", "elbow"), {"wrist": -1.0192}),
+        ("arm_group_command", "arm_held_wrist", ("shoulder", "elbow"), {"wrist": -1.0192}),
+        ("held_elbow", "held_elbow", ("shoulder",), {"elbow": 2.0}),
+        ("mimic", "mimic", ("shoulder",), {}),
+        ("arm_viscous", "arm_viscous", ("shoulder", "elbow", "wrist"), {}),
+        ("dual_arm_joint_names", "dual", ("a_right", "b_left"), {}),
+    ],
+)
+def test_the_cases_get_their_joints(name, urdf, joints, locked, tmp_path):
+    assert init(CASES / f"{urdf}.urdf", CASES / f"{name}.mcap", "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == joints
+    assert robot.tree.locked == pytest.approx(locked, abs=1e-3)
+
+
+@needs_cases
+def test_links_and_joints_may_have_the_same_names(tmp_path):
+    arguments = (CASES / "arm_same_names.urdf", CASES / "arm_same_names.mcap", "--joints", "shoulder,elbow")
+    assert init(*arguments, "-o", tmp_path / "a.yaml") == 0
+    assert load_robot(tmp_path / "a.yaml").tree.locked == pytest.approx({"wrist": -1.0192}, abs=1e-3)

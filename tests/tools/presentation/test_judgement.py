@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The verdict on a calibration: a sigma that is too large is no fault, what the model lacks is one."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from fake_results import fake_calibration
+
+from jointscope.graphs.calibration.findings import findings
+from jointscope.tools.presentation.judgement import Judgement, judge
+
+NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
+CHANNEL = "joint1.motor_position"
+
+
+@pytest.fixture(scope="module")
+def good():
+    return fake_calibration()
+
+
+def with_chi2(result, chi2):
+    fit = dataclasses.replace(result.channels[CHANNEL], chi2=chi2)
+    return dataclasses.replace(result, channels={**result.channels, CHANNEL: fit})
+
+
+def coloured(result):
+    """The same with residuals of one encoder that come back every 50 ms."""
+    bag = result.bags[0]
+    series = bag.residuals["motor_encoder"]
+    predicted = series.predicted.copy()
+    wave = 3.0 * series.sigma[:, 0] * np.sin(2.0 * np.pi * series.times / 0.05)
+    predicted[:, 0] = series.measured[:, 0] - wave
+    residuals = {**bag.residuals, "motor_encoder": dataclasses.replace(series, predicted=predicted)}
+    return dataclasses.replace(result, bags=(dataclasses.replace(bag, residuals=residuals),))
+
+
+def level(judgement: Judgement, name: str) -> str:
+    return next(check.level for check in judgement.checks if check.name == name)
+
+
+@pytest.mark.parametrize(
+    ("chi2", "expected"), [(0.01, "info"), (0.5, "good"), (1.2, "good"), (1.6, "warn"), (4.0, "bad")]
+)
+def test_only_residuals_that_are_too_large_speak_against_a_calibration(good, chi2, expected):
+    assert level(judge(with_chi2(good, chi2)), NOISE) == expected
+
+
+def test_a_memory_in_the_residuals_is_bad_unless_they_are_far_below_the_noise(good):
+    assert level(judge(good), MEMORY) == "good"
+    assert level(judge(coloured(good)), MEMORY) == "bad"
+    assert level(judge(with_chi2(coloured(good), 0.1)), MEMORY) == "warn"
+
+
+def test_a_short_last_step_is_a_remark(good):
+    said = findings(dataclasses.replace(good, unsettled=0.021))
+    assert any("the iterations ended with a last step of 0.02 sigma" in text for text in said)
+    assert not any("last step" in text for text in findings(good))
+
+
+def test_a_sigma_that_was_found_anew_is_said_from_a_fifth_on(good):
+    def found(factor):
+        encoder = good.robot.motor_encoder
+        other = dataclasses.replace(encoder, sigmas=encoder.sigmas * factor)
+        robot = good.robot.with_sensors({encoder.name: other})
+        return " ".join(findings(dataclasses.replace(good, robot=robot)))
+
+    assert "`estimate_sigma: false` in sensors.motor_encoder keeps yours" in found(0.4)
+    assert "joint1.motor_position 2.77e-05 rad (was 6.93e-05)" in found(0.4)
+    assert "estimate_sigma" not in found(0.9)

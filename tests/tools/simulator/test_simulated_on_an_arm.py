@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""No simulated effect is made for Doggy: an arm with gravity, torque commands, turned frames and other names."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
+from jointscope.tools.simulator import simulate
+from jointscope.tools.simulator.effects import make_effect, simulated_effects
+from jointscope.tools.simulator.world.effect import owners_of
+from jointscope.tools.simulator.world.engine import Engine
+
+pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+
+URDF = """<robot name="arm"><link name="base"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+ <origin xyz="0.1 0.2 0.3" rpy="0.4 -0.3 0.2"/><axis xyz="0 1 0"/>
+ <limit effort="40" velocity="10" lower="-3" upper="3"/></joint>
+<link name="upper"><inertial><origin xyz="0.1 0 0.2"/><mass value="3"/>
+ <inertia ixx="0.05" iyy="0.05" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.4" rpy="0.5 0.1 0"/>
+ <axis xyz="0.6 0 -0.8"/><limit effort="40" velocity="10" lower="-2" upper="2"/></joint>
+<link name="fore"><inertial><origin xyz="0.05 0 0.15"/><mass value="2"/>
+ <inertia ixx="0.03" iyy="0.01" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+UNITS = {"inertia": "kg m2", "coulomb_torque": "N m", "stiffness": "N m/rad", "damping": "N m s/rad"}
+VALUES = {"inertia": 0.5, "coulomb_torque": 1.0, "stiffness": 300.0, "damping": 1.0}
+PARAMETERS = "".join(
+    f"  {joint}.{name}: {{value: {value}, unit: {UNITS[name]}}}\n"
+    for joint in ("shoulder", "elbow")
+    for name, value in VALUES.items()
+)
+YAML = f"""
+format: 1
+name: arm
+urdf: arm.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [shoulder, elbow]
+command: {{topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: N m}}
+sensors:
+  enc: {{kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: rad, sigma: 1.0e-4}}
+  wrist: {{kind: gyro, topic: /wg, type: sensor_msgs/msg/Imu, field: angular_velocity, unit: rad/s, body: fore,
+          sigma: 2.0e-3, R_imu_body: {{value: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}}}
+parameters:
+{PARAMETERS}noise: {{link_velocity: [0.3, 0.3], motor_velocity: [0.3, 0.3]}}
+"""
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    (folder / "arm.urdf").write_text(URDF)
+    (folder / "arm.yaml").write_text(YAML)
+    return load_robot(folder / "arm.yaml")
+
+
+@pytest.mark.parametrize("effect_id", list(simulated_effects()))
+def test_every_effect_runs_on_the_arm(arm, effect_id):
+    owner = owners_of(simulated_effects()[effect_id].acts_on[0], arm)[-1]
+    simulation = simulate(arm, "moves", 1.0, 1, effects=[f"{effect_id}@{owner}"])
+    assert np.isfinite(simulation.states).all()
+    assert np.abs(simulation.states).max() < 50
+
+
+def accelerations(engine: Engine, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    x = np.zeros((2, 4))
+    x[:, engine.link], x[:, engine.motor] = (q, v), (q, v)
+    return engine.accelerations(*x, np.zeros(2))[engine.link]
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+def test_an_imbalance_turns_its_own_joint_only(arm, joint):
+    effect, rng = make_effect(f"gravity_imbalance@{joint}:cos=-2,sin=5", arm), np.random.default_rng(0)
+    for _ in range(5):
+        q, v = rng.uniform(-1.5, 1.5, (2, 2))
+        change = accelerations(Engine(arm, [effect]), q, v) - accelerations(Engine(arm), q, v)
+        own = arm.joints.index(joint)
+        expected = np.where(np.arange(2) == own, -2 * np.cos(q[own]) + 5 * np.sin(q[own]), 0.0)
+        np.testing.assert_allclose(arm.tree.mass_matrix(q[None])[0] @ change, expected, atol=1e-8)
+
+
+def test_a_payload_sits_on_the_long_axis_and_has_weight(arm):
+    model = arm.tree.model.copy()
+    long_axis = np.array([0.0, 1.0, 0.0])
+    model.appendBodyToJoint(2, pin.Inertia(0.2, 0.5 * long_axis, np.zeros((3, 3))), pin.SE3.Identity())
+    model.gravity = pin.Motion(np.array([0.0, 0.0, -9.81]), np.zeros(3))
+    q, v = np.array([0.3, -0.5]), np.array([0.7, 0.4])
+    expected = pin.aba(model, model.createData(), q, v, np.zeros(2))
+    engine = Engine(arm, [make_effect("payload@elbow:inertia=0.05", arm)])
+    np.testing.assert_allclose(accelerations(engine, q, v), expected, rtol=1e-6, atol=1e-6)
+
+
+def test_without_a_gear_ratio_one_period_per_turn_of_the_joint_is_assumed(arm):
+    for effect_id in ("cogging", "encoder_eccentricity"):
+        assert make_effect(f"{effect_id}@elbow", arm).parameters["order"] == 1.0
+
+
+def test_state_feedback_from_the_robot_file_alone_moves_the_arm_against_gravity(arm):
+    options = LoopOptions(sources=("true",))
+    result = run_closed_loop(arm, None, seconds=6.0, seed=1, options=options)
+    p, feedback = (result.run(controller, "true").tracking for controller in ("p", "state_feedback"))
+    assert feedback.hit_position < 0.05 * p.hit_position
+    assert feedback.link_position_rms < 5e-3  # [rad] although the arm sags before it is caught at the start

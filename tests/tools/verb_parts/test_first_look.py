@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plain mistakes are said before a computation begins, and bad recordings by name."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.tools.bags import write_bag
+from jointscope.tools.command_line import main
+from jointscope.tools.verb_parts.first_look import first_look
+
+
+@pytest.fixture
+def swapped(simulated):
+    """The simulated recording with two axes of imu2 exchanged."""
+    stream = simulated.recording.streams["imu2"]
+    values = replace(stream, values=stream.values[:, [1, 0, 2]])
+    return replace(simulated.recording, path="odd.mcap", streams={**simulated.recording.streams, "imu2": values})
+
+
+def said(robot, *recordings):
+    stream = io.StringIO()
+    first_look(robot, recordings, stream)
+    return stream.getvalue()
+
+
+def test_a_clean_recording_passes_without_a_word(doggy, simulated):
+    assert said(doggy, simulated.recording) == ""
+
+
+def test_swapped_axes_are_said_once_with_the_recording_that_showed_them(doggy, simulated, swapped):
+    text = said(doggy, simulated.recording, swapped, replace(swapped, path="again.mcap"))
+    assert text.startswith("odd.mcap: imu2: the axes seem swapped or flipped against R_imu_body: ")
+    assert "again.mcap" not in text and text.count("\n") == 2
+    assert "Look at this first" in text
+
+
+def test_a_recording_that_cannot_be_used_is_named(doggy, simulated):
+    stream = simulated.recording.streams["imu1"]
+    dead = replace(stream, values=np.zeros_like(stream.values))
+    broken = replace(simulated.recording, path="dead.mcap", streams={**simulated.recording.streams, "imu1": dead})
+    with pytest.raises(RecordingError, match=r"^dead\.mcap: imu1\.x never changes"):
+        said(doggy, simulated.recording, broken)
+
+
+@pytest.mark.parametrize("verb", ["calibrate", "diagnose", "discover"])
+def test_verbs_that_take_long_say_it_before_they_begin(verb, doggy, swapped, tmp_path, monkeypatch, capsys):
+    def begin(*args, **kwargs):
+        raise SolveError("here the computation begins")
+
+    bag = tmp_path / "odd.mcap"
+    write_bag(bag, swapped, doggy)
+    monkeypatch.setattr(f"jointscope.graphs.{verb}.{verb}", begin)
+    output = ["-o", str(tmp_path / "out.yaml")] if verb != "diagnose" else []
+    assert main([verb, "doggy", str(bag), *output]) == 1
+    first, second, last = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"{bag}: imu2: the axes seem swapped or flipped") and "Look at this first" in second
+    assert last == "jointscope: error: here the computation begins"

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope effects`: the list, a card, and both for machines."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from jointscope.robots.files import effect_catalogue
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.tools.command_line import main
+
+
+@pytest.fixture(autouse=True)
+def in_own_folder(tmp_path, monkeypatch):
+    """An empty folder; effects of a file are forgotten afterwards."""
+    monkeypatch.setattr(effect_catalogue, "_of_files", {})
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def said(capsys, *arguments: str) -> str:
+    assert main(["effects", *arguments]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return out
+
+
+def test_the_list_names_every_effect_with_its_owner_and_where_it_is_absent(capsys):
+    lines = said(capsys).splitlines()
+    for effect in catalogue().values():
+        (line,) = [line for line in lines if line.split()[:1] == [effect.id]]
+        assert effect.card.title in line
+        assert all(owner in line for owner in effect.owners)
+    assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.parametrize("effect_id", list(catalogue()))
+def test_a_card_says_everything(effect_id, capsys):
+    effect = catalogue()[effect_id]
+    text = said(capsys, effect_id)
+    words = " ".join(text.split())
+    for part in (effect.card.law, effect.card.explanation, effect.card.source, effect.card.excitation):
+        assert " ".join(part.split()) in words
+    for name, reason in effect.card.look_alikes.items():
+        assert f"{name}: {reason}" in words
+    for p in effect.parameters:
+        assert p.name in text and p.unit in text
+    assert max(map(len, text.splitlines())) <= 120
+
+
+def test_json_says_what_the_screen_says(in_own_folder, capsys):
+    said(capsys, "cogging", "--json", "card.json")
+    card = json.loads((in_own_folder / "card.json").read_text())
+    assert card["parameters"]["cos"]["null"] == 0.0
+    assert card["parameters"]["order"]["null"] is None
+    said(capsys, "--json", "all.json")
+    assert list(json.loads((in_own_folder / "all.json").read_text())["effects"]) == list(catalogue())
+
+
+def test_an_effect_of_the_users_own_is_listed_and_has_a_card(in_own_folder, capsys):
+    text = "from dataclasses import replace\nfrom jointscope.robots.effects.cogging import EFFECT as OTHER\n"
+    (in_own_folder / "mine.py").write_text(text + "EFFECT = replace(OTHER, id='my_cogging')\n")
+    assert "my_cogging" in said(capsys, "--effects", "mine.py")
+    assert said(capsys, "my_cogging", "--effects", "mine.py").startswith("my_cogging: torque ripple")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["coging"], "no effect 'coging'; did you mean 'cogging'?"),
+        (["--effects", "none.py"], "cannot read the effects file none.py: No such file or directory"),
+        (["--json", "no/folder.json"], None),
+    ],
+)
+def test_mistakes_are_answered_in_one_line(arguments, message, capsys):
+    assert main(["effects", *arguments]) == 1
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    if message:
+        assert err == f"jointscope: error: {message}\n"

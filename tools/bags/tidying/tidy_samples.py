@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One stream tidied up by itself, before the robot is known: clock, order, glitches, second publishers, staircases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from jointscope.robots.recordings.recording import Notice
+from jointscope.tools.bags.tidying.clock_steps import on_one_clock
+from jointscope.tools.bags.tidying.glitches import without_glitches
+from jointscope.tools.bags.tidying.not_finite import numbers_only
+from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
+from jointscope.tools.bags.tidying.staircase import without_repetitions
+from jointscope.tools.bags.tidying.time_order import in_time_order
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
+
+MOSTLY = 0.9  # of the samples that must be numbers to tell wild ones
+FEWEST = 30  # samples that tell anything
+
+
+def ordered_samples(name: str, samples: TimedSamples, stamped: bool) -> TimedSamples:
+    """The samples in the order of their stamps, whatever is no number as NaN.
+
+    Args:
+        name: of the stream.
+        samples: in the order of the bag; NaN may be among them.
+        stamped: whether the messages carry stamps.
+
+    Raises:
+        RecordingError: the clock cannot be trusted, or too much would be left out.
+    """
+    if stamped:
+        samples, _ = without_unfilled(name, samples)
+        samples = on_one_clock({name: samples})[0][name]
+    samples, _ = in_time_order(name, samples)
+    return replace(samples, values=numbers_only(samples.values))
+
+
+def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
+    """Ordered samples of a sensor of any kind, without what no sensor says; commands may jump and repeat themselves.
+
+    Args:
+        name: of the stream.
+        samples: in the order of their stamps; NaN may be among them.
+
+    Raises:
+        RecordingError: so much would be left out that something else is wrong.
+    """
+    finite = np.asarray(np.isfinite(samples.values).all(axis=1))
+    if finite.mean() < MOSTLY:
+        return samples
+    samples = samples.take(finite)
+    return cleaned_sensor(name, tuple(map(str, range(samples.values.shape[1]))), samples)[0]
+
+
+def cleaned_sensor(
+    name: str, channels: tuple[str, ...], samples: TimedSamples, wraps: float = 0.0
+) -> tuple[TimedSamples, list[Notice]]:
+    """Samples of a sensor without those of a second publisher, glitches and repetitions, and what was left out.
+
+    Args:
+        name: of the stream.
+        channels: name of each column.
+        samples: in the order of their stamps, finite, in the unit of the bag.
+        wraps: period of the counter behind them, 0 for none.
+
+    Raises:
+        RecordingError: so much would be left out that something else is wrong.
+    """
+    if len(samples) < FEWEST:
+        return samples, []
+    samples, notices = without_second_publisher(name, channels, samples)
+    samples, found = without_glitches(name, channels, samples, wraps)
+    notices += found
+    samples, found = without_repetitions(name, samples)
+    return samples, notices + found

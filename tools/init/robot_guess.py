@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All guesses about one robot, each with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.starts.drive_regression import Driven
+from jointscope.graphs.starts.drive_signal import acts_until_the_next
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.bodies.urdf_bodies import UrdfBodies
+from jointscope.robots.recordings.joint_motion import joint_motion
+from jointscope.robots.recordings.recording import Stream
+from jointscope.robots.units import si_factor
+from jointscope.tools.bags.messages.open_bag import Progress
+from jointscope.tools.init.estimates.drive_values import Drives, DriveValues, find_drives, find_signs
+from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
+from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
+from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
+from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
+from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
+from jointscope.tools.init.streams.roles import Roles
+from jointscope.tools.init.streams.sample_times import guess_sample_times
+from jointscope.tools.init.streams.sensor_noise import NoiseGuess, guess_noise
+from jointscope.tools.init.streams.signals import Signal, read_signals
+
+Array = NDArray[np.float64]
+
+SUPPLY = 24.0  # [V]
+ENOUGH = 3000  # instants for the mounting of a gyroscope
+
+
+@dataclass(frozen=True)
+class GuessedGyro:
+    """A gyroscope, where it seems to sit, and its noise."""
+
+    name: str
+    signal: Signal
+    mount: Mount
+    noise: NoiseGuess
+
+
+@dataclass(frozen=True)
+class RobotGuess:
+    """What a URDF and a bag say about a robot.
+
+    Attributes:
+        name: of the robot.
+        urdf: its file.
+        bag: path of the bag.
+        roles: which signal is what.
+        masses: whether the URDF has inertias for all moving bodies.
+        position_units: of the encoders in the bag.
+        encoder_signs: which way the joints' encoders count.
+        command_unit: unit of the drive and why.
+        drives: start values by joint.
+        encoder_noise, link_noise, torque_noise: of the sensors.
+        gyros: those that sit on a moving link.
+        left_out: what the bag also holds and why it is not used.
+        stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
+        held: other joints that matter, and where they stand [rad or m].
+        following: sentences about mimic joints of the URDF.
+        elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
+        gravity: in the base frame [m/s^2].
+        gravity_reason: why it does not point along -z; empty if it does.
+        held_command: whether each value of the command acts until the next one; else it was measured.
+    """
+
+    name: str
+    urdf: Path
+    bag: str
+    roles: Roles
+    masses: bool
+    position_units: UnitGuess
+    encoder_signs: SignGuess
+    command_unit: tuple[str, str]
+    drives: list[DriveValues]
+    encoder_noise: tuple[NoiseGuess, ...]
+    link_noise: tuple[NoiseGuess, ...] | None
+    torque_noise: NoiseGuess | None
+    gyros: list[GuessedGyro]
+    left_out: list[str] = field(default_factory=list)
+    elastic: tuple[str, ...] = ()
+    slides: tuple[str, ...] = ()
+    stamped_by: tuple[str, ...] = ()
+    held: tuple[HeldJoint, ...] = ()
+    following: tuple[str, ...] = ()
+    gravity: tuple[float, ...] = GRAVITY
+    gravity_reason: str = ""
+    held_command: bool = True
+
+    @property
+    def free_links(self) -> bool:
+        """Whether only transmissions can be modelled: no masses, but encoders on both sides."""
+        return not self.masses and self.roles.link_encoder is not None
+
+
+def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
+    """Guesses a robot.
+
+    Args:
+        typed: URDF, bag and what the user said about them.
+        progress: called with the number of messages read and expected.
+
+    Raises:
+        RobotError: the URDF cannot be read, or has neither masses nor are there encoders on the links.
+        RecordingError: the bag cannot be read, lacks positions or what drives the motors, or a joint moves that must
+            not be left out.
+    """
+    signals = read_signals(typed.bag, progress)
+    robot = measured_robot(typed, signals)
+    roles, tree, masses = robot.roles, robot.tree, robot.masses
+    torque = None if roles.joint_torque is None else role_stream(roles.joint_torque, roles.joints)
+    noises = robot.noise(roles.motor_encoder)
+
+    def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
+        return _drives(robot, positions, noises, torque, elastic)
+
+    # the links turn the gyroscopes, and their encoders know where zero is
+    encoder, seen = robot.encoder, robot.links or robot.encoder
+
+    def motors(signs: tuple[float, ...]) -> list[float]:
+        turned = replace(encoder, values=encoder.values * np.array(signs))
+        return [drive.sign for drive in drives(turned, roles.joints).joints]
+
+    signs = encoder_signs(tree, seen_rates(seen, robot.gyros), motors)
+    turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
+    gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
+    elastic = _seen(tree, gyros) if masses else ()
+    drive = drives(turned, elastic)
+    left_out += _unused(signals, roles, masses)
+    return RobotGuess(
+        name=typed.name or typed.urdf.stem,
+        urdf=typed.urdf,
+        bag=str(typed.bag),
+        roles=roles,
+        masses=masses,
+        position_units=robot.units,
+        encoder_signs=signs,
+        command_unit=drive.unit,
+        drives=drive.joints,
+        gravity=tuple(drive.gravity.tolist()),
+        gravity_reason=drive.gravity_reason,
+        held_command=drive.held,
+        encoder_noise=noises,
+        link_noise=None if roles.link_encoder is None else robot.noise(roles.link_encoder),
+        torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
+        gyros=gyros,
+        left_out=left_out,
+        slides=tree.slides,
+        stamped_by=_sample_times(roles, gyros),
+        elastic=elastic,
+        held=robot.held,
+        following=_following(robot.bodies, roles.joints),
+    )
+
+
+def _drives(
+    robot: MeasuredRobot,
+    encoder: Stream,
+    noises: Sequence[NoiseGuess],
+    torque: Stream | None,
+    elastic: tuple[str, ...],
+) -> Drives:
+    """Unit of the command, and the drive of each joint."""
+    roles, tree = robot.roles, robot.tree
+    # noise is that of positions behind gears, in the unit of the bag
+    sigmas = np.array([si_factor(unit) * noise.sigma for unit, noise in zip(robot.units.units, noises, strict=True)])
+    command = role_stream(roles.command, roles.joints)
+    if not robot.masses:
+        return find_signs(encoder, command, sigmas, torque, tree.gravity)
+    told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
+    measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
+    return find_drives(tree, encoder, command, sigmas, held=not measured if told is None else told, elastic=elastic)
+
+
+def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:
+    """Sentences about mimic joints that move with the robot's."""
+    return tuple(f"{name} follows {f.leader}" for name, f in bodies.followers.items() if f.leader in joints)
+
+
+def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
+    """Whose stamps the joints' samples have; the finer encoders tell."""
+    chosen = roles.link_encoder or roles.motor_encoder
+    return guess_sample_times(chosen.signal, chosen.names or roles.joints, {g.name: g.signal for g in gyros})
+
+
+def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
+    """Joints that turn with a gyroscope behind them."""
+    seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
+    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
+
+
+def _gyros(
+    tree: RigidTree, encoder: Stream, imus: Sequence[Signal], streams: Sequence[Stream], signs: SignGuess
+) -> tuple[list[GuessedGyro], list[str]]:
+    """Gyroscopes with their links, and a sentence for each one that is on none."""
+    motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
+    found: list[GuessedGyro] = []
+    left_out = []
+    for signal, stream in zip(imus, streams, strict=True):
+        seen = seen_rate(motion, stream, ENOUGH)
+        mount = None if seen is None else find_mount(tree, seen, mirrored=signs.mirrored)
+        if mount is None:
+            left_out.append(f"{signal.topic}: stands still, or no link turns like it")
+            continue
+        name = _sensor_name(signal.topic, [gyro.name for gyro in found])
+        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.times, stream.values, mount.unit)))
+    return found, left_out
+
+
+def _sensor_name(topic: str, taken: Sequence[str]) -> str:
+    """The first part of a topic, as "imu1" of "/imu1/data_raw"; numbered where that is taken."""
+    name = next((part for part in topic.split("/") if part), "imu").replace("-", "_")
+    number = 2
+    while name in taken:
+        name, number = f"{name.rstrip('0123456789')}{number}", number + 1
+    return name
+
+
+def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
+    used = {roles.motor_encoder.signal.topic, roles.command.signal.topic, *(s.topic for s in roles.imus)}
+    if roles.link_encoder is not None:
+        used.add(roles.link_encoder.signal.topic)
+    said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]
+    if roles.joint_torque is not None and masses:
+        said.append(f"{roles.joint_torque.signal.topic}, effort: measured joint torques need link_dynamics: free")
+    return said

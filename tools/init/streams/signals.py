@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Everything numeric that a bag holds, before anybody knows what it means."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recordings.recording import Stream
+from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
+from jointscope.tools.bags.read_recording import read_columns
+from jointscope.tools.bags.tidying.long_holes import LongHoles
+from jointscope.tools.bags.tidying.stream_notices import Timing, timing
+from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.init.streams.known_fields import KnownField, known_fields
+
+Array = NDArray[np.float64]
+
+COMMANDED = re.compile(r"command|cmd|desired|target|setpoint|reference|goal|(^|\.)output\.|points\.|_d$|_des$")
+"""Words in topics and fields with what a controller wants, in contrast to what is measured."""
+
+MEASURED = ("position", "rate")
+"""Quantities that a sensor fills, so that single wild samples in them are none."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One field of one topic.
+
+    Attributes:
+        topic, msgtype, field: where it is.
+        names: joint names of its columns; empty where the messages name none.
+        times: stamps, strictly increasing, shape (n,) [s]; zero is the same for all signals of a bag.
+        values: shape (n, m), in the unit of the bag.
+        stamped: whether the messages carry a stamp.
+        quantity: what its field says it is: "position", "effort", "rate" or "numbers".
+        sent: the same with all messages, where some were left out; streams are compared one for one by it.
+    """
+
+    topic: str
+    msgtype: str
+    field: str
+    names: tuple[str, ...]
+    times: Array
+    values: Array
+    stamped: bool
+    quantity: str = ""
+    sent: Signal | None = None
+
+    @property
+    def as_sent(self) -> Signal:
+        """With all messages."""
+        return self.sent or self
+
+    @property
+    def timing(self) -> Timing:
+        """How regular it is."""
+        return timing(self.times)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether it says what a controller wants."""
+        return bool(COMMANDED.search(self.topic.lower()) or COMMANDED.search(self.field.lower()))
+
+    def columns(self, names: tuple[str, ...]) -> Array:
+        """Values of some joints, shape (n, k); by place, counted from 0, where the messages name none."""
+        if self.names:
+            return self.values[:, [self.names.index(name) for name in names]]
+        places = [int(name) for name in names] if all(name.isdecimal() for name in names) else list(range(len(names)))
+        return self.values[:, places]
+
+    def stream(self, names: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
+        """Some joints as a stream, finite samples only, times a factor."""
+        values = self.columns(names) * factor
+        good = np.isfinite(values).all(axis=1)
+        return Stream(self.topic, self.times[good], values[good], names, "")
+
+
+def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
+    """All signals of a bag, in the order of its topics.
+
+    Raises:
+        RecordingError: the bag cannot be read, or holds nothing that a robot file could use.
+    """
+    with open_bag(path) as bag:
+        types = {topic: kind for topic in bag.topics if (kind := _useful_type(bag, topic)) is not None}
+        raw = bag.read(list(types), progress)
+    filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
+    start = min((min(part.received) for part in raw.values() if part.received), default=0)
+    troubles: list[RecordingError] = []
+    found = [
+        _signal(raw[topic], kind, known, start, troubles)
+        for topic, kind in filled.items()
+        for known in known_fields(kind, raw[topic].data[0])
+    ]
+    signals = [signal for signal in found if signal is not None]
+    if troubles and not signals:
+        raise troubles[0]
+    holes = LongHoles.of([signal.times for signal in signals])
+    signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
+    if not signals:
+        raise RecordingError(
+            f"{path} holds no messages with positions or efforts of joints (sensor_msgs/msg/JointState, states of "
+            f"controllers, arrays of motors); jointscope info {path} shows what is there"
+        )
+    return signals
+
+
+def _useful_type(bag: Bag, topic: str) -> MessageType | None:
+    """The type of a topic that could tell something about joints; one that cannot be understood does not."""
+    if len(bag.type_names(topic)) != 1:
+        return None
+    try:
+        kind = bag.message_type(topic)
+    except RecordingError:
+        return None
+    interfaces = any(name == "interface_values" for name, _ in kind.fields)
+    return kind if interfaces or known_fields(kind, None) else None
+
+
+def _signal(
+    raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int, troubles: list[RecordingError]
+) -> Signal | None:
+    """One field; None where it is empty in some messages or changes its length, or its times cannot be told."""
+    try:
+        columns = read_columns(raw, kind, known.path)
+    except RecordingError:
+        return None
+    width = columns.values.shape[1]
+    names = columns.names or ()
+    if width == 0 or (names and len(names) != width) or len(set(names)) != len(names):
+        return None
+    received = columns.of(raw.received_ns)
+    stamps = received if columns.stamps is None else columns.stamps
+    stamped = columns.stamps is not None
+    everything = TimedSamples(stamps, received, columns.values)
+
+    def signal(samples: TimedSamples, sent: Signal | None = None) -> Signal:
+        times = (samples.stamps - start_ns) / 1e9
+        later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
+        values = samples.values[later]
+        return Signal(raw.name, kind.name, known.path, names, times[later], values, stamped, known.quantity, sent)
+
+    try:
+        ordered = ordered_samples(raw.name, everything, stamped)
+        samples = plausible_samples(raw.name, ordered) if known.quantity in MEASURED else ordered
+    except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
+        troubles.append(err)
+        return None
+    return signal(samples, signal(ordered) if len(ordered) > len(samples) else None)

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is this calibration good? Checks with limits, each with a sentence, and the verdict that follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ParameterEstimate
+from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.presentation.whiteness import LAGS, autocorrelation, strength
+
+LEVELS = ("good", "info", "warn", "bad")
+ANSWERS = {
+    "good": "Yes, this calibration is good.",
+    "warn": "Usable, with reservations.",
+    "bad": "No, do not rely on this calibration yet.",
+}
+CHI2 = (1.25, 2.0)  # mean square of a channel's residual in sigmas: fine up to the first, bad beyond the second
+TOO_SMALL = 0.4  # mean square of a channel's residual in sigmas below which its sigma is too large
+CORRELATION = (0.25, 0.5)  # largest autocorrelation within LAGS; a quantized encoder at rest reaches 0.2
+UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open after DRIFT, in the worst window
+DRIFT = 0.1  # [s]
+INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
+HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
+EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
+MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
+APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
+UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
+WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question, its answer as a level of LEVELS, and a sentence."""
+
+    level: str
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Verdict of all checks: level, headline, and the checks."""
+
+    level: str
+    headline: str
+    checks: tuple[Check, ...]
+
+
+def judge(result: CalibrationResult) -> Judgement:
+    """Applies all checks to a calibration."""
+    checks = (
+        _noise_as_stated(result),
+        _white(result),
+        _even(result),
+        _determined(result),
+        _held(result),
+        _honest_sigmas(result),
+        _same_time(result),
+        _two_ways(result),
+    )
+    worst = max((LEVELS.index(c.level) for c in checks), default=0)
+    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
+    return Judgement(level, ANSWERS[level], checks)
+
+
+def is_held(parameter: ParameterEstimate) -> bool:
+    """Whether the prior, not the recording, determines a parameter."""
+    return parameter.prior_sigma > 0.0 and parameter.sigma > HELD * parameter.prior_sigma
+
+
+def is_mounting_or_bias(parameter: ParameterEstimate) -> bool:
+    """Whether it describes how a sensor sits, not how the robot moves."""
+    return ".R_imu_body" in parameter.name or ".bias" in parameter.name
+
+
+def channel_whiteness(fit: BagFit) -> dict[str, float]:
+    """Largest autocorrelation of each channel's residual over short lags."""
+    return {
+        channel: float(np.max(np.abs(autocorrelation((s.measured - s.predicted)[:, i])), initial=0.0))
+        for s in fit.residuals.values()
+        for i, channel in enumerate(s.channels)
+    }
+
+
+def _noise_as_stated(result: CalibrationResult) -> Check:
+    name = "Residuals as large as the sensor noise"
+    if not result.channels:
+        return Check("info", name, "There are no channels to check.")
+    chi2s = {c: f.chi2 for c, f in result.channels.items()}
+    worst = max(chi2s, key=lambda c: chi2s[c])
+    smallest = min(chi2s, key=lambda c: chi2s[c])
+    level = _level(chi2s[worst], CHI2)
+    if level == "good" and chi2s[smallest] < TOO_SMALL:
+        # a sigma that was taken too large does no harm to the values
+        text = f"{smallest} has χ² per sample {significant(chi2s[smallest])}: its noise is smaller than its sigma."
+        return Check("info", name, text)
+    if level == "good":
+        low, high = min(f.chi2 for f in result.channels.values()), max(f.chi2 for f in result.channels.values())
+        return Check(level, name, f"χ² per sample is {low:.2f} to {high:.2f} over all channels; 1 is expected.")
+    count = sum(chi2 > CHI2[0] for chi2 in chi2s.values())
+    return Check(
+        level,
+        name,
+        f"{worst} has χ² per sample {significant(chi2s[worst])} (1 is expected): the model misses something there, or "
+        f"its noise is larger than stated. {count} of {len(chi2s)} channels are off.",
+    )
+
+
+def _white(result: CalibrationResult) -> Check:
+    found: dict[str, float] = {}
+    for bag in result.bags:
+        for channel, value in channel_whiteness(bag).items():
+            found[channel] = max(found.get(channel, 0.0), value)
+    if not found:
+        return Check("info", "Residuals without memory", "There are no residuals to check.")
+    levels = {c: _colour_level(value, result.channels[c].chi2) for c, value in found.items()}
+    worst = max(found, key=lambda c: (LEVELS.index(levels[c]), found[c]))
+    level = levels[worst]
+    tail = "nothing systematic is left" if level == "good" else "something systematic is left in it"
+    text = f"The largest autocorrelation over {LAGS} samples is {found[worst]:.2f}, in {worst}: {tail}."
+    return Check(level, "Residuals without memory", text)
+
+
+def _colour_level(correlation: float, chi2: float) -> str:
+    """Residuals far below the noise of their sensor may have a memory without doing much harm."""
+    level = _level(correlation, CORRELATION)
+    return "warn" if level == "bad" and chi2 < TOO_SMALL else level
+
+
+def _even(result: CalibrationResult) -> Check:
+    """The worst window in practical size: with many samples every deviation is significant, few matter."""
+    noise, velocities = result.noise, result.robot.layout.velocities
+    density = np.concatenate([noise.link_velocity, noise.motor_velocity])
+    worst, where, when = 0.0, "", 0.0
+    for bag in result.bags:
+        edges, rms = strength(bag.ticks[:-1], (bag.process / bag.process_sigma)[:, : len(density)])
+        size = np.sqrt(np.mean(bag.states[:, velocities] ** 2, axis=0))
+        share = rms * density * np.sqrt(DRIFT) / np.where(size > 0, size, np.inf)
+        k, i = np.unravel_index(int(np.nanargmax(share)), share.shape)
+        if share[k, i] > worst:
+            worst, where, when = float(share[k, i]), equation_names(result)[i], float(edges[k])
+    level = _level(worst, UNEXPLAINED)
+    text = (
+        f"At its worst ({where} equation, around {when:.1f} s) the dynamics leave {significant(100 * worst, 2)} % of "
+        f"the velocity open after {DRIFT:g} s"
+        + ("." if level == "good" else ": an effect may be missing that acts there.")
+    )
+    return Check(level, "Dynamics hold throughout", text)
+
+
+def _determined(result: CalibrationResult) -> Check:
+    name = "Every parameter determined by the motion"
+    open_by = _typically_open(result)
+    if open_by > UNDETERMINED:
+        return Check(
+            "bad",
+            name,
+            f"Typical values are only known to ±{significant(100 * open_by, 2)} %: the recording tells their ratios at "
+            "best. Hold one that you know with `fixed: true` in the robot file, or record more.",
+        )
+    weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]
+    if weak:
+        return Check("warn" if weak[0].sigma > WEAK else "info", name, weak[0].text)
+    if result.weak_directions:
+        return Check("info", name, f"All dynamic parameters are, but: {result.weak_directions[0].text}")
+    return Check("good", name, "No combination of parameters is weakly determined.")
+
+
+def _typically_open(result: CalibrationResult) -> float:
+    """Median relative sigma of the dynamic parameters."""
+    free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit != "s" and p.value]
+    return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
+
+
+def _held(result: CalibrationResult) -> Check:
+    name = "Values from data, not from priors"
+    noted = [p for p in result.parameters if p.note or is_held(p)]
+    dynamic = [p for p in noted if not is_mounting_or_bias(p)]
+    if not noted:
+        return Check("good", name, "No parameter leans on its prior or lies on a bound.")
+    text = "; ".join(f"{p.name}: {p.note or 'held by its prior'}" for p in (dynamic or noted)[:3])
+    more = f" and {len(dynamic or noted) - 3} more" if len(dynamic or noted) > 3 else ""
+    return Check("warn" if dynamic else "info", name, f"{text}{more}.")
+
+
+def _honest_sigmas(result: CalibrationResult) -> Check:
+    name = "Sigmas that can be trusted"
+    if not result.sigma_inflation:
+        return Check("info", name, "They assume white noise; no comparison with blocks of the recording was made.")
+    worst = max(result.sigma_inflation, key=lambda p: result.sigma_inflation[p])
+    factor = result.sigma_inflation[worst]
+    level = _level(factor, INFLATION)
+    if result.recording_seconds < BLOCK * FEWEST_BLOCKS:
+        return Check("info", name, "The recording is too short to compare blocks of it; they assume white noise.")
+    if factor <= 1.05:
+        return Check(level, name, "Blocks of the recording scatter no more than white noise would.")
+    return Check(
+        level,
+        name,
+        f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
+        f"would ({worst}); the sigmas shown include it.",
+    )
+
+
+def _same_time(result: CalibrationResult) -> Check:
+    """A delay of a fraction of a millisecond is friction that is not there, and no residual shows it."""
+    name, timing = "Drive signal and sensors at the same time", result.timing
+    if timing is None:
+        return Check("info", name, "The model has times of its own, or this was not looked at.")
+    delay, sigma = abs(timing.delay), timing.sigma
+    moved = [p for p in result.parameters if _matters(p, timing.changes.get(p.name, 0.0))]
+    if delay < EARLY_OR_LATE * sigma or not moved:
+        text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+        return Check("good", name, text)
+    worst = max(moved, key=lambda p: abs(timing.changes[p.name]) / p.sigma)
+    other = worst.value + timing.changes[worst.name]
+    return Check(
+        "warn",
+        name,
+        f"The drive signal seems to act {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms "
+        f"{'after' if timing.delay > 0.0 else 'before'} its stamp, with which {worst.name} would be "
+        f"{significant(other)} instead of {significant(worst.value)} {worst.unit}: `jointscope add "
+        f"{result.start.path.name} {timing.label} -o OUT.yaml`, then calibrate again.",
+    )
+
+
+def _two_ways(result: CalibrationResult) -> Check:
+    """Regression needs no states and no process noise; where both disagree one of them is wrong."""
+    name = "Regression says the same"
+    if not result.regressed:
+        return Check("info", name, "Regression knows rigid joints with dry and viscous friction only.")
+    table = {p.name: p for p in result.parameters}
+    apart = {n: _apart(table[n], other.value, other.sigma) for n, other in result.regressed.items() if n in table}
+    worst = max(apart, key=lambda n: apart[n], default="")
+    if not worst or apart[worst] <= APART[0]:
+        return Check("good", name, f"So it does of {len(apart)} values, each within its uncertainty or a few percent.")
+    found, other = table[worst], result.regressed[worst]
+    return Check(
+        "warn",
+        name,
+        f"{worst} is {significant(found.value)} ± {significant(found.sigma, 1)} {found.unit} here and "
+        f"{significant(other.value)} ± {significant(other.sigma, 1)} {found.unit} by regression on the same "
+        f"recordings, {significant(apart[worst], 2)} sigma apart: one of the two is wrong.",
+    )
+
+
+def _apart(found: ParameterEstimate, value: float, sigma: float) -> float:
+    """Distance of two values of a parameter in their sigmas; zero where it is a small share of it."""
+    distance = abs(found.value - value)
+    if distance <= APART[1] * max(abs(found.value), abs(value)):
+        return 0.0
+    return float(distance / max(np.hypot(found.sigma, sigma), 1e-300))
+
+
+def _matters(parameter: ParameterEstimate, change: float) -> bool:
+    sigmas, share = MOVES
+    return abs(change) > sigmas * parameter.sigma and abs(change) > share * abs(parameter.value)
+
+
+def equation_names(result: CalibrationResult) -> list[str]:
+    """Names of the columns of BagFit.process without those of memories."""
+    layout = result.robot.layout
+    return [f"{name} link" for name in layout.links] + [f"{name} motor" for name in layout.motors]
+
+
+def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
+    """The dynamic parameter with the largest sigma relative to its value, and that share; times have none."""
+    told = [p for p in result.parameters if p.value and p.unit != "s" and not is_mounting_or_bias(p)]
+    shares = {p.name: p.sigma / abs(p.value) for p in told}
+    if not shares:
+        return "", float("nan")
+    worst = max(shares, key=lambda name: shares[name])
+    return worst, shares[worst]
+
+
+def _is_sensor_name(name: str) -> bool:
+    return ".R_imu_body" in name or ".rotation" in name or ".bias" in name
+
+
+def _level(value: float, limits: tuple[float, float]) -> str:
+    if not np.isfinite(value):
+        return "bad"
+    return "good" if value <= limits[0] else "warn" if value <= limits[1] else "bad"

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tracking errors over time: distance of the head from its planned place, and the error of every link."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
+from jointscope.tools.presentation.numbers import prefixed
+from jointscope.tools.report.page.page import Key, Section, figure
+from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.sections.closed_loop.loop_colours import COLOURS, by_controller, source_keys
+
+LEAST = 1e-5  # [m] below this the logarithmic axis ends
+
+
+def loop_errors(result: ClosedLoopResult) -> Section:
+    """One figure per controller."""
+    body = ""
+    for title, runs in by_controller(result):
+        body += f"<h3>{title}</h3>" + figure(_panels(result, runs), source_keys(runs), group="loop")
+    lead = "Drag to look closer, double click for the whole time; all figures follow."
+    return Section("errors", "Errors over time", body + _planned(result), lead)
+
+
+def _panels(result: ClosedLoopResult, runs: list[LoopRun]) -> list[str]:
+    t, n = result.plan.times, result.plan.q.shape[1]
+    distance: list[Mark] = [
+        _curve(run, t, np.maximum(1e3 * np.linalg.norm(run.head - result.head, axis=1), 1e3 * LEAST)) for run in runs
+    ]
+    panels = [plot(Axes("head, distance from the plan [mm]", "", height=190, log_y=True), distance)]
+    worst = max(float(np.max(np.abs(run.states[:, :n] - result.plan.q))) for run in runs)
+    factor, unit = prefixed(worst, "rad")
+    for i, joint in enumerate(result.robot.joints):
+        last = i == n - 1
+        errors: list[Mark] = [_curve(run, t, factor * (run.states[:, i] - result.plan.q[:, i])) for run in runs]
+        axes = Axes(f"{joint} link, true − planned [{unit}]", "time [s]" if last else "", height=120 + 28 * last)
+        panels.append(plot(axes, errors))
+    return panels
+
+
+def _planned(result: ClosedLoopResult) -> str:
+    """The plan itself, and where the hits are in it."""
+    t, names = result.plan.times, result.robot.joints
+    hits = [hit.time for hit in result.plan.hits]
+    panels = []
+    for k, (title, values) in enumerate(
+        (("planned link angle [rad]", result.plan.q), ("planned velocity [rad/s]", result.plan.v))
+    ):
+        marks: list[Mark] = [Curve(name, t, values[:, i], f"k{i % 6}") for i, name in enumerate(names)]
+        at = np.array([values[result.plan.tick(time)] for time in hits])
+        marks += [_dots(f"hit {names[i]}", np.array(hits), at[:, i], f"k{i % 6}") for i in range(len(names))]
+        panels.append(plot(Axes(title, "time [s]" if k else "", height=150 + 28 * k), marks))
+    keys = [Key(name, f"k{i % 6}") for i, name in enumerate(names)]
+    return "<h3>The plan</h3>" + figure(panels, keys, "Dots are the hits.", group="loop")
+
+
+def _dots(name: str, times: np.ndarray, values: np.ndarray, colour: str) -> Curve:
+    """Single points: each is a short stroke, and NaN lifts the pen between them."""
+    x = np.repeat(times, 3)
+    x[1::3] += 1e-4
+    x[2::3] += 2e-4
+    y = np.repeat(values, 3)
+    y[2::3] = np.nan
+    return Curve(name, x, y, colour, "dots")
+
+
+def _curve(run: LoopRun, t: np.ndarray, y: np.ndarray) -> Curve:
+    return Curve(SOURCES[run.source], t, y, COLOURS[run.source])

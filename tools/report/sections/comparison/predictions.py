@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Measured signals with what each model predicts, open loop and 0.1 s ahead, sensor by sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointscope.graphs.comparison.comparison_result import ComparisonResult, SensorPrediction
+from jointscope.tools.report.page.page import Key, Section, figure
+from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.sparse_series import joined
+from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys
+
+
+def predictions(result: ComparisonResult) -> Section:
+    """One figure per sensor and kind of prediction."""
+    points = max(1500 // (1 + len(result.models)), 500)
+    body = ""
+    sensors = result.models[0].sensors if result.models else {}
+    for name in sensors:
+        body += f"<h3>{name}: 0.1 s ahead</h3>" + _sensor(result, name, "ahead", points)
+        body += f"<h3>{name}: open loop from the first state</h3>" + _sensor(result, name, "open_loop", points)
+    lead = (
+        "Broad and pale: measured. Dashed: predicted with the recorded commands alone, 0.1 s ahead from the state "
+        "known then, or open loop over the whole recording, where positions drift because nothing corrects them."
+    )
+    return Section("predictions", "Measured and predicted", body, lead)
+
+
+def channel_marks(
+    result: ComparisonResult, sensor: str, i: int, kind: str, points: int = 1500
+) -> tuple[str, list[Mark]]:
+    """Title and curves of one channel: measured, then every model."""
+    first = result.models[0].sensors[sensor]
+    marks: list[Mark] = [Curve("measured", first.times, first.measured[:, i], "soft", "wide", points)]
+    for k, model in enumerate(result.models):
+        if sensor in model.sensors:
+            prediction = model.sensors[sensor]
+            times, values = joined(prediction.times, getattr(prediction, kind)[:, i])
+            marks.append(Curve(model.label, times, values, model_colour(k), "dashed", points))
+    return f"{first.channels[i]} [{first.units[i]}]", marks
+
+
+def _sensor(result: ComparisonResult, name: str, kind: str, points: int) -> str:
+    first = result.models[0].sensors[name]
+    panels = []
+    for i in range(len(first.channels)):
+        title, marks = channel_marks(result, name, i, kind, points)
+        last = i == len(first.channels) - 1
+        limits = (float(first.times[0]), float(first.times[-1]))
+        axes = Axes(
+            title,
+            "time [s]" if last else "",
+            height=120 + 28 * last,
+            x_range=limits,
+            y_range=_readable(first, i, marks),
+        )
+        panels.append(plot(axes, marks))
+    keys = [Key("measured", "soft", "wide"), *model_keys(result)]
+    return figure(panels, keys, group="whole")
+
+
+def _readable(sensor: SensorPrediction, i: int, marks: list[Mark]) -> tuple[float, float]:
+    """Limits that follow the measurement; a prediction that runs away may leave the picture."""
+    low, high = float(np.nanmin(sensor.measured[:, i])), float(np.nanmax(sensor.measured[:, i]))
+    span = max(high - low, 20.0 * float(sensor.sigmas[i]))
+    values = np.concatenate([m.y[np.isfinite(m.y)] for m in marks if isinstance(m, Curve)])
+    return (
+        max(float(values.min()), low - 0.75 * span) - 0.06 * span,
+        min(float(values.max()), high + 0.75 * span) + 0.06 * span,
+    )

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What to type next."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from html import escape
+
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.discovery_result import Discovery
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.presentation.left_out import left_out_arguments
+from jointscope.tools.presentation.model_answer import missing_numerics, of_verdict
+from jointscope.tools.presentation.robot_argument import robot_argument
+from jointscope.tools.report.page.page import Section
+
+
+def after_diagnosis(result: Diagnosis) -> Section:
+    """Add the missing effect and calibrate, or let discover do it; or use the model."""
+    robot, bags, held = _quoted(robot_argument(result.robot)), _paths(result.recordings), _holdout(result.heldout)
+    missing = of_verdict(result, "missing") or missing_numerics(result)
+    found = [c.label for c in missing or of_verdict(result, "possible")]
+    if result.adequate:
+        return _section(
+            [("The model is adequate: calibrate with all recordings and use it.", [_calibrate(robot, bags)])]
+        )
+    blocks = []
+    if found:
+        effect = _quoted(found[0])
+        commands = [f"jointscope add {robot} {effect} -o with_effect.yaml", _calibrate("with_effect.yaml", bags)]
+        if result.heldout is not None:
+            commands.append(f"jointscope compare {robot} calibrated.yaml {_paths([result.heldout])}")
+        blocks.append(("Add the first effect, calibrate, and see whether the error falls:", commands))
+    discover = f"jointscope discover {robot} {bags}{held} -o found.yaml --report discovery.html"
+    blocks.append(("Or let the effects be added one by one, as long as the error falls:", [discover]))
+    return _section(blocks)
+
+
+def after_discovery(result: Discovery) -> Section:
+    """Look at the model that was found, and undo its last step."""
+    file = _quoted(result.robot_file or "found.yaml")
+    bag = _paths([result.heldout]) if result.heldout is not None else "ANOTHER_BAG"
+    first = _quoted(result.steps[0].robot_file or robot_argument(result.steps[0].robot))
+    blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
+    last = result.steps[-1].added
+    if last and last in {here.label for here in result.robot.effects}:  # a better integrator is no effect
+        blocks.append(
+            ("Take the last effect out again:", [f"jointscope remove {file} {_quoted(last)} -o without.yaml"])
+        )
+    if not result.adequate:
+        blocks.append(("See what is still missing:", [f"jointscope diagnose {file} {_paths(result.recordings)}"]))
+    return _section(blocks)
+
+
+def _section(blocks: Sequence[tuple[str, Sequence[str]]]) -> Section:
+    body = "".join(f"<p>{escape(text)}</p><pre>{escape(chr(10).join(commands))}</pre>" for text, commands in blocks)
+    return Section("next", "What to do next", body)
+
+
+def _calibrate(robot: str, bags: str) -> str:
+    return f"jointscope calibrate {robot} {bags} -o calibrated.yaml"
+
+
+def _holdout(recording: Recording | None) -> str:
+    return f" --holdout {_paths([recording])}" if recording is not None else ""
+
+
+def _paths(recordings: Sequence[Recording]) -> str:
+    return " ".join([*(_quoted(recording.path) for recording in recordings), *_left_out(recordings)]) or "BAG"
+
+
+def _left_out(recordings: Sequence[Recording]) -> list[str]:
+    return [f"--leave-out {_quoted(stretch)}" for stretch in left_out_arguments(recordings)]
+
+
+def _quoted(text: str) -> str:
+    return shlex.quote(text)

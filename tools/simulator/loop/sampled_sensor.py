@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sensors of one run: when each sample is taken and arrives, and what it says of a trajectory.
+
+The same samples can be had one by one while the engine runs (`OnlineSensors`) and all at once after it (`stream`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor
+from jointscope.robots.recordings.recording import Stream
+from jointscope.robots.units import joined
+from jointscope.tools.simulator.loop.sensing import MountedGyro, Sampling, read_encoder
+from jointscope.tools.simulator.world.engine import Engine
+from jointscope.tools.simulator.world.hooks import age, distort, logged, taken_at
+from jointscope.tools.simulator.world.random_streams import random_stream
+from jointscope.tools.simulator.world.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp] | slice
+
+
+class SampledSensor:
+    """One sensor with the times of all its samples; a child says what they read.
+
+    Args:
+        sensor: as in the robot file.
+        engine: the robot, and the effects that act on sensors.
+        sampling: how samples are taken and sent.
+        stamps: times of the samples by the clock of the sensor, shape (m,) [s].
+        seed: of losses and delays.
+
+    Attributes:
+        sensor: as given.
+        stamps: as given.
+        taken: when the samples are really taken, shape (m,) [s].
+        kept: which of them are not lost, shape (m,).
+        received: when they arrive, by the clock that stamps them, shape (m,) [s].
+    """
+
+    def __init__(self, sensor: Sensor, engine: Engine, sampling: Sampling, stamps: Array, seed: int):
+        self.sensor, self.stamps = sensor, stamps
+        self.taken = taken_at(engine.effects, sensor, stamps)
+        self.kept = sampling.kept(len(stamps), random_stream(seed, "drop", sensor.name))
+        self.received = sampling.received(stamps, random_stream(seed, "transport", sensor.name))
+        self._effects, self._age = engine.effects, age(engine.effects, sensor)
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """What the sensor gives out for some of its samples, which must lie inside the trajectory, shape (k, c)."""
+        raise NotImplementedError
+
+    def stream(self, trajectory: Trajectory) -> Stream:
+        """What a bag holds of the samples that were taken before the end and not lost."""
+        values = logged(self._effects, self.sensor, self.given_out(trajectory, slice(None)))
+        kept = (self.taken <= trajectory.end) & self.kept
+        sensor = self.sensor
+        return Stream(
+            sensor.name, self.stamps[kept], values[kept], sensor.channels, joined(sensor.units), self.received[kept]
+        )
+
+
+class SampledEncoder(SampledSensor):
+    """The encoders on the motors, or on the links; `noise` is standard normal, shape (m, n_joints)."""
+
+    def __init__(
+        self,
+        encoder: MotorEncoder | LinkEncoder,
+        engine: Engine,
+        sampling: Sampling,
+        stamps: Array,
+        seed: int,
+        noise: Array,
+    ):
+        super().__init__(encoder, engine, sampling, stamps, seed)
+        self._encoder, self._noise, self._quantized = encoder, noise, sampling.quantized
+        self._columns = engine.motor if isinstance(encoder, MotorEncoder) else engine.link
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Readings, shape (k, n_joints) [rad]."""
+        angles = self._angles(trajectory, self.taken[rows])
+        angles = distort(self._effects, self._encoder, self.stamps[rows], angles)
+        return read_encoder(self._encoder, angles, self._noise[rows], self._quantized)
+
+    def _angles(self, trajectory: Trajectory, times: Array) -> Array:
+        """Each rotor or link as old as its channel, shape (k, n_joints) [rad]."""
+        angles = np.empty((len(times), len(self._columns)))
+        for old in np.unique(self._age):
+            now = self._age == old
+            angles[:, now] = trajectory.at(times - old)[0][:, self._columns[now]]
+        return angles
+
+
+class SampledGyro(SampledSensor):
+    """One gyro as it is mounted."""
+
+    def __init__(self, gyro: MountedGyro, engine: Engine, sampling: Sampling, stamps: Array, seed: int):
+        super().__init__(gyro.sensor, engine, sampling, stamps, seed)
+        self._gyro, self._engine = gyro, engine
+        self._noise = random_stream(seed, "noise", gyro.sensor.name).standard_normal((len(stamps), 3))
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Rates, shape (k, 3) [rad/s]."""
+        gyro, sensor = self._gyro, self._gyro.sensor
+        q, v = trajectory.at(self.taken[rows] - self._age[0])
+        rates = self._engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T
+        rates = distort(self._effects, sensor, self.stamps[rows], rates)
+        return rates + gyro.bias + sensor.sigma * self._noise[rows]

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot in MuJoCo: its model, its drives, hooks for what effects change."""

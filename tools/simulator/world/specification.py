@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The MuJoCo model of a robot with elastic joints, built from parts that the engine already has.
+
+Each link is a body with its joint. Each rotor is a body of its own in the world, so it feels nothing of the link's
+motion but the spring: a fixed tendon of "length" q_link - q_motor with stiffness and damping. The motor is an actuator
+on the rotor whose gain is the voltage constant and whose bias is the back-EMF. Dry friction is the engine's own
+friction loss. No equation of motion is written here; the engine makes them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.tools.simulator.world.inertia import full_inertia
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
+
+Array = NDArray[np.float64]
+
+DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
+STIFF = (4e-4, 1.0)  # [s] time constant and damping ratio with which a mimic joint is pulled back; two steps at 5 kHz
+DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # almost rigid
+
+
+def link_body(joint: str) -> str:
+    """Name of the body that a joint moves."""
+    return f"{joint}.link"
+
+
+def motor_joint(joint: str) -> str:
+    """Name of the rotor's hinge."""
+    return f"{joint}.motor"
+
+
+def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
+    """The editable model: chain, rotors, springs, motors, one site per gyro.
+
+    Args:
+        robot: the robot with the true parameter values.
+        friction: "dry" for the engine's friction loss on the rotors; anything else leaves them without friction.
+        timestep: of the integration [s].
+
+    Returns:
+        A `mujoco.MjSpec`, not yet compiled. Joints carry the robot's joint names, rotors `motor_joint(name)`.
+    """
+    mujoco = load_mujoco()
+    spec = mujoco.MjSpec()
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.timestep = timestep
+    spec.option.gravity = robot.tree.gravity
+    # The engine would otherwise shift a body's inertia to satisfy inequalities that the robot file has passed already.
+    spec.compiler.balanceinertia = False
+    _add_links(mujoco, spec, robot)
+    _tie_followers(mujoco, spec, robot)
+    for joint in robot.joints:
+        _add_rotor(mujoco, spec, robot, joint, friction)
+        _add_spring(spec, robot, joint)
+        _add_motor(mujoco, spec, robot, joint)
+    for gyro in robot.gyros:
+        _add_site(spec, robot, gyro.name, gyro.body)
+    return spec
+
+
+def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
+    model = robot.tree.model
+    for j in range(1, model.njoints):
+        name, parent = model.names[j], model.parents[j]
+        placement, inertia = model.jointPlacements[j], model.inertias[j]
+        parent_body = spec.body(link_body(model.names[parent])) if parent else spec.worldbody
+        body = parent_body.add_body(
+            name=link_body(name),
+            pos=placement.translation,
+            quat=_quaternion_wxyz(placement.rotation),
+            explicitinertial=True,
+            mass=max(inertia.mass, 1e-9),  # [kg] the engine refuses a moving body without any
+            ipos=inertia.lever,
+            fullinertia=full_inertia(inertia.inertia),  # about the centre of mass, in the axes of the joint
+        )
+        axis, turns = joint_axis(model, j)
+        kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
+        body.add_joint(name=name, type=kind, axis=axis)
+
+
+def _tie_followers(mujoco: Any, spec: Any, robot: Robot) -> None:
+    """Mimic joints as equations between joints, which the engine holds by forces; off by some 1e-9 rad."""
+    for name, follower in robot.tree.followers.items():
+        tie = spec.add_equality(
+            name=f"{name} follows",
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=name,
+            name2=follower.leader,
+            solref=STIFF,
+            solimp=DRY_IMPEDANCE,
+        )
+        tie.data[:2] = follower.offset, follower.factor  # of a polynomial in the leader's position
+        tie.data[2:5] = 0.0
+
+
+def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
+    """Axis of a joint in its own frame, and whether it turns: what pinocchio made of the URDF's <axis>."""
+    column = joint_motion_axis(model, j)
+    turns = bool(np.any(column[3:]))
+    return (column[3:] if turns else column[:3]), turns
+
+
+def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) -> None:
+    inertia = robot.drive_parameter(joint, "inertia").value
+    rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
+    hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+    if friction == "dry":
+        add_dry_friction(hinge, robot.parameter(f"{joint}.coulomb_torque").value)
+
+
+def _add_spring(spec: Any, robot: Robot, joint: str) -> None:
+    tendon = spec.add_tendon(name=spring_tendon(joint))
+    tendon.wrap_joint(joint, 1.0)
+    tendon.wrap_joint(motor_joint(joint), -1.0)
+    tendon.springlength = [0.0, 0.0]
+    set_linear(tendon, "stiffness", robot.parameter(f"{joint}.stiffness").value)
+    set_linear(tendon, "damping", robot.parameter(f"{joint}.damping").value)
+
+
+def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
+    gain, back_emf = 1.0, 0.0
+    if robot.drive_gain is not None:
+        gain = robot.drive_parameter(joint, robot.drive_gain).value * robot.command_volts
+    if "k_mi" in robot.drive_laws:
+        back_emf = robot.drive_parameter(joint, "k_mi").value
+    motor = spec.add_actuator(
+        name=drive(joint),
+        target=motor_joint(joint),
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    motor.gainprm[0] = gain
+    motor.biasprm[2] = -back_emf
+
+
+def _add_site(spec: Any, robot: Robot, name: str, body: str) -> None:
+    frame = robot.tree.model.frames[robot.tree.frame_id(body)]
+    joint = robot.tree.model.names[frame.parentJoint]
+    parent = spec.body(link_body(joint)) if frame.parentJoint else spec.worldbody
+    placement = frame.placement
+    parent.add_site(name=name, pos=placement.translation, quat=_quaternion_wxyz(placement.rotation))
+
+
+def set_linear(element: Any, name: str, value: float) -> None:
+    """Sets a stiffness or damping, which is a number in MuJoCo 3 and the coefficients of a polynomial in MuJoCo 4."""
+    if np.ndim(getattr(element, name)):
+        getattr(element, name)[:] = [value, 0.0, 0.0]
+    else:
+        setattr(element, name, value)
+
+
+def add_linear(element: Any, name: str, value: float) -> None:
+    """Adds to the linear part of a stiffness or damping, see `set_linear`."""
+    if np.ndim(getattr(element, name)):
+        getattr(element, name)[0] += value
+    else:
+        setattr(element, name, getattr(element, name) + value)
+
+
+def add_dry_friction(hinge: Any, torque: float) -> None:
+    """Adds to the engine's friction loss of a joint [N m], and makes it as hard as can be integrated."""
+    hinge.frictionloss += torque
+    hinge.solref_friction = [DRY_TIME_CONSTANT, 1.0]
+    hinge.solimp_friction = DRY_IMPEDANCE
+
+
+def spring_tendon(joint: str) -> str:
+    """Name of the tendon whose length is the deflection of a joint, q_link - q_motor."""
+    return f"{joint}.spring"
+
+
+def drive(joint: str) -> str:
+    """Name of a joint's motor."""
+    return f"{joint}.drive"
+
+
+def _quaternion_wxyz(R: Array) -> Array:
+    x, y, z, w = pin.Quaternion(R).coeffs()
+    return np.array([w, x, y, z])

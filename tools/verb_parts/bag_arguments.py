@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ROBOT BAG... [--holdout BAG]: what the verbs take that learn from recordings and are judged by another one."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
+from jointscope.tools.terminal.progress import Progress, reading
+from jointscope.tools.verb_parts.first_look import first_look
+from jointscope.tools.verb_parts.user_effects import add_effects_option
+
+
+def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments."""
+    parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
+    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument(
+        "--holdout", metavar="BAG", type=Path, help="a recording that is scored and reported, but never chooses"
+    )
+    parser.add_argument(
+        "--holdout-share",
+        metavar="SHARE",
+        type=float,
+        help="hold out the last part of the only BAG instead, for example 0.33; zeros of encoders and biases of gyros "
+        "are fitted again there",
+    )
+    add_leave_out_option(parser)
+    add_effects_option(parser)
+
+
+def input_files(args: argparse.Namespace) -> list[Path]:
+    """Everything that must not be overwritten."""
+    robot = [Path(args.robot)] if Path(args.robot).is_file() else []
+    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *args.effects]
+
+
+def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
+    """The training recordings and the held-out one; says what looks like a plain mistake in them.
+
+    Raises:
+        RecordingError: a bag cannot be read or cannot be a measurement of this robot, the held-out one is also a
+            training recording, or what is to be left out is not there.
+    """
+    recordings, holdout = _read(args, robot, progress)
+    first_look(robot, [*recordings, *([holdout] if holdout is not None else [])])
+    return recordings, holdout
+
+
+def _read(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
+    """What the arguments name; arguments as in `read_bags`."""
+    from jointscope.tools.bags import read_recording
+
+    recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+    if args.holdout_share is not None:
+        return _last_part_held_out(args, leave_out(recordings, args.leave_out))
+    if args.holdout is None:
+        return leave_out(recordings, args.leave_out), None
+    holdout = read_recording(args.holdout, robot, reading(args.holdout, progress))
+    _check_apart(recordings, holdout)
+    *recordings, holdout = leave_out([*recordings, holdout], args.leave_out)
+    return recordings, holdout
+
+
+def _last_part_held_out(
+    args: argparse.Namespace, recordings: Sequence[Recording]
+) -> tuple[list[Recording], Recording | None]:
+    """The first part of a recording for training, the last part held out."""
+    if args.holdout is not None:
+        raise RecordingError("--holdout and --holdout-share exclude each other; give one of them")
+    if len(recordings) > 1:
+        raise RecordingError(
+            f"--holdout-share: expected a single BAG, got {len(recordings)}; hold one of them out with --holdout"
+        )
+    if not 0.05 <= args.holdout_share <= 0.95:
+        raise RecordingError(f"--holdout-share {args.holdout_share:g}: expected a share from 0.05 to 0.95")
+    (whole,) = recordings
+    end = max(float(stream.times[-1]) for stream in whole.streams.values())
+    cut = end - args.holdout_share * whole.duration
+    return [whole.between(float("-inf"), cut)], whole.between(cut, float("inf"))
+
+
+def _check_apart(recordings: Sequence[Recording], holdout: Recording) -> None:
+    for recording in recordings:
+        if recording.sha256 and recording.sha256 == holdout.sha256:
+            raise RecordingError(
+                f"--holdout {holdout.path} is also a training recording ({recording.path}); hold out one that the "
+                "model has not seen"
+            )

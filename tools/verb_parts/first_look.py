@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What looks odd in recordings, said before the computation begins: minutes with swapped axes teach nothing."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TextIO
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.screening import screen
+from jointscope.tools.terminal.progress import ERASE_LINE
+
+PLAIN_MISTAKES = ("unit", "axes")  # kinds of notices
+
+
+def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | None = None) -> None:
+    """Screens all recordings and prints what looks like a plain mistake.
+
+    Args:
+        robot: as the user gave it.
+        recordings: everything that will be used, the held-out one included.
+        stream: where to print; standard error by default.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot; the message says which one.
+    """
+    stream = stream or sys.stderr
+    seen: dict[str, str] = {}
+    for recording in recordings:
+        for notice in _screened(recording, robot):
+            if notice.kind in PLAIN_MISTAKES:
+                seen.setdefault(notice.text, recording.path)
+    if not seen:
+        return
+    lead = ERASE_LINE if stream.isatty() else ""
+    for text, path in seen.items():
+        stream.write(f"{lead}{path}: {text}\n")
+    stream.write(
+        "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording "
+        "takes long to calibrate (Ctrl-C ends it).\n"
+    )
+    stream.flush()
+
+
+def _screened(recording: Recording, robot: Robot) -> list[Notice]:
+    try:
+        return screen(recording, robot)
+    except RecordingError as err:
+        if recording.path in str(err):
+            raise
+        raise RecordingError(f"{recording.path}: {err}") from err

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writes what a verb found as robot file, report, rerun recording and JSON: all of them, or none."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import jointscope
+from jointscope.robots.outside_modules import need_module
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.writing.whole_file import whole_file, write_json
+
+
+@dataclass(frozen=True)
+class ResultFiles:
+    """The files that the user asked for; None where not.
+
+    Attributes:
+        report: HTML.
+        rrd: rerun recording.
+        json: what the screen says, for machines.
+        robot: robot file; only a calibration has one.
+
+    Raises:
+        JointscopeError: an rrd is asked for, and rerun is not there.
+    """
+
+    report: Path | None = None
+    rrd: Path | None = None
+    json: Path | None = None
+    robot: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.rrd is not None:
+            need_module("rerun")  # now, not after an hour of work
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> ResultFiles:
+        """The files named on the command line."""
+        return cls(args.report, args.rrd, args.json, getattr(args, "output", None))
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """Those that were asked for."""
+        return tuple(path for path in (self.robot, self.report, self.rrd, self.json) if path is not None)
+
+    @property
+    def pictures(self) -> bool:
+        """Whether anything with pictures was asked for."""
+        return self.report is not None or self.rrd is not None
+
+
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Adds --report, --rrd and --json, which every verb that estimates something takes."""
+    parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
+    parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+
+
+def write_calibration(result: Any, files: ResultFiles) -> None:
+    """Writes a CalibrationResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.files.robot_writer import robot_text
+
+            text = robot_text(result.robot, files.robot.parent, provenance(result))
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        from jointscope.tools.report import calibration_report
+        from jointscope.tools.rerun_log import log_calibration
+
+        _write_views(stack, result, files, calibration_report, log_calibration)
+
+
+def write_comparison(result: Any, files: ResultFiles) -> None:
+    """Writes a ComparisonResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report import comparison_report
+        from jointscope.tools.rerun_log import log_comparison
+
+        _write_views(stack, result, files, comparison_report, log_comparison)
+
+
+def write_diagnosis(result: Any, files: ResultFiles) -> None:
+    """Writes a Diagnosis.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report import diagnosis_report
+        from jointscope.tools.rerun_log import log_diagnosis
+
+        _write_views(stack, result, files, diagnosis_report, log_diagnosis)
+
+
+def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
+    """Writes a Discovery; its last robot goes to `files.robot`.
+
+    Args:
+        result: what was found.
+        files: where to.
+        start: name of the base robot's file.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.files.robot_writer import robot_text
+
+            last = len(result.steps) - 1
+            text = robot_text(
+                result.robot, files.robot.parent, step_provenance(result.steps[last], last, start, result.recordings)
+            )
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        from jointscope.tools.report import discovery_report
+        from jointscope.tools.rerun_log import log_discovery
+
+        _write_views(stack, result, files, discovery_report, log_discovery)
+
+
+def write_closed_loop(result: Any, files: ResultFiles) -> None:
+    """Writes a ClosedLoopResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report import closed_loop_report
+        from jointscope.tools.rerun_log import log_closed_loop
+
+        _write_views(stack, result, files, closed_loop_report, log_closed_loop)
+
+
+def write_replay(result: Any, files: ResultFiles) -> None:
+    """Writes a ReplayResult.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        from jointscope.tools.report.replay_report import replay_report
+        from jointscope.tools.rerun_log.log_replay import log_replay
+
+        _write_views(stack, result, files, replay_report, log_replay)
+
+
+def _write_views(
+    stack: ExitStack,
+    result: Any,
+    files: ResultFiles,
+    report: Callable[[Any], str],
+    log: Callable[[Any, Path], None],
+) -> None:
+    """Report, rerun recording and JSON; they take their places when the stack closes."""
+    if files.report is not None:
+        html = report(result)
+        stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+    if files.rrd is not None:
+        log(result, stack.enter_context(whole_file(files.rrd)))
+    if files.json is not None:
+        write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+
+
+def provenance(result: Any) -> dict[str, Any]:
+    """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
+    return {
+        **origin(result.start.path.name, [bag.recording for bag in result.bags]),
+        "samples": int(result.samples),
+        "cost": float(result.cost),
+    }
+
+
+def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Where a step of a discovery comes from: the same, and what was changed."""
+    errors = {"train_error": step.train_error, "heldout_error": step.heldout_error, "floor": step.floor}
+    return {
+        **origin(start, recordings),
+        "discovery_step": index,
+        **{name: label for name, label in (("added", step.added), ("removed", step.removed)) if label},
+        **{name: float(f"{value:.6g}") for name, value in errors.items() if math.isfinite(value)},
+    }
+
+
+def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Version, date, name of the start model's file, and bags with hashes."""
+    return {
+        "version": jointscope.__version__,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "start": start,
+        "bags": [
+            {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
+            | ({"left_out": [list(stretch) for stretch in recording.left_out]} if recording.left_out else {})
+            for recording in recordings
+        ],
+    }
