@@ -1,6 +1,57 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jointscope: calibrate flexible-joint robots from recordings and see what the model cannot explain."""
+"""Jointscope: calibrate flexible-joint robots from recordings and see what the model cannot explain.
 
+The names below are what programs build on; modules may move. They are imported when they are first used.
+"""
+
+from __future__ import annotations
+
+import importlib
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jointscope.graphs.calibration.calibrate import calibrate
+    from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
+    from jointscope.graphs.comparison.compare import compare
+    from jointscope.graphs.discovery.diagnose import diagnose
+    from jointscope.graphs.discovery.discover import discover
+    from jointscope.graphs.fixed_lag.estimator import FixedLagEstimator
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.robots.files.robot_writer import robot_text
+    from jointscope.tools.bags.read_recording import read_recording
 
 __version__ = version("jointscope")
+__all__ = [
+    "CalibrationGraph",
+    "FixedLagEstimator",
+    "calibrate",
+    "compare",
+    "diagnose",
+    "discover",
+    "load_robot",
+    "read_recording",
+    "robot_text",
+]
+
+_MODULES = {
+    "CalibrationGraph": "graphs.calibration.calibration_graph",
+    "FixedLagEstimator": "graphs.fixed_lag.estimator",
+    "calibrate": "graphs.calibration.calibrate",
+    "compare": "graphs.comparison.compare",
+    "diagnose": "graphs.discovery.diagnose",
+    "discover": "graphs.discovery.discover",
+    "load_robot": "robots.files.robot_file",
+    "read_recording": "tools.bags.read_recording",
+    "robot_text": "robots.files.robot_writer",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"jointscope.{_MODULES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])
