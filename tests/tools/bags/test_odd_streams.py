@@ -152,6 +152,15 @@ def test_a_clock_that_was_set_is_told_by_reception_and_mended(seconds):
     assert len(notices) == len(seams) == 2 and f"by {duration(seconds)} at message 900" in notices[0].text
 
 
+def test_stamps_that_no_clock_counts_are_not_brought_together():
+    samples = motion()
+    stamps = samples.stamps.copy()
+    stamps[700:] += int(5e9) * 10**9  # [ns] a clock set by 158 years
+    with np.errstate(all="raise"):
+        moved, seams, notices = on_one_clock({"motor_encoder": dataclasses.replace(samples, stamps=stamps)})
+    assert np.array_equal(moved["motor_encoder"].stamps, stamps) and not seams and not notices
+
+
 def test_a_queue_that_empties_is_no_clock():
     samples = motion()
     received = samples.received.copy()

@@ -24,6 +24,7 @@ PERIODS = 5.0  # a step is longer than so many periods
 WINDOW = 50  # messages on either side that tell the latency
 AGREE = 0.2  # of the step: the latency must jump as the stamps do
 SAME_MOMENT, SAME_STEP = 1.0, 0.05  # [s] of two streams of one clock
+LONGEST = 4.3e9  # [s] what 32 bits of seconds can count, from 1970 to 2106
 SEAM = 0.01  # [s] around the moment in which nothing is asked to hold
 
 
@@ -87,6 +88,8 @@ def on_one_clock(
         edges = [0, *(step.row for step in found), len(samples)]
         ahead = np.concatenate([[0.0], np.cumsum(sizes)])
         ahead -= ahead[int(np.argmax(np.diff(edges)))]
+        if np.abs(ahead).max() > LONGEST:
+            continue  # no clock was ever set by so much: these are no times
         stamps = samples.stamps - np.repeat(np.rint(1e9 * ahead).astype(np.int64), np.diff(edges))
         moved[name] = samples.stamped(stamps)
         for step, size in zip(found, sizes, strict=True):
