@@ -15,7 +15,7 @@ from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, Case
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
-from jointscope.graphs.discovery.diagnose import SUSPICION
+from jointscope.graphs.discovery.diagnose import LOOK_FIRST
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discover import discover
 from jointscope.graphs.discovery.discovery_result import Discovery
@@ -109,7 +109,7 @@ def _row(case: Case, recordings: Recordings, found: Discovery, seconds: float) -
         adequate=found.adequate,
         seconds=seconds,
         stages=dict(diagnosis.wall_seconds) if diagnosis else {},
-        suspicions=tuple(p for p in diagnosis.paragraphs if p.startswith(SUSPICION)) if diagnosis else (),
+        suspicions=tuple(p for p in diagnosis.paragraphs if p.startswith(LOOK_FIRST)) if diagnosis else (),
         leaders=tuple(map(_leader, diagnosis.candidates[:LEADERS])) if diagnosis else (),
         stop=found.stop_reason,
     )

@@ -62,6 +62,13 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+def imported_names(path: Path) -> set[str]:
+    """What the names are called that a file takes from other modules of the house."""
+    froms = [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom)]
+    ours = [node for node in froms if (node.module or "").startswith("jointscope.")]
+    return {alias.asname or alias.name for node in ours for alias in node.names}
+
+
 def room_of(path: Path) -> str:
     """The room that a file stands in."""
     return ".".join(path.relative_to(ROOT).parts[:-1])
@@ -94,6 +101,17 @@ def test_rooms_stand_in_one_order_of_imports(path):
         first, _, rest = module.partition(".")
         if first == "jointscope" and rest.split(".")[0] in FLOORS:
             assert room_of_import(rest) in before, f"{room_of(path)} stands before {room_of_import(rest)}: {module}"
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_imports_name_the_module_in_which_a_thing_stands(path):
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("jointscope."):
+            source = (ROOT / Path(*node.module.split(".")[1:])).with_suffix(".py")
+            passed_on = imported_names(source) if source.is_file() else set()
+            for alias in node.names:
+                assert alias.name not in passed_on, f"{node.module} only passes {alias.name} on: import it from its own"
+                assert alias.name != alias.asname, f"{alias.name} is passed on: let others import it from {node.module}"
 
 
 def test_no_room_is_a_hall():

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.comparison.causal_filter import filter_around
 from jointscope.graphs.noise.white_noise import separate_noise
-from jointscope.graphs.problem.bag_problem import BagProblem, factor_on_state, first_command_time
+from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.problem.sensor_placement import factor_on_state
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]

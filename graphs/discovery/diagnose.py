@@ -43,7 +43,7 @@ LEADERS = 3  # candidates that are refitted
 PATIENCE = 2  # times as many, as long as none of them helps: one effect may hide that another one is right
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
-SUSPICION = "Look at this before any effect"  # how a paragraph about a plain mistake begins
+LOOK_FIRST = "Look at this before any effect"  # how a paragraph about a plain mistake begins
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -140,10 +140,10 @@ def diagnose(
         recordings=base.recordings,
         heldout=holdout,
     )
-    return replace(result, paragraphs=(*_suspicions(base), *paragraphs_of(result)))
+    return replace(result, paragraphs=(*_to_look_at_first(base), *paragraphs_of(result)))
 
 
-def _suspicions(base: BaseModel) -> list[str]:
+def _to_look_at_first(base: BaseModel) -> list[str]:
     """Plain mistakes that the screening saw, and pushes: they look like effects, so they come first.
 
     The robot as it was before its calibration is screened: a mounting that was calibrated hides axes that are swapped.
@@ -151,7 +151,7 @@ def _suspicions(base: BaseModel) -> list[str]:
     notices = [notice for recording in base.recordings for notice in screen(recording, base.result.start)]
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
-    return [f"{SUSPICION}: {text}." for text in texts]
+    return [f"{LOOK_FIRST}: {text}." for text in texts]
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:

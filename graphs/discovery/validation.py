@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.comparison.causal_filter import filter_states
-from jointscope.graphs.comparison.compare import HORIZON, Ahead, predict_ahead, smooth
+from jointscope.graphs.comparison.compare import smooth
 from jointscope.graphs.comparison.free_run import free_run, loop_error
 from jointscope.graphs.comparison.prediction import Predictor
+from jointscope.graphs.comparison.predictions_ahead import HORIZON, Ahead, predict_ahead
 from jointscope.graphs.discovery.loop_validation import judged_by_loop, loop_squares
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.model.robot import Robot

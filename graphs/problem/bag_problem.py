@@ -25,7 +25,6 @@ from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
-from jointscope.graphs.problem.sensor_placement import factor_on_state as factor_on_state
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints

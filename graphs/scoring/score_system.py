@@ -138,7 +138,7 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[ScoreRows]:
 
 
 @dataclass(frozen=True)
-class TrialSystem:
+class HypothesisSystem:
     """Reduced system of one segment on its shared values (p of them) and k sizes of hypotheses.
 
     Attributes:
@@ -152,7 +152,7 @@ class TrialSystem:
     W: Array
 
 
-def trial_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> TrialSystem:
+def hypothesis_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> HypothesisSystem:
     """Eliminates the states from the hypotheses' columns.
 
     Args:
@@ -176,7 +176,7 @@ def trial_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> TrialSy
     W, info = lapack.dtbtrs(base.L, B.reshape(m * d, k), uplo="L", overwrite_b=1)
     assert info == 0
     H = np.block([[base.S, C_pk - base.W.T @ W], [(C_pk - base.W.T @ W).T, C_kk - W.T @ W]])
-    return TrialSystem(H, np.concatenate([base.s, g_k - W.T @ base.w]), W)
+    return HypothesisSystem(H, np.concatenate([base.s, g_k - W.T @ base.w]), W)
 
 
 def _block_columns(calibration: Calibration) -> dict[str, slice]:

@@ -22,9 +22,10 @@ from scipy.special import fdtrc
 
 from jointscope.factors.priors import shared_priors
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.score_columns import Column, columns_of
-from jointscope.graphs.scoring.score_system import ScoreRows, Segment, rows_of, trial_system
+from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 
 Array = NDArray[np.float64]
@@ -78,7 +79,7 @@ class HypothesisScore:
 
 @dataclass(frozen=True)
 class JointScores:
-    """Trials scored together.
+    """Hypotheses scored together.
 
     Attributes:
         scores: one per hypothesis.
@@ -175,7 +176,7 @@ class ScoreTest:
         size, shared = self._shared.size, self._shared
         H, g, Ws = np.zeros((size + k, size + k)), np.zeros(size + k), []
         for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
-            system = trial_system(segment, rows, k)
+            system = hypothesis_system(segment, rows, k)
             index = np.concatenate([shared.indices(i), size + np.arange(k)])
             H[np.ix_(index, index)] += system.H
             g[index] += system.g

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor, Linearization
-from jointscope.graphs.problem.bag_problem import BagProblem, Placed
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.sensor_placement import Placed
 
 Array = NDArray[np.float64]
 

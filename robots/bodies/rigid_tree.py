@@ -21,9 +21,11 @@ from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
 from jointscope.robots.bodies.mimic_joints import Follower
 from jointscope.robots.bodies.possible_inertias import check_inertias
 from jointscope.robots.bodies.urdf_bodies import UrdfBodies
-from jointscope.robots.bodies.usable_joints import check_locked, check_moving, check_within_limits
-from jointscope.robots.bodies.usable_joints import joints_that_matter as joints_that_matter
-from jointscope.robots.bodies.usable_joints import moving_joints as moving_joints
+from jointscope.robots.bodies.usable_joints import (
+    check_locked,
+    check_moving,
+    check_within_limits,
+)
 from jointscope.robots.errors import RobotError
 
 Array = NDArray[np.float64]

@@ -130,7 +130,7 @@ def dof(hypothesis):
     return len(hypothesis.sizes)
 
 
-def one_trial_each(name, kinds=None):
+def one_hypothesis_each(name, kinds=None):
     """One hypothesis per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
     found = {}
     for hypothesis in hypotheses_of(ROBOTS[name]):

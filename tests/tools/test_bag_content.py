@@ -12,7 +12,8 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags.messages.message_type import known_message_type
-from jointscope.tools.bags.read_recording import needed_streams, read_recording
+from jointscope.tools.bags.needed_streams import needed_streams
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 
 JOINTS = ("joint1", "joint2", "joint3")

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from jointscope.tools.bags.describe_bag import BagDescription, describe_bag
+from jointscope.tools.bags.bag_description import BagDescription
+from jointscope.tools.bags.describe_bag import describe_bag
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 

@@ -22,14 +22,8 @@ from jointscope.tools.bags.bag_description import (
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType, inner_type
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
-from jointscope.tools.bags.read_recording import (
-    check_topic,
-    full_type_name,
-    left_out_notices,
-    needed_streams,
-    read_columns,
-    read_recording,
-)
+from jointscope.tools.bags.needed_streams import check_topic, full_type_name, needed_streams
+from jointscope.tools.bags.read_recording import left_out_notices, read_columns, read_recording
 from jointscope.tools.bags.tidying.clock_steps import on_one_clock
 from jointscope.tools.bags.tidying.not_finite import numbers_only
 from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing

@@ -22,15 +22,15 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Progress, RawTopic, bag_sha256, open_bag
-from jointscope.tools.bags.read_recording import (
+from jointscope.tools.bags.needed_streams import (
     StreamSource,
     check_topic,
     column_order,
     in_si,
     needed_streams,
-    read_columns,
     wanted_of,
 )
+from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.tidying.durations import counted
 
 BLOCK = 20_000  # messages

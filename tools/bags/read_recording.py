@@ -22,13 +22,14 @@ from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_parts import message_parts
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
-from jointscope.tools.bags.needed_streams import StreamSource as StreamSource
-from jointscope.tools.bags.needed_streams import check_topic as check_topic
-from jointscope.tools.bags.needed_streams import column_order as column_order
-from jointscope.tools.bags.needed_streams import full_type_name as full_type_name
-from jointscope.tools.bags.needed_streams import in_si as in_si
-from jointscope.tools.bags.needed_streams import needed_streams as needed_streams
-from jointscope.tools.bags.needed_streams import wanted_of as wanted_of
+from jointscope.tools.bags.needed_streams import (
+    StreamSource,
+    check_topic,
+    column_order,
+    in_si,
+    needed_streams,
+    wanted_of,
+)
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.tidying.clock_steps import on_one_clock
 from jointscope.tools.bags.tidying.durations import counted

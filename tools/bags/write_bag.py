@@ -18,7 +18,7 @@ from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags.messages.message_template import fill_messages
 from jointscope.tools.bags.messages.message_type import MessageType, known_message_type
 from jointscope.tools.bags.messages.open_bag import Progress, one_line, storage_files
-from jointscope.tools.bags.read_recording import StreamSource, full_type_name, needed_streams
+from jointscope.tools.bags.needed_streams import StreamSource, full_type_name, needed_streams
 
 FORMATS = ("bag", "db3", "mcap")
 PROGRESS_STEP = 10_000  # messages

@@ -88,7 +88,7 @@ def check_same_streams(robots: dict[str, Any]) -> None:
     Raises:
         RobotError: two robots read other topics, fields or units.
     """
-    from jointscope.tools.bags.read_recording import needed_streams
+    from jointscope.tools.bags.needed_streams import needed_streams
 
     (first, reference), *others = ((label, needed_streams(robot)) for label, robot in robots.items())
     for label, needed in others:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from jointscope.graphs.calibration import failures_with_notices as suspicions
+from jointscope.graphs.calibration import failures_with_notices
 from jointscope.graphs.calibration.failures_with_notices import names_notices, with_notices
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.discover import discover
@@ -37,7 +37,7 @@ def test_nothing_is_named_twice():
 
 @pytest.mark.parametrize("depth", [1, 2])
 def test_what_fails_inside_is_named_once(monkeypatch, depth):
-    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+    monkeypatch.setattr(failures_with_notices, "screen", lambda recording, robot: [SWAPPED])
 
     def fails(robot, recordings):
         raise SolveError("it ran away")
@@ -49,8 +49,8 @@ def test_what_fails_inside_is_named_once(monkeypatch, depth):
 
 
 @pytest.mark.parametrize("verb", [diagnose, discover])
-def test_verbs_that_learn_name_their_suspicions(monkeypatch, verb, doggy):
-    monkeypatch.setattr(suspicions, "screen", lambda recording, robot: [SWAPPED])
+def test_verbs_that_learn_name_what_looked_odd(monkeypatch, verb, doggy):
+    monkeypatch.setattr(failures_with_notices, "screen", lambda recording, robot: [SWAPPED])
     place = {"diagnose": "jointscope.graphs.discovery.diagnose", "discover": "jointscope.graphs.discovery.discover"}[
         verb.__name__
     ]
@@ -68,4 +68,4 @@ def test_the_robot_is_screened_as_it_was_before_its_calibration(monkeypatch):
     monkeypatch.setattr(diagnose_module, "screen", lambda recording, robot: [SWAPPED] if robot == "before" else [])
     result = SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())])
     base = SimpleNamespace(recordings=[recording()], robot="after", result=result)
-    assert diagnose_module._suspicions(base) == [f"{diagnose_module.SUSPICION}: {SWAPPED.text}."]
+    assert diagnose_module._to_look_at_first(base) == [f"{diagnose_module.LOOK_FIRST}: {SWAPPED.text}."]

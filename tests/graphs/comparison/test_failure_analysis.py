@@ -8,10 +8,10 @@ import time
 import numpy as np
 import pytest
 
-from jointscope.graphs.calibration.motion_regimes import motion_regimes
+from jointscope.graphs.calibration.motion_regimes import REGIMES, motion_regimes
 from jointscope.graphs.comparison.comparison_result import ModelComparison, SensorPrediction
 from jointscope.graphs.comparison.error_concentration import concentration
-from jointscope.graphs.comparison.failure_analysis import REGIMES, analyse_failure
+from jointscope.graphs.comparison.failure_analysis import analyse_failure
 from jointscope.graphs.noise.whiteness_test import evenly, whiteness
 from jointscope.graphs.problem.joint_states import JointStates
 from jointscope.robots.recordings.recording import Recording, Stream

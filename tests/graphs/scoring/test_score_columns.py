@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linearised_motion import base, one_trial_each, regressors, residuals
+from linearised_motion import base, one_hypothesis_each, regressors, residuals
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -21,12 +21,14 @@ TRAPEZOID = 0.03  # relative difference between the two rules along this motion
 SLIGHT = 0.1  # of the largest change: equations that change less are held against that
 
 QUASI_STATIC = ("bearing_flexibility", "joint_elasticity")
-CASES = [case for case in one_trial_each("doggy") if case[1].here.effect.id not in QUASI_STATIC]
-CASES += one_trial_each("without Coriolis terms", ("coriolis",))
+CASES = [case for case in one_hypothesis_each("doggy") if case[1].here.effect.id not in QUASI_STATIC]
+CASES += one_hypothesis_each("without Coriolis terms", ("coriolis",))
 OTHERS = ("motor_viscous", "torque_offset", "motor_lag", "link_viscous", "gravity_imbalance", "kinematic_coupling")
 OTHERS += ("inertia_error", "gyro_scale", "gyro_delay", "encoder_delay", "encoder_eccentricity")
-CASES += one_trial_each("joint 2 rigid", OTHERS)
-CASES += one_trial_each("soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis"))
+CASES += one_hypothesis_each("joint 2 rigid", OTHERS)
+CASES += one_hypothesis_each(
+    "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
+)
 
 
 def test_every_effect_has_a_case():
@@ -66,7 +68,7 @@ def test_a_regressor_is_the_derivative_of_the_residuals(name, hypothesis):
 
 def test_the_regressor_of_the_integration_error_is_what_the_better_rule_changes():
     segment, x = base("Euler")
-    ((_, hypothesis),) = one_trial_each("Euler", ("integration_error",))
+    ((_, hypothesis),) = one_hypothesis_each("Euler", ("integration_error",))
     columns, without = regressors(segment, hypothesis), residuals(segment.problem, x, segment.calibration)
     better = BagProblem.of(add_effect(segment.problem.robot, hypothesis.label), segment.problem.recording)
     changed = residuals(better, x, segment.calibration)

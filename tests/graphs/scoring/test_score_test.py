@@ -100,7 +100,7 @@ def test_the_estimate_is_minus_S_inverse_s_and_the_score_its_square(short):
         assert score.score == pytest.approx(score.estimate @ score.S @ score.estimate, rel=1e-6)
 
 
-def test_trials_scored_together_score_as_they_do_alone(short):
+def test_hypotheses_scored_together_score_as_they_do_alone(short):
     segment, _ = short
     test, chosen = ScoreTest([segment]), hypotheses(segment.problem.robot, TRIED)
     for alone, together in zip(test.each(chosen), test.together(chosen).scores, strict=True):

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from robots_to_compare import MIMICKING
 
-from jointscope.robots.bodies.rigid_tree import RigidTree, joints_that_matter, moving_joints
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.bodies.usable_joints import joints_that_matter, moving_joints
 from jointscope.robots.errors import RobotError
 
 JOINTS, ORDER = ("joint1", "joint2", "joint3"), ("joint3", "joint1", "joint2")

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from robots_to_compare import MIMICKING
 
-from jointscope.robots.bodies.rigid_tree import RigidTree, moving_joints
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.errors import RobotError
 
 DOWN = np.array([0.0, 0.0, -9.81])

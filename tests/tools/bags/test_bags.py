@@ -16,7 +16,8 @@ from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags.messages.fast_columns import fast_columns
 from jointscope.tools.bags.messages.open_bag import open_bag
-from jointscope.tools.bags.read_recording import needed_streams, read_recording
+from jointscope.tools.bags.needed_streams import needed_streams
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"

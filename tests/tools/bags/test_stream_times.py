@@ -6,7 +6,8 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing, timing_notices
-from jointscope.tools.bags.tidying.time_order import TimedSamples, in_time_order
+from jointscope.tools.bags.tidying.time_order import in_time_order
+from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 MILLISECOND = 1_000_000
 

@@ -19,7 +19,7 @@ from jointscope.graphs.comparison import compare as compare_module
 from jointscope.robots.files.robot_file import load_robot, ready_robots
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools import bags
-from jointscope.tools.bags.read_recording import needed_streams
+from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.command_line import main, verbs
 from jointscope.tools.presentation.judgement import judge
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from jointscope.robots.bodies.rigid_tree import RigidTree, moving_joints
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.urdf_bodies import UrdfBodies
+from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linearised_motion import base, one_trial_each, regressors, residuals
+from linearised_motion import base, one_hypothesis_each, regressors, residuals
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -22,7 +22,7 @@ LAG, NEGLECTED = 0.03, 0.25  # of the resonance; inertias and Coriolis torques t
 def test_a_rigid_joint_that_becomes_elastic_leads_its_link_by_compliance_times_torque():
     """With motors that run ahead as the regressor says, the spring accelerates the links as the rigid joint did."""
     segment, x = base("joint 2 rigid")
-    (hypothesis,) = [hypothesis for _, hypothesis in one_trial_each("joint 2 rigid", ("joint_elasticity",))]
+    (hypothesis,) = [hypothesis for _, hypothesis in one_hypothesis_each("joint 2 rigid", ("joint_elasticity",))]
     columns, sigma = regressors(segment, hypothesis), segment.problem.robot.motor_encoder.sigmas[0]
     lead = sigma * columns["motor_encoder joint2.motor_position"][:, 0]
     compliance, count = 1e-9, len(lead)
@@ -44,7 +44,7 @@ def test_a_soft_bearing_tilts_as_its_hinges_do_in_equilibrium(joint, axis):
     segment, x = base("doggy", amplitude=0.04, posture=0.5)
     (hypothesis,) = [
         hypothesis
-        for _, hypothesis in one_trial_each("doggy", ("bearing_flexibility",))
+        for _, hypothesis in one_hypothesis_each("doggy", ("bearing_flexibility",))
         if hypothesis.here.owner == joint
     ]
     columns = regressors(segment, replace(hypothesis, shapes=BEARING))
