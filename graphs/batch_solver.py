@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import gtsam
 import numpy as np
@@ -58,6 +59,21 @@ class Solution:
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
+
+
+class Solver(Protocol):
+    """Minimises the cost of some recordings: `solve`, or what takes its place for all samples."""
+
+    def __call__(
+        self,
+        problems: Sequence[BagProblem],
+        start: Estimate,
+        *,
+        max_iterations: int,
+        hold: Sequence[str],
+        progress: Progress | None,
+    ) -> Solution:
+        """Arguments and result as of `solve`."""
 
 
 def solve(

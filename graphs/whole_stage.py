@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.bag_problem import BagProblem
-from jointscope.graphs.batch_solver import Progress, Solution, first_step, solve, total_cost
+from jointscope.graphs.batch_solver import Progress, Solution, Solver, first_step, solve, total_cost
 from jointscope.graphs.calibration_result import IterationRecord
 from jointscope.graphs.calibration_summary import Solved
 from jointscope.graphs.convergence import measured_rows
@@ -69,12 +69,14 @@ class WholeStage:
         history: receives the iterations.
         progress: called with a text and the share done.
         sigmas: whether the sigmas of encoders are estimated, too.
+        solver: minimises the cost of all samples.
     """
 
     hold: tuple[str, ...]
     history: History
     progress: Progress
     sigmas: bool
+    solver: Solver = solve
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -123,7 +125,7 @@ class WholeStage:
         self, name: str, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int
     ) -> Solution:
         now = [p.with_noise(noise) for p in problems]
-        solution = solve(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
+        solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
         return solution
 

@@ -32,6 +32,13 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    parser.add_argument(
+        "--solver",
+        choices=("condensed", "samples"),
+        default="condensed",
+        help="condensed (default): a factor for every thousand samples; samples: one for each, by GTSAM's own "
+        "optimizer, the slow reference for a second or two of recording",
+    )
     add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
@@ -42,7 +49,9 @@ def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
     files = ResultFiles.of(args)
     check_outputs(files.all, inputs=[*args.bags, *args.effects])
+    from jointscope.graphs.batch_solver import solve
     from jointscope.graphs.calibrate import calibrate
+    from jointscope.graphs.samples_solver import solve_samples
     from jointscope.robots.robot_file import load_robot
     from jointscope.tools.bags import read_recording
     from jointscope.tools.calibration_text import calibration_text
@@ -59,7 +68,8 @@ def run(args: argparse.Namespace) -> int:
 
             text = run_free_links(robot, recordings, None, files, False, progress)
         else:
-            result = calibrate(robot, recordings, progress=progress)
+            solver = solve_samples if args.solver == "samples" else solve
+            result = calibrate(robot, recordings, solver=solver, progress=progress)
             if files.report is not None or files.rrd is not None:
                 progress("writing", 1.0)
             write_calibration(result, files)
