@@ -18,7 +18,7 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.condensed import CondensedFactor
 from jointscope.factors.factor import Factor
 from jointscope.factors.priors import shared_priors
@@ -124,6 +124,11 @@ class CondensedGraph:
                 own = bends[piece][first : last + 1] if len(bends) else np.zeros(last + 1 - first)
                 stretch.damping = np.maximum(own, damping)
         return self.graph.linearize(values)
+
+    @property
+    def dynamics_key(self) -> int | None:
+        """Key of the dynamic parameters; None where they are held or there are none."""
+        return block_key(DYNAMICS, self.likes[0]) if DYNAMICS in self.blocks else None
 
     @property
     def states_ordering(self) -> gtsam.Ordering:
