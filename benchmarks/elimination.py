@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import gtsam
 import numpy as np
 
-from jointscope.factors.custom_factor import block_key, state_key
 from jointscope.factors.factor import Factor
 from jointscope.factors.priors import shared_priors
+from jointscope.factors.single import block_key, state_key
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import NewtonStep, Solution, newton_step
 from jointscope.graphs.solving.estimate import Estimate

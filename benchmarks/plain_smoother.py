@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block
-from jointscope.factors.custom_factor import block_key, custom_factor, state_key
 from jointscope.factors.factor import Factor, Linearization, Samples
+from jointscope.factors.single import block_key, single_factor, state_key
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.starts.initial_guess import initial_states
 from jointscope.robots.model.robot import Robot
@@ -131,4 +131,4 @@ class PlainSmoother:
     def _add(self, graph: gtsam.NonlinearFactorGraph, factor: Factor, sample: int, ticks: tuple[int, ...]) -> None:
         known = KnownModel(factor, self._like)
         if ticks or known.blocks:
-            graph.add(custom_factor(known, sample, ticks, self._like))
+            graph.add(single_factor(known, sample, ticks, self._like))

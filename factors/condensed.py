@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.custom_factor import block_key, extract_calibration, state_key
+from jointscope.factors.single import block_key, extract_calibration, state_key
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 """What a factor is here: one residual, vectorised over samples, with analytic Jacobians.
 
 The same object serves three masters: the batch solver linearises all samples in one call, GTSAM gets one custom
-factor per sample (custom_factor.py), and the reports read its residuals. Residuals are in physical units and their
+factor per sample (single.py), and the reports read its residuals. Residuals are in physical units and their
 noise is diagonal; `sigmas` whitens them.
 """
 

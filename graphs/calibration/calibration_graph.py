@@ -11,17 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.factors.custom_factor import block_key, extract_calibration, state_key
+from jointscope.factors.single import block_key, extract_calibration, state_key
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
+from jointscope.graphs.solving.reference_graph import initial_values, marquardt_parameters, nonlinear_graph
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
-
-LAMBDA_START, LAMBDA_FACTOR = 1e-9, 30.0
 
 
 @dataclass(frozen=True)
@@ -88,12 +86,7 @@ class CalibrationGraph:
             SolveError: a factor has a key that the graph's values lack, or nothing determines a variable.
         """
         self._check_keys()
-        parameters = gtsam.LevenbergMarquardtParams()
-        parameters.setlambdaInitial(LAMBDA_START)
-        parameters.setlambdaFactor(LAMBDA_FACTOR)
-        parameters.setDiagonalDamping(True)
-        parameters.setRelativeErrorTol(1e-10)
-        parameters.setAbsoluteErrorTol(1e-8)
+        parameters = marquardt_parameters()
         parameters.setOrdering(self.ordering)
         try:
             return gtsam.LevenbergMarquardtOptimizer(self.graph, self.values, parameters).optimize()

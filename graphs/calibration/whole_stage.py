@@ -19,7 +19,7 @@ from jointscope.graphs.calibration.calibration_result import IterationRecord
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.batch_solver import Progress, Solution, first_step, solve, total_cost
+from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve, total_cost
 from jointscope.graphs.solving.convergence import measured_rows
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.starts.encoder_motion import hides_reversals
@@ -69,12 +69,14 @@ class WholeStage:
         history: receives the iterations.
         progress: called with a text and the share done.
         sigmas: whether the sigmas of encoders are estimated, too.
+        solver: minimises the cost of all samples.
     """
 
     hold: tuple[str, ...]
     history: History
     progress: Progress
     sigmas: bool
+    solver: Solver = solve
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -123,7 +125,7 @@ class WholeStage:
         self, name: str, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int
     ) -> Solution:
         now = [p.with_noise(noise) for p in problems]
-        solution = solve(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
+        solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
         return solution
 

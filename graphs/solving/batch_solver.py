@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import gtsam
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.priors import shared_priors
@@ -28,16 +28,16 @@ from jointscope.graphs.solving.convergence import (
     measured_rows,
     short_step,
 )
-from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states
+from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations, build, cost
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
-from jointscope.graphs.solving.unobservable import unobservable
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values]
 
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
@@ -67,6 +67,21 @@ class Solution:
     flat: bool = False
 
 
+class Solver(Protocol):
+    """Minimises the cost of some recordings: `solve`, or what takes its place for all samples."""
+
+    def __call__(
+        self,
+        problems: Sequence[BagProblem],
+        start: Estimate,
+        *,
+        max_iterations: int,
+        hold: Sequence[str],
+        progress: Progress | None,
+    ) -> Solution:
+        """Arguments and result as of `solve`."""
+
+
 def solve(
     problems: Sequence[BagProblem],
     start: Estimate,
@@ -75,6 +90,8 @@ def solve(
     step_tolerance: float = STEP_TOLERANCE,
     hold: Sequence[str] = (),
     progress: Progress | None = None,
+    first: First | None = None,
+    length: int = 0,
 ) -> Solution:
     """Minimises the cost of all recordings together.
 
@@ -85,11 +102,15 @@ def solve(
         step_tolerance: largest step of a shared value, in its sigmas times the misfit, at which it has converged.
         hold: blocks that stay at their start, for example "dynamics".
         progress: called with a text and the share done.
+        first: finds values to go on from; where they cost more than the start, the start is taken.
+        length: steps in one condensed factor; chosen by the number of samples if 0.
 
     Raises:
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
-    graph, values = CondensedGraph.of(problems, start, hold)
+    graph, values = CondensedGraph.of(problems, start, hold, length)
+    if first is not None:
+        values = min(values, first(graph, values), key=graph.cost)
     cost, bends = graph.cost(values), StateDamping.of([problem.timeline.ticks for problem in problems])
     descent = _Descent(graph, values, cost, graph.costs, bends)
     if not np.isfinite(descent.cost):
@@ -200,10 +221,7 @@ def newton_step(
     free = free_indices(shared, hold)
     eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
     H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
-    try:
-        dp, in_sigmas = _solve_shared(H, g, free, damping)
-    except np.linalg.LinAlgError as err:
-        raise unobservable(H, free, shared, solution.estimate.calibrations[0]) from err
+    dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
@@ -262,18 +280,3 @@ def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
         for block in hold:
             held[shared.indices(bag)[shared.columns[block]]] = True
     return np.flatnonzero(~held)
-
-
-def _solve_shared(H: Array, g: Array, free: NDArray[np.intp], damping: float) -> tuple[Array, float]:
-    """Damped step of the shared values, and the largest undamped one in sigmas."""
-    dp = np.zeros(len(g))
-    if len(free) == 0:
-        return dp, 0.0
-    block = H[np.ix_(free, free)]
-    if not (np.all(np.isfinite(block)) and np.all(np.isfinite(g))):
-        raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
-    factor = cho_factor(block + damping * np.diag(np.diag(block)))
-    dp[free] = -cho_solve(factor, g[free])
-    # Newton decrement per value: step over its conditional-free sigma
-    sigma = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(free)))), 0.0))
-    return dp, float(np.max(np.abs(dp[free]) / sigma))

@@ -18,17 +18,17 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.condensed import CondensedFactor
-from jointscope.factors.custom_factor import (
+from jointscope.factors.factor import Factor
+from jointscope.factors.priors import shared_priors
+from jointscope.factors.single import (
     block_key,
     extract_calibration,
     insert_calibration,
     stacked_factor,
     state_key,
 )
-from jointscope.factors.factor import Factor
-from jointscope.factors.priors import shared_priors
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
@@ -80,7 +80,9 @@ class CondensedGraph:
         like = start.calibrations[0]
         # nothing is no variable: a robot may have no free parameter
         blocks = tuple(block for block in like.blocks if block not in hold and like.block_size(block))
-        values = _shared_values(start, owners, blocks)
+        values = gtsam.Values()
+        for calibration, owner in zip(start.calibrations, owners, strict=True):
+            insert_calibration(values, calibration, owner, blocks)
         likes = tuple(
             extract_calibration(values, calibration, blocks, owner)
             for calibration, owner in zip(start.calibrations, owners, strict=True)
@@ -122,6 +124,11 @@ class CondensedGraph:
                 own = bends[piece][first : last + 1] if len(bends) else np.zeros(last + 1 - first)
                 stretch.damping = np.maximum(own, damping)
         return self.graph.linearize(values)
+
+    @property
+    def dynamics_key(self) -> int | None:
+        """Key of the dynamic parameters; None where they are held or there are none."""
+        return block_key(DYNAMICS, self.likes[0]) if DYNAMICS in self.blocks else None
 
     @property
     def states_ordering(self) -> gtsam.Ordering:
@@ -172,23 +179,6 @@ class CondensedGraph:
             _add_shared(system, alone, x[:2], calibration)
             found.append(system)
         return found
-
-
-def _shared_values(start: Estimate, owners: Sequence[int], blocks: Sequence[str]) -> gtsam.Values:
-    """Values of all blocks that may change."""
-    everything, values = gtsam.Values(), gtsam.Values()
-    for piece, owner in enumerate(owners):
-        if owner not in owners[:piece]:
-            insert_calibration(everything, start.calibrations[piece], owner)
-        for block in blocks:
-            key = block_key(block, start.calibrations[piece], owner)
-            if values.exists(key):
-                continue
-            if block.endswith(".rotation"):
-                values.insert(key, everything.atRot3(key))
-            else:
-                values.insert(key, everything.atVector(key))
-    return values
 
 
 def _add_rows_without_states(

@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
+from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.unobservable import unobservable
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
 LARGEST = 1e8  # damping of the shared values beyond which nothing is tried
-OF_STATES = 1e-9  # damping of the states, as long as shorter steps of the shared values may help
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def damped_step(graph: CondensedGraph, values: gtsam.Values, damping: float, ben
     linear = graph.linearized(values, damping_of_states(damping), bends)
     try:
         conditionals, rest = linear.eliminatePartialSequential(graph.states_ordering)
-        given, in_sigmas = _shared_step(graph, rest, damping)
+        given, in_sigmas = _graph_step(graph, rest, damping)
         return DampedStep(values.retract(conditionals.optimize(given)), in_sigmas)
     except RuntimeError as err:
         raise SolveError(
@@ -59,34 +60,58 @@ def damped_step(graph: CondensedGraph, values: gtsam.Values, damping: float, ben
 
 
 def damping_of_states(damping: float) -> float:
-    """Damping of the states for one of the shared values.
+    """Damping of the states for one of the shared values: next to none, as long as shorter steps of those may help.
 
-    Where steps of the shared values are next to nothing and the cost still rises, the states are what is too far off.
+    Damping is relative to the diagonal, and steps of the dynamics know each state a million times better from its
+    neighbours than the sensors know the motion: a billionth of that holds a motion fast. Where steps of the shared
+    values are next to nothing and the cost still rises, the states are what is too far off.
     """
-    return float(max(min(damping, OF_STATES), (damping / LARGEST) ** 1.5))
+    return float((damping / LARGEST) ** 1.5)
 
 
-def _shared_step(
+def shared_step(
+    H: Array, g: Array, free: NDArray[np.intp], damping: float, shared: SharedLayout, like: Calibration
+) -> tuple[Array, float]:
+    """Damped step of all shared values, and its largest part in sigmas.
+
+    Args:
+        H: their Hessian with the states eliminated, shape (s, s).
+        g: their gradient, shape (s,).
+        free: indices of those that may change.
+        damping: relative to the diagonal of the Hessian.
+        shared: layout of the shared values.
+        like: any calibration of the robot; names what is not determined.
+
+    Raises:
+        SolveError: a Hessian that is not finite or not positive definite.
+    """
+    step = np.zeros(len(g))
+    if len(free) == 0:
+        return step, 0.0
+    block = H[np.ix_(free, free)]
+    if not (np.all(np.isfinite(block)) and np.all(np.isfinite(g))):
+        raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
+    try:
+        factor = cho_factor(block + damping * np.diag(np.diag(block)))
+    except np.linalg.LinAlgError as err:
+        raise unobservable(H, free, shared, like) from err
+    step[free] = -cho_solve(factor, g[free])
+    sigmas = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(free)))), 0.0))
+    return step, float(np.max(np.abs(step[free]) / sigmas))
+
+
+def _graph_step(
     graph: CondensedGraph, rest: gtsam.GaussianFactorGraph, damping: float
 ) -> tuple[gtsam.VectorValues, float]:
     """Step of the shared values from the graph that the states left, and its largest part in sigmas."""
-    step, keys = gtsam.VectorValues(), graph.shared_keys
+    given, keys = gtsam.VectorValues(), graph.shared_keys
     if not keys:
-        return step, 0.0
-    H, right = rest.hessian(graph.shared_ordering)
+        return given, 0.0
     free = np.concatenate([index for _, index in keys])
-    if not (np.all(np.isfinite(H)) and np.all(np.isfinite(right))):
-        raise SolveError("the estimate ran away: a Hessian is not finite; the model contradicts the recording")
-    try:
-        factor = cho_factor(H + damping * np.diag(np.diag(H)))
-    except np.linalg.LinAlgError as err:
-        whole = np.zeros((graph.shared.size, graph.shared.size))
-        whole[np.ix_(free, free)] = H
-        raise unobservable(whole, free, graph.shared, graph.likes[0]) from err
-    change = cho_solve(factor, np.ravel(right))
-    sigmas = np.sqrt(np.maximum(np.diag(cho_solve(factor, np.eye(len(change)))), 0.0))
-    place = 0
+    H, g = np.zeros((graph.shared.size, graph.shared.size)), np.zeros(graph.shared.size)
+    block, right = rest.hessian(graph.shared_ordering)
+    H[np.ix_(free, free)], g[free] = block, -np.ravel(right)
+    step, in_sigmas = shared_step(H, g, free, damping, graph.shared, graph.likes[0])
     for key, index in keys:
-        step.insert(key, change[place : place + len(index)])
-        place += len(index)
-    return step, float(np.max(np.abs(change) / sigmas))
+        given.insert(key, step[index])
+    return given, in_sigmas

@@ -159,7 +159,7 @@ class RecordingStretch:
                 self._elimination, self._eliminated_with = self._eliminated(), self.damping
             assert self._elimination is not None
             parts = [first - base.x[0], last - base.x[-1]]
-            parts += [_moved(base.calibration, calibration, block) for block in self._columns]
+            parts += [change_of(base.calibration, calibration, block) for block in self._columns]
             x[1:-1] += self._elimination.states(np.concatenate(parts))
         return x
 
@@ -199,8 +199,8 @@ def _same(one: Calibration, other: Calibration) -> bool:
     )
 
 
-def _moved(before: Calibration, now: Calibration, block: str) -> Array:
-    """Coordinates of a block's change."""
+def change_of(before: Calibration, now: Calibration, block: str) -> Array:
+    """Coordinates of a block's way from one calibration to another, shape (size,)."""
     for name in before.biases:
         if block == bias_block(name):
             return now.biases[name] - before.biases[name]

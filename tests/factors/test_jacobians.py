@@ -9,7 +9,6 @@ import pytest
 
 from jointscope.factors.bias_at_rest import BiasAtRestFactor
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.custom_factor import custom_factor, insert_calibration, state_key
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.initial_state import InitialStateFactor
@@ -20,6 +19,7 @@ from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.priors import BiasPrior, DynamicsPrior, RotationPrior
 from jointscope.factors.relative_gyro import RelativeGyroFactor
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
+from jointscope.factors.single import insert_calibration, single_factor, state_key
 from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
@@ -197,7 +197,7 @@ def test_gtsam_linearizes_the_wrapped_factor_to_the_whitened_jacobians(name):
     factor, robot = FACTORS[name]
     x, calibration = _point(factor, robot)
     sample = len(factor) - 1
-    wrapped = custom_factor(factor, sample, tuple(range(factor.states)), calibration)
+    wrapped = single_factor(factor, sample, tuple(range(factor.states)), calibration)
     values = gtsam.Values()
     insert_calibration(values, calibration)
     for k, states in enumerate(x):

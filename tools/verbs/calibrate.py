@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from jointscope.robots.errors import SolveError
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
@@ -32,6 +33,18 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    parser.add_argument(
+        "--solver",
+        choices=("condensed", "samples"),
+        default="condensed",
+        help="condensed (default): a factor for every thousand samples; samples: one for each, by GTSAM's own "
+        "optimizer, the slow reference for a second or two of recording",
+    )
+    parser.add_argument(
+        "--incremental",
+        action="store_true",
+        help="stretch after stretch by iSAM2, saying what is known after each; ends where the batch ends",
+    )
     add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
@@ -40,6 +53,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
+    if args.incremental and args.solver == "samples":
+        raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
     files = ResultFiles.of(args)
     check_outputs(files.all, inputs=[*args.bags, *args.effects])
     from jointscope.graphs.calibration.calibrate import calibrate
@@ -50,6 +65,11 @@ def run(args: argparse.Namespace) -> int:
 
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
+    if robot.free_links and (args.incremental or args.solver != "condensed"):
+        raise SolveError(
+            f"{robot.name}: its links are free, so there are no states to estimate one by one; leave out "
+            f"`{'--incremental' if args.incremental else '--solver samples'}`"
+        )
     with progress_bar() as progress:
         read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
         recordings = leave_out(read, args.leave_out)
@@ -59,7 +79,8 @@ def run(args: argparse.Namespace) -> int:
 
             text = run_free_links(robot, recordings, None, files, False, progress)
         else:
-            result = calibrate(robot, recordings, progress=progress)
+            seen = None if args.incremental else progress  # what is printed and a bar would write into each other
+            result = calibrate(robot, recordings, solver=_solver(args, robot), progress=seen)
             if files.report is not None or files.rrd is not None:
                 progress("writing", 1.0)
             write_calibration(result, files)
@@ -67,3 +88,20 @@ def run(args: argparse.Namespace) -> int:
     print(text)
     print(f"\nWrote {', '.join(map(str, files.all))}")
     return 0
+
+
+def _solver(args: argparse.Namespace, robot: Any) -> Any:
+    """What minimises the cost of all samples."""
+    if args.incremental:
+        from jointscope.graphs.solving.incremental_solver import Incremental
+        from jointscope.tools.terminal.known_so_far import known_so_far_text
+
+        units = {parameter.name: parameter.unit for parameter in robot.parameters.values()}
+        return Incremental(lambda known: print(known_so_far_text(known, units), end="\n\n", flush=True))
+    if args.solver == "samples":
+        from jointscope.graphs.solving.samples_solver import solve_samples
+
+        return solve_samples
+    from jointscope.graphs.solving.batch_solver import solve
+
+    return solve
