@@ -67,7 +67,7 @@ def _other_sigmas(result: CalibrationResult) -> list[str]:
         ]
         if changed:
             said.append(
-                f"the residuals are white and of another size than stated, so these sigmas were found anew: "
+                f"its samples scatter by another size than stated, so these sigmas were found anew: "
                 f"{', '.join(changed)}; `estimate_sigma: false` in sensors.{name} keeps yours"
             )
     return said

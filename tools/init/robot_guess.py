@@ -22,6 +22,7 @@ from jointscope.tools.init.estimates.drive_values import Drives, DriveValues, fi
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
+from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
@@ -64,6 +65,7 @@ class RobotGuess:
         left_out: what the bag also holds and why it is not used.
         stamped_by: gyroscope with the stamps of each joint's samples, or BY_MESSAGE; empty if that holds for all.
         held: other joints that matter, and where they stand [rad or m].
+        motor_zero: reading of each motor's encoder at zero, where encoders on the links tell it [rad or m].
         following: sentences about mimic joints of the URDF.
         elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
         gravity: in the base frame [m/s^2].
@@ -90,6 +92,7 @@ class RobotGuess:
     stamped_by: tuple[str, ...] = ()
     held: tuple[HeldJoint, ...] = ()
     following: tuple[str, ...] = ()
+    motor_zero: tuple[float, ...] = ()
     gravity: tuple[float, ...] = GRAVITY
     gravity_reason: str = ""
     held_command: bool = True
@@ -130,6 +133,10 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
 
     signs = encoder_signs(tree, seen_rates(seen, robot.gyros), motors)
     turned, seen = (replace(stream, values=stream.values * np.array(signs.signs)) for stream in (encoder, seen))
+    zero = np.zeros(len(roles.joints))
+    if masses and robot.links is not None:
+        zero = motor_zero(turned, seen, _in_si(robot, noises))
+        turned = replace(turned, values=turned.values - zero)
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     elastic = _seen(tree, gyros) if masses else ()
     drive = drives(turned, elastic)
@@ -156,6 +163,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         stamped_by=_sample_times(roles, gyros),
         elastic=elastic,
         held=robot.held,
+        motor_zero=tuple(zero.tolist()),
         following=_following(robot.bodies, roles.joints),
     )
 
@@ -169,14 +177,18 @@ def _drives(
 ) -> Drives:
     """Unit of the command, and the drive of each joint."""
     roles, tree = robot.roles, robot.tree
-    # noise is that of positions behind gears, in the unit of the bag
-    sigmas = np.array([si_factor(unit) * noise.sigma for unit, noise in zip(robot.units.units, noises, strict=True)])
+    sigmas = _in_si(robot, noises)
     command = role_stream(roles.command, roles.joints)
     if not robot.masses:
         return find_signs(encoder, command, sigmas, torque, tree.gravity)
     told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     return find_drives(tree, encoder, command, sigmas, held=not measured if told is None else told, elastic=elastic)
+
+
+def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:
+    """Noise of positions behind gears, which is in the unit of the bag, shape (n,) [rad or m]."""
+    return np.array([si_factor(unit) * noise.sigma for unit, noise in zip(robot.units.units, noises, strict=True)])
 
 
 def _following(bodies: UrdfBodies, joints: tuple[str, ...]) -> tuple[str, ...]:

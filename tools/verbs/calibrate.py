@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.graphs.calibration.calibrate import calibrate
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags import read_recording
+    from jointscope.tools.presentation.judgement import judge
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look
 
@@ -87,6 +89,9 @@ def run(args: argparse.Namespace) -> int:
             text = calibration_text(result)
     print(text)
     print(f"\nWrote {', '.join(map(str, files.all))}")
+    if not robot.free_links and judge(result).level != "good":
+        bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
+        print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
     return 0
 
 

@@ -37,7 +37,7 @@ def in_own_folder(tmp_path, monkeypatch):
 def no_solving(monkeypatch):
     """Reading, calibrating and comparing give made-up results at once."""
     monkeypatch.setattr(bags, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
-    monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress: fake_calibration())
+    monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress, solver: fake_calibration())
     monkeypatch.setattr(compare_module, "compare", lambda *args, progress: fake_comparison())
 
 
@@ -257,6 +257,8 @@ def test_calibrate_says_what_it_found_and_writes_every_file(no_solving, capsys):
         "Wrote o.yaml, r.html",
     ):
         assert part in text
+    doubtful = judge(fake_calibration()).level != "good"
+    assert ("jointscope diagnose o.yaml a.mcap --report diagnosis.html" in text) is doubtful is True
     assert files() == {"o.yaml", "r.html", "f.rrd", "c.json"}
     content = json.loads(Path("c.json").read_text())
     assert content["converged"] is True

@@ -181,8 +181,11 @@ def _sigmas(noises: tuple[NoiseGuess, ...], units: tuple[str, ...]) -> str:
 def _motor_encoder(guess: RobotGuess) -> list[str]:
     signs, noise = _turned_joints(guess.encoder_signs), guess.encoder_noise
     zero = "counts from where the motor stood when it was switched on"
-    unknown = [_line("zero: unknown", zero, False, 4)] if guess.free_links else []
-    return _encoder("motor_encoder", guess.roles.motor_encoder, guess, signs, noise, unknown)
+    lines = [_line("zero: unknown", zero, False, 4)] if guess.free_links else []
+    if any(guess.motor_zero):
+        values = [float(f"{value:.6g}") for value in guess.motor_zero]
+        lines = [_line(f"zero: {_list(values)}", "differs by that from the encoder on the link all the time", False, 4)]
+    return _encoder("motor_encoder", guess.roles.motor_encoder, guess, signs, noise, lines)
 
 
 def _link_encoder(guess: RobotGuess) -> list[str]:
