@@ -19,7 +19,8 @@ from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.diagnosis_words import paragraphs_of
 from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_missing_torque
 from jointscope.graphs.discovery.refit import refit
-from jointscope.graphs.discovery.scored_candidates import ScoredCandidate, ScoredCandidates, score_candidates
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
+from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
@@ -30,6 +31,7 @@ from jointscope.graphs.discovery.verdicts import (
     judge,
     worth_a_refit,
 )
+from jointscope.graphs.scoring.score_test import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import JointscopeError
@@ -72,6 +74,7 @@ def diagnose(
     validation: ValidationError | None = None,
     leaders: int = LEADERS,
     missing_torque: bool = True,
+    side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Ranks the effects that a model lacks.
@@ -85,6 +88,7 @@ def diagnose(
         validation: errors of that model on the validation blocks, if they are known.
         leaders: number of candidates to refit; up to twice as many where none of them helps.
         missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
+        side_by_side: who fits the candidates, if not this process alone.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -104,7 +108,8 @@ def diagnose(
     clock.stage("comparison")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
-    validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report)
+    pool = side_by_side or SideBySide()
+    validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
     clock.stage("refits")
     seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
     candidates = _ranked(
@@ -193,38 +198,40 @@ def _refit_leaders(
     holdout: Recording | None,
     leaders: int,
     report: Progress,
+    side_by_side: SideBySide,
 ) -> tuple[dict[str, ValidatedRefit], set[str]]:
     """Refits of the best candidates, and the labels of those whose fit ran away.
 
     Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too; where none
     helps, the next ones are.
     """
-    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)]
+    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)][: PATIENCE * leaders]
     found, failed, enough = dict[str, ValidatedRefit](), set[str](), 0.0
-    for i, candidate in enumerate(worth[: PATIENCE * leaders]):
+    refits = side_by_side.in_order(_refit_and_validate, (base, *spans, holdout), [c.best for c in worth])
+    for i, candidate in enumerate(worth):
         helped = any(t.validation.error**2 < (1.0 - MATTERS) * error**2 for t in found.values())
         if candidate.plausible < enough or (i >= leaders and helped):
             break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
-        validated = _refit_and_validate(base, candidate, *spans, holdout)
+        validated = next(refits)
         if validated is None:
             failed.add(candidate.label)
             continue
         found[candidate.label] = validated
         if excess_share(error, validated.validation.error, SENSOR_FLOOR) > NEARLY_ALL:
             enough = max(enough, NEAR * candidate.plausible)
+    refits.close()
     return found, failed
 
 
+@in_solver_context
 def _refit_and_validate(
-    base: BaseModel,
-    candidate: ScoredCandidate,
-    fit: Sequence[Span],
-    spans: Sequence[Span],
-    holdout: Recording | None,
+    shared: tuple[BaseModel, Sequence[Span], Sequence[Span], Recording | None], score: HypothesisScore
 ) -> ValidatedRefit | None:
+    """A refit on the pieces to fit, judged on those between; None where it ran away."""
+    base, fit, spans, holdout = shared
     try:
-        found = refit(base, fit, candidate.best)
+        found = refit(base, fit, score)
         errors: ValidationError = judged_error(base, found.robot, found.biases, spans)
     except (JointscopeError, np.linalg.LinAlgError):
         return None

@@ -16,6 +16,7 @@ from jointscope.graphs.comparison.compare import compare_model
 from jointscope.graphs.discovery.diagnose import ADEQUATE, diagnose, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
+from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.discovery.verdicts import MATTERS, SURE
 from jointscope.graphs.solving.batch_solver import Progress
@@ -41,6 +42,7 @@ def discover(
     resume: Sequence[SavedStep] | None = None,
     max_steps: int = MAX_STEPS,
     missing_torque: bool = True,
+    side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
     """Finds the effects that a model lacks, one after the other.
@@ -53,13 +55,15 @@ def discover(
         resume: finished steps of an earlier run; the search goes on after the last.
         max_steps: effects to add at the most.
         missing_torque: estimate the missing torque at every step, too; pictures need it, no verdict does.
+        side_by_side: who fits the candidates, if not this process alone.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    search = _Search(recordings, holdout, save, progress or (lambda text, share: None), max_steps, missing_torque)
+    report = progress or (lambda text, share: None)
+    search = _Search(recordings, holdout, save, report, max_steps, missing_torque, side_by_side)
     return search.run(robot, resume or ())
 
 
@@ -74,9 +78,11 @@ class _Search:
         report: Progress,
         max_steps: int,
         missing_torque: bool,
+        side_by_side: SideBySide | None,
     ):
         self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
         self.max_steps, self.missing_torque, self.steps = max_steps, missing_torque, list[DiscoveryStep]()
+        self.side_by_side = side_by_side
         self.errors: ValidationError | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
@@ -106,6 +112,7 @@ class _Search:
                 comparison=self.steps[-1].comparison,
                 validation=self.errors,
                 missing_torque=self.missing_torque,
+                side_by_side=self.side_by_side,
                 progress=self._part(share),
             )
             self._attach(diagnosis)

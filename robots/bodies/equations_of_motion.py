@@ -32,6 +32,10 @@ class FreeEquations:
     def __init__(self, model: pin.Model):
         self._model, self._data, self._pool = model, model.createData(), pin.ModelPool(model, 1)
 
+    def __reduce__(self) -> tuple[type[FreeEquations], tuple[pin.Model]]:
+        """Pinocchio cannot pickle a pool; a copy makes its own."""
+        return FreeEquations, (self._model,)
+
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Accelerations of many samples; arguments and result of shape (m, n)."""
         if len(q) == 1:

@@ -11,6 +11,7 @@ from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_f
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_diagnosis
 from jointscope.tools.verb_parts.user_effects import load_user_effects
+from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
@@ -30,6 +31,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_bag_arguments(parser)
+    add_workers_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
@@ -44,9 +46,11 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
-    with progress_bar() as progress:
+    with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
-        found = diagnose(robot, recordings, holdout, missing_torque=files.pictures, progress=progress)
+        found = diagnose(
+            robot, recordings, holdout, missing_torque=files.pictures, side_by_side=workers, progress=progress
+        )
         result = diagnosis_of(found, recordings, holdout)
         if files.pictures:
             progress("writing", 1.0)

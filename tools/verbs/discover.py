@@ -16,6 +16,7 @@ from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_f
 from jointscope.tools.verb_parts.named_recordings import discovery_of
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_discovery
 from jointscope.tools.verb_parts.user_effects import load_user_effects
+from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
@@ -41,6 +42,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_bag_arguments(parser)
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
+    add_workers_option(parser)
     parser.add_argument("--restart", action="store_true", help="ignore the steps of an earlier run")
     add_result_options(parser)
     parser.set_defaults(run=run)
@@ -88,16 +90,18 @@ def _discover(
     if saved:
         print(f"Continuing after step {len(saved) - 1}, {saved[-1].robot_file}; --restart starts anew.\n", flush=True)
     try:
-        result = discover(
-            robot,
-            recordings,
-            holdout,
-            save=state.save,
-            resume=saved or None,
-            max_steps=MAX_STEPS,
-            missing_torque=ResultFiles.of(args).pictures,
-            progress=progress,
-        )
+        with workers_of(args) as workers:
+            result = discover(
+                robot,
+                recordings,
+                holdout,
+                save=state.save,
+                resume=saved or None,
+                max_steps=MAX_STEPS,
+                missing_torque=ResultFiles.of(args).pictures,
+                side_by_side=workers,
+                progress=progress,
+            )
     except KeyboardInterrupt:
         if not state.count:
             raise

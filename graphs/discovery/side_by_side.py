@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fits that do not need each other, on several cores: processes that begin when there is something to do for two.
+
+What is decided is decided in the order of the tasks, as if they ran one after the other; a result that came too late
+to matter is thrown away. So no answer depends on the number of cores.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import tempfile
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+ATTEMPTS = 2  # times that a task is given to processes before it is done here
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_known: dict[str, Any] = {}  # in a worker: what its last task needed, by file
+
+
+class SideBySide:
+    """Worker processes, started when they are first needed.
+
+    Args:
+        workers: processes; with 1 everything is done in this one.
+        effect_files: Python files with effects of the user's own, which workers read, too.
+    """
+
+    def __init__(self, workers: int = 1, effect_files: Sequence[Path] = ()):
+        self.workers = workers
+        self._effect_files = tuple(effect_files)
+        self._pool: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> SideBySide:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, err: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop()
+
+    def in_order(self, function: Callable[[Any, T], R], shared: Any, tasks: Sequence[T]) -> Generator[R]:
+        """Results of function(shared, task) in the order of the tasks; who stops asking stops the rest.
+
+        Args:
+            function: of a module, so that workers find it.
+            shared: what all tasks need; it is handed to each worker once.
+            tasks: small.
+        """
+        if self.workers < 2 or len(tasks) < 2:
+            yield from (function(shared, task) for task in tasks)
+            return
+        with tempfile.TemporaryDirectory(prefix="jointscope-") as folder:
+            file = Path(folder) / "shared"
+            file.write_bytes(pickle.dumps(shared, pickle.HIGHEST_PROTOCOL))
+            running: dict[int, Future[R]] = {}
+            try:
+                for i in range(len(tasks)):
+                    for ahead in range(i, min(i + self.workers, len(tasks))):
+                        if ahead not in running:
+                            running[ahead] = self._submit(function, file, tasks[ahead])
+                    yield self._result(running, i, function, file, tasks[i], shared)
+                    del running[i]
+            finally:
+                if running:
+                    self._stop()  # nobody waits for them
+
+    def _result(
+        self, running: dict[int, Future[R]], i: int, function: Callable[[Any, T], R], file: Path, task: T, shared: Any
+    ) -> R:
+        """One result; a worker that was killed costs its tasks a second attempt, and nothing else."""
+        for _ in range(ATTEMPTS):
+            try:
+                return running[i].result()
+            except BrokenProcessPool:
+                self._stop()
+                for other in [k for k in running if k != i]:
+                    del running[other]
+                running[i] = self._submit(function, file, task)
+        return function(shared, task)
+
+    def _submit(self, function: Callable[[Any, T], R], file: Path, task: T) -> Future[R]:
+        if self._pool is None:
+            before = {name: os.environ.get(name) for name in THREADS}
+            os.environ.update(dict.fromkeys(THREADS, "1"))  # workers read it when they begin
+            try:
+                self._pool = ProcessPoolExecutor(
+                    self.workers, multiprocessing.get_context("spawn"), _begin, (self._effect_files,)
+                )
+                return self._pool.submit(_run, function, str(file), task)
+            finally:
+                for name, value in before.items():
+                    if value is None:
+                        del os.environ[name]
+                    else:
+                        os.environ[name] = value
+        return self._pool.submit(_run, function, str(file), task)
+
+    def _stop(self) -> None:
+        """Ends the processes, whatever they are doing."""
+        if self._pool is None:
+            return
+        processes = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+        self._pool = None
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _begin(effect_files: tuple[Path, ...]) -> None:
+    """Makes a worker ready; the process that asked handles Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from jointscope.robots.files.effect_catalogue import add_user_effects
+
+    for file in effect_files:
+        add_user_effects(file)
+
+
+def _run(function: Callable[[Any, Any], Any], file: str, task: Any) -> Any:
+    if file not in _known:
+        _known.clear()
+        _known[file] = pickle.loads(Path(file).read_bytes())
+    return function(_known[file], task)
