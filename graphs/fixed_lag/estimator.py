@@ -18,7 +18,6 @@ import time as clock
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-import gtsam
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -35,7 +34,7 @@ from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.graphs.fixed_lag.window.newest_state import NewestState
 from jointscope.graphs.fixed_lag.window.observation import AT_TICK
 from jointscope.graphs.fixed_lag.window.tick_engine import TickEngine
-from jointscope.graphs.fixed_lag.window.users_factor import tick_key
+from jointscope.graphs.fixed_lag.window_access import WindowAccess
 from jointscope.graphs.problem.timeline import LONGEST_STEP, SHORTEST_STEP
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.robot import Robot
@@ -46,11 +45,10 @@ Found = TypeVar("Found")
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
 GAP = 0.3  # [s] without a tick after which the estimator begins anew; so far it predicts
 BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and numpy raise where numbers are impossible
-NO_STATE = "the estimator has no state yet"
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
 
 
-class FixedLagEstimator:
+class FixedLagEstimator(WindowAccess):
     """State of a robot from the messages of its sensors, now and at the lag.
 
     Args:
@@ -180,53 +178,6 @@ class FixedLagEstimator:
             return unknown_state(self.robot, self._engine.layout.parameters, time, q, time - self._newest_sample)
         when = self._engine.time if t is None else max(t, self._engine.time)
         return self._state_of(when, self._engine.ahead(when, self._waiting.acting))
-
-    def smoothed(self, covariance: bool = True) -> EstimatedState | None:
-        """The state at the lag, smoothed with everything since; None until the window is full.
-
-        Args:
-            covariance: whether it is wanted; it costs a millisecond.
-        """
-        if not self.status.running or self._engine.time - self._engine.past[0].time < 0.9 * self.lag:
-            return None
-        found = self._unbroken(lambda: self._engine.smoothed(covariance))
-        return None if found is None else self._state_of(*found)
-
-    def newest_of_window(self) -> EstimatedState | None:
-        """The newest tick as GTSAM's window has it: `state()` up to rounding, and slower; None before the start."""
-        if not self.status.running:
-            return None
-        found = self._unbroken(self._engine.from_window)
-        return None if found is None else self._state_of(self._engine.time, found)
-
-    def key(self, t: float | None = None) -> int:
-        """GTSAM's key X(k) of the newest tick, or of the one nearest to a time [s]; for a factor of your own.
-
-        Raises:
-            EstimatorError: there is no tick yet, or none near that time is in the window.
-        """
-        if self.status.running:
-            self._catch_up(t)
-        if not self.status.running:
-            raise EstimatorError(f"{NO_STATE}: ask for a key once `est.status.running` is true")
-        times = [tick.time for tick in self._engine.past]
-        when = times[-1] if t is None else t
-        if not times[0] - LONGEST_STEP <= when <= times[-1] + LONGEST_STEP:
-            raise EstimatorError(f"no tick at {when:g} s; the window goes from {times[0]:.3f} to {times[-1]:.3f} s")
-        return tick_key(min(self._engine.past, key=lambda tick: abs(tick.time - when)).number)
-
-    def add(self, factor: gtsam.NonlinearFactor) -> None:
-        """A factor of your own on states of the window, whose keys `key` tells.
-
-        X(k) is the state itself: the robot's layout, three biases of each gyro, adapted parameters, shape (D,). The
-        factor is linearised now, and counts in the smoothed states and in the newest one.
-
-        Raises:
-            EstimatorError: a key that is not in the window, or a factor that cannot be linearised.
-        """
-        if not self.status.running:
-            raise EstimatorError(f"{NO_STATE}: add factors once `est.status.running` is true")
-        self._unbroken(lambda: self._engine.add(factor))
 
     @property
     def _now(self) -> float | None:
