@@ -81,17 +81,15 @@ class Steps:
     @property
     def sigmas(self) -> Array:
         """Standard deviations of the rows (velocities, memories, positions; link before motor), shape (m, d)."""
-        density = np.concatenate([self.noise.link_velocity, self.noise.motor_velocity, self.noise.memory])
-        root = np.sqrt(self.h)[:, None]
-        rates, k = density * root, len(self.layout.velocities)
+        h, root = self.h[:, None], np.sqrt(self.h)[:, None]
+        rates, k = rate_sigmas(self.noise, h), len(self.layout.velocities)
         if self.slack is not None:  # memories follow the motion, which the sensors see
             free = np.where(self.slack > 1.0, FREE, 0.0)[:, None] * root
             rates[:, :k] = np.maximum(rates[:, :k] * self.slack[:, None], free)
-            root = root * self.slack[:, None]
-        velocity = rates[:, :k]
-        if self.integrated:
-            return np.hstack([rates, velocity * self.h[:, None] / np.sqrt(12.0)])
-        return np.hstack([rates, np.broadcast_to(self.noise.position * root, velocity.shape)])
+        positions = position_sigmas(self.noise, rates[:, :k], h)
+        if self.slack is not None and not self.integrated:
+            positions = positions * self.slack[:, None]
+        return np.hstack([rates, positions])
 
     def combine(self, d_v: Array, d_q: Array) -> Array:
         """Stacks rate and position defects (axis 1) into the rows whose noise is independent."""
@@ -108,6 +106,18 @@ class Steps:
         columns = defect[:, :n].reshape(len(defect), n, -1)
         link = (self.weight @ columns).reshape(defect[:, :n].shape)
         return np.concatenate([link, defect[:, n:]], axis=1)
+
+
+def rate_sigmas(noise: ProcessNoise, h: Array) -> Array:
+    """Standard deviations of velocity and memory defects over steps of length h, shape (m, 1) [s]; shape (m, r)."""
+    return np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory]) * np.sqrt(h)
+
+
+def position_sigmas(noise: ProcessNoise, velocity: Array, h: Array) -> Array:
+    """Standard deviations of the position rows of these steps, shape (m, k), with those of their velocities."""
+    if noise.model == "integrated":
+        return velocity * (h / np.sqrt(12.0))
+    return np.broadcast_to(noise.position * np.sqrt(h), velocity.shape)
 
 
 def row_names(layout: StateLayout) -> tuple[str, ...]:

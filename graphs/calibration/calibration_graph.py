@@ -16,7 +16,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.reference_graph import initial_values, marquardt_parameters, nonlinear_graph
+from jointscope.graphs.solving.reference_graph import initial_values, marquardt_parameters, nonlinear_graph, unsolvable
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -74,8 +74,16 @@ class CalibrationGraph:
         return dict(zip(found.names, found.values.tolist(), strict=True))
 
     def sigmas(self, values: gtsam.Values) -> dict[str, float]:
-        """Standard deviations of all free parameters in their units, by `gtsam.Marginals`."""
-        covariance = gtsam.Marginals(self.graph, values).marginalCovariance(self.keys[DYNAMICS])
+        """Standard deviations of all free parameters in their units, by `gtsam.Marginals`.
+
+        Raises:
+            SolveError: as `optimize` says.
+        """
+        self._check_keys(values)
+        try:
+            covariance = gtsam.Marginals(self.graph, values).marginalCovariance(self.keys[DYNAMICS])
+        except RuntimeError as err:
+            raise unsolvable(err) from err
         slopes = extract_calibration(values, self.like, (DYNAMICS,)).value_by_coordinate
         return dict(zip(self.like.names, (np.sqrt(np.diag(covariance)) * slopes).tolist(), strict=True))
 
@@ -85,13 +93,13 @@ class CalibrationGraph:
         Raises:
             SolveError: a factor has a key that the graph's values lack, or nothing determines a variable.
         """
-        self._check_keys()
+        self._check_keys(self.values)
         parameters = marquardt_parameters()
         parameters.setOrdering(self.ordering)
         try:
             return gtsam.LevenbergMarquardtOptimizer(self.graph, self.values, parameters).optimize()
         except RuntimeError as err:
-            raise SolveError(f"GTSAM cannot solve the graph: {' '.join(str(err).split())[:200]}") from err
+            raise unsolvable(err) from err
 
     @property
     def ordering(self) -> gtsam.Ordering:
@@ -108,13 +116,20 @@ class CalibrationGraph:
         """What the recordings say about the shared blocks alone: a small linear graph about some values, and these.
 
         The states are eliminated; what is left are `gtsam.LinearContainerFactor`s, to which other factors may be added.
+
+        Raises:
+            SolveError: as `optimize` says.
         """
         values = self.values if values is None else values
+        self._check_keys(values)
         states = gtsam.Ordering()
         for name, key in self.keys.items():
             if name.startswith("x "):
                 states.push_back(key)
-        _, rest = self.graph.linearize(values).eliminatePartialSequential(states)
+        try:
+            _, rest = self.graph.linearize(values).eliminatePartialSequential(states)
+        except RuntimeError as err:
+            raise unsolvable(err) from err
         shared = gtsam.Values(values)
         for i in range(states.size()):
             shared.erase(states.at(i))
@@ -130,9 +145,9 @@ class CalibrationGraph:
             lines.append(f"{i:4d}  {factor.dim()} rows: {', '.join(touched)}")
         return "\n".join(lines)
 
-    def _check_keys(self) -> None:
+    def _check_keys(self, values: gtsam.Values) -> None:
         for i in range(self.graph.size()):
-            missing = [key for key in self.graph.at(i).keys() if not self.values.exists(key)]
+            missing = [key for key in self.graph.at(i).keys() if not values.exists(key)]
             if missing:
                 raise SolveError(
                     f"factor {i} touches {gtsam.DefaultKeyFormatter(missing[0])}, which the graph's values lack; "

@@ -34,6 +34,7 @@ from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.graphs.fixed_lag.window.newest_state import NewestState
 from jointscope.graphs.fixed_lag.window.observation import AT_TICK
 from jointscope.graphs.fixed_lag.window.tick_engine import TickEngine
+from jointscope.graphs.fixed_lag.window_access import WindowAccess
 from jointscope.graphs.problem.timeline import LONGEST_STEP, SHORTEST_STEP
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.robot import Robot
@@ -47,7 +48,7 @@ BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and num
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
 
 
-class FixedLagEstimator:
+class FixedLagEstimator(WindowAccess):
     """State of a robot from the messages of its sensors, now and at the lag.
 
     Args:
@@ -177,24 +178,6 @@ class FixedLagEstimator:
             return unknown_state(self.robot, self._engine.layout.parameters, time, q, time - self._newest_sample)
         when = self._engine.time if t is None else max(t, self._engine.time)
         return self._state_of(when, self._engine.ahead(when, self._waiting.acting))
-
-    def smoothed(self, covariance: bool = True) -> EstimatedState | None:
-        """The state at the lag, smoothed with everything since; None until the window is full.
-
-        Args:
-            covariance: whether it is wanted; it costs a millisecond.
-        """
-        if not self.status.running or self._engine.time - self._engine.past[0].time < 0.9 * self.lag:
-            return None
-        found = self._unbroken(lambda: self._engine.smoothed(covariance))
-        return None if found is None else self._state_of(*found)
-
-    def newest_of_window(self) -> EstimatedState | None:
-        """The newest tick as GTSAM's window has it: `state()` up to rounding, and slower; None before the start."""
-        if not self.status.running:
-            return None
-        found = self._unbroken(self._engine.from_window)
-        return None if found is None else self._state_of(self._engine.time, found)
 
     @property
     def _now(self) -> float | None:

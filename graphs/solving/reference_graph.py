@@ -16,6 +16,7 @@ from jointscope.factors.priors import shared_priors
 from jointscope.factors.single import extract_calibration, insert_calibration, single_factor, state_key
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.robots.errors import SolveError
 from jointscope.robots.outside_modules import need_module
 
 
@@ -77,3 +78,8 @@ def marquardt_parameters() -> gtsam.LevenbergMarquardtParams:
     parameters.setRelativeErrorTol(1e-10)
     parameters.setAbsoluteErrorTol(1e-8)
     return parameters
+
+
+def unsolvable(err: RuntimeError) -> SolveError:
+    """What GTSAM says where a graph has no solution, in one line."""
+    return SolveError(f"GTSAM cannot solve the graph: {' '.join(str(err).split())[:200]}")

@@ -27,6 +27,7 @@ from jointscope.graphs.solving.reference_graph import (
     initial_values,
     marquardt_parameters,
     nonlinear_graph,
+    unsolvable,
 )
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.stretch import change_of
@@ -85,7 +86,7 @@ def solve_samples(
             costs.append(optimizer.error())
             path.append(_calibrations(optimizer.values(), start, hold))
     except RuntimeError as err:
-        raise SolveError(f"GTSAM cannot solve the graph: {str(err).strip().splitlines()[0]}") from err
+        raise unsolvable(err) from err
     return _solution(
         problems, estimate_of(optimizer.values(), start, hold), hold, path, costs, dampings, _at_rest(costs, parameters)
     )

@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Process noise of one step at one state: the whitening of the defects of the dynamics factor, and its inverse.
 
-The same rows as `factors.step`: velocity defects d_v and d_q - (h/2) d_v, link rows turned into impulses by
+The rows and sigmas of `factors.step`: velocity defects d_v and d_q - (h/2) d_v, link rows turned into impulses by
 W = M(q) / (inertia alone), with standard deviations s sqrt(h) and s h sqrt(h/12).
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from jointscope.factors.step import position_sigmas, rate_sigmas
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -29,12 +28,11 @@ class StepNoise:
 
     def __init__(self, robot: Robot):
         self._layout, noise = robot.layout, robot.noise
-        self._integrated, self._position = noise.model == "integrated", noise.position
-        self._density = np.concatenate([noise.link_velocity, noise.motor_velocity, noise.memory])
+        self._process, self._integrated = noise, noise.model == "integrated"
         # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
         self._tree = robot.kinematic_tree
         self._alone = self._tree.free_inertias()
-        r, k = len(self._density), len(robot.layout.positions)
+        r, k = len(robot.layout.rates), len(robot.layout.positions)
         self._rate_rows, self._position_rows = np.arange(r), np.arange(r, r + k)
         self._eye = np.eye(robot.layout.n_link)
         self._kept: tuple[Array, float, tuple[Array, Array]] | None = None
@@ -62,8 +60,9 @@ class StepNoise:
 
     def _computed(self, x: Array, h: float, extra: Array | None) -> tuple[Array, Array]:
         layout, k = self._layout, len(self._layout.positions)
-        sigma = self._density * math.sqrt(h)
-        position = sigma[:k] * (h / math.sqrt(12.0)) if self._integrated else np.full(k, self._position * math.sqrt(h))
+        length = np.array([h])
+        sigma = rate_sigmas(self._process, length)
+        position = position_sigmas(self._process, sigma[:k], length)
         if extra is not None:
             sigma = np.sqrt(sigma**2 + extra**2)
         T, G = np.zeros((2, layout.size, layout.size))

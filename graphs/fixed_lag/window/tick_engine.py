@@ -13,6 +13,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 
+import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +25,7 @@ from jointscope.graphs.fixed_lag.window.past_tick import PastTick
 from jointscope.graphs.fixed_lag.window.process_model import Prediction, ProcessModel
 from jointscope.graphs.fixed_lag.window.sample_judge import SampleJudge
 from jointscope.graphs.fixed_lag.window.smoother_window import Rows, SmootherWindow
+from jointscope.graphs.fixed_lag.window.users_factor import rows_of, ticks_of
 from jointscope.graphs.problem.timeline import LONGEST_STEP
 from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.model.robot import Robot
@@ -139,6 +141,17 @@ class TickEngine:
                 self.window.add_rows(self._sensor_rows(seen, first, last, x0, x1))
         self._reread()
         return innovations
+
+    def add(self, factor: gtsam.NonlinearFactor) -> None:
+        """A user's factor on ticks of the window; it stays in it, and the newest state is read from the window again.
+
+        Raises:
+            EstimatorError: keys that are not in the window, or a factor that cannot be linearised.
+        """
+        self._commit()
+        ticks = ticks_of(factor, {tick.number: tick for tick in self.past})
+        self.window.add_rows(rows_of(factor, ticks, self._estimate))
+        self._reread()
 
     def correct_commands(self, since: float, acting: Acting) -> Counter[str]:
         """Commands have come late: steps that end after a time are taken anew, from the state where they began.

@@ -84,6 +84,9 @@ def test_a_factor_with_a_key_that_the_graph_lacks_is_an_error(calibrated):
     graph.graph.add(gtsam.PriorFactorVector(gtsam.symbol("q", 7), np.zeros(2), gtsam.noiseModel.Unit.Create(2)))
     with pytest.raises(SolveError, match=r"touches q7, which the graph's values lack; insert a start value.*dynamics"):
         graph.optimize()
+    for work in (lambda: graph.sigmas(graph.values), graph.without_states):
+        with pytest.raises(SolveError, match="which the graph's values lack"):
+            work()
 
 
 def test_a_parameter_that_is_not_free_is_an_error(calibrated):

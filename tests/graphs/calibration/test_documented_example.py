@@ -1,27 +1,55 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The example of docs/gtsam.md, run as it stands there."""
+"""The Python examples of README.md and docs/gtsam.md, run as they stand there."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from jointscope.tools.bags.write_bag import write_bag
 
-PAGE = Path(__file__).parents[3] / "docs" / "gtsam.md"
+ROOT = Path(__file__).parents[3]
+BLOCK = re.compile(
+    r"<!-- executed by tests/graphs/calibration/test_documented_example.py -->\n```python\n(.*?)```", re.DOTALL
+)
 
 
-def test_the_example_runs_and_the_data_sheet_counts(simulated, doggy, tmp_path, monkeypatch, capsys):
-    part = simulated.recording.between(4.0, 5.5)
-    write_bag(tmp_path / "train.mcap", part, doggy)
+@pytest.fixture
+def run(simulated, doggy, tmp_path, monkeypatch):
+    """Runs the example of a page beside a recording; its names and what it printed."""
+    write_bag(tmp_path / "train.mcap", simulated.recording.between(4.0, 5.5), doggy)
     monkeypatch.chdir(tmp_path)
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    names: dict = {}
-    exec(compile(code, str(PAGE), "exec"), names)
+
+    def example(page):
+        (code,) = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+        names: dict = {}
+        exec(compile(code, page, "exec"), names)
+        return names
+
+    return example
+
+
+def test_the_example_of_the_page_runs_and_the_data_sheet_counts(run, capsys):
+    names = run("docs/gtsam.md")
     value, sigma = map(float, capsys.readouterr().out.splitlines()[-1].split())
     before = next(p for p in names["result"].parameters if p.name == "joint2.stiffness")
     assert min(before.value, 120.0) <= value <= max(before.value, 120.0)
     assert sigma <= 1.001 * before.sigma
     assert value == pytest.approx(120.0, rel=0.05)
+
+
+def test_the_example_of_the_readme_prints_the_graph_and_the_test_bench_counts(run, capsys):
+    names = run("README.md")
+    assert "rows: dynamics" in capsys.readouterr().out
+    g, bench = names["g"], np.array([0.046, 0.0, -0.022])
+    before, after = (values.atVector(g.keys["imu1.bias"]) for values in (g.values, names["values"]))
+    assert np.linalg.norm(after - bench) < 0.1 * np.linalg.norm(before - bench)
+
+
+def test_the_readmes_lines_with_the_users_factor_are_few():
+    (code,) = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+    lines = [line for line in code.splitlines() if line.strip() and "import" not in line and "load_robot" not in line]
+    assert len(lines) == 5
