@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from arm_verbs import Session
 
@@ -138,27 +137,10 @@ def found_values(truth: Mapping[str, Any], folder: Path, session: Session) -> li
     for k, joint in enumerate(truth["joints"]):
         for quantity, places in PLACES.items():
             true = float(truth[quantity][k])
-            if quantity == "inertia" and not _mass_behind(folder / "robot.urdf", joint):
-                true += float(truth["link_inertia"][k])  # what nobody told the estimator moves with the rotor
             if quantity == "k" and truth["unit"] == "Nm" and not _entries(result, joint, places):
                 continue  # torques are commanded as they are
             values.append(_value(f"{joint}.{quantity}", true, _entries(result, joint, places), volts))
     return values
-
-
-def _mass_behind(urdf: Path, joint: str) -> float:
-    """Mass of all links behind a joint as the URDF has it [kg]."""
-    robot = ElementTree.parse(urdf).getroot()
-    links = {link.get("name"): link for link in robot.iter("link")}
-    parts = [(j.find("parent").get("link"), j.find("child").get("link")) for j in robot.findall("joint")]
-    (waiting,) = ([j.find("child").get("link")] for j in robot.findall("joint") if j.get("name") == joint)
-    total = 0.0
-    while waiting:
-        link = waiting.pop()
-        mass = links[link].find("inertial/mass")
-        total += float(mass.get("value")) if mass is not None else 0.0
-        waiting += [child for parent, child in parts if parent == link]
-    return total
 
 
 def _entries(result: Mapping[str, Any], joint: str, places: tuple[str, ...]) -> list[tuple[str, dict[str, Any]]]:

@@ -2,9 +2,8 @@
 """Whether the inertias of a URDF make equations of motion: a mass matrix that is positive definite in every posture.
 
 A body that cannot exist (principal moments of which one exceeds the sum of the other two) still has such equations.
-Makers round, and fill in guesses; that is worth a remark, not a refusal. A joint that moves something negative has
-none, one that moves nothing has one if its motor turns with it: then the rotor alone is moved. Its body gets a speck of
-dust, so that a mass matrix without the rotors can be inverted.
+Makers round, and fill in guesses; that is worth a remark, not a refusal. A joint that moves nothing, or something
+negative, has none.
 """
 
 from __future__ import annotations
@@ -21,13 +20,12 @@ Array = NDArray[np.float64]
 POSTURES = 64  # at which the mass matrix is looked at, besides zero
 SINGULAR = 1e-10  # eigenvalue of the mass matrix, scaled to a unit diagonal, that cannot be told from zero
 ROUNDING = 1e-9  # of moments, over m (extent of the body)^2
-SPECK = (1e-4, 1e-8)  # [kg], [kg m2] far below what any motor moves
 SLIGHT = 1e-3  # share of the largest moment by which printed digits alone miss the inequality
 
 
 def check_inertias(
     file: str, model: pin.Model, joints: Sequence[str], mass_matrix: Callable[[Array], Array], limits: Array
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
+) -> tuple[str, ...]:
     """Looks at the bodies behind the moving joints, each with what is fixed to it.
 
     Args:
@@ -38,22 +36,19 @@ def check_inertias(
         limits: of the joints, shape (n, 2).
 
     Returns:
-        Remarks on bodies that cannot exist, and joints that move nothing that has a mass.
+        Remarks on bodies that cannot exist.
 
     Raises:
         RobotError: there is a posture without equations of motion.
     """
     odd = {model.names[j]: _oddity(model, j) for j in range(1, model.njoints)}
     M = mass_matrix(_postures(limits))
-    moved = np.abs(M).max(axis=(0, 2)) > 0.0
-    massless = tuple(joint for joint, moves in zip(joints, moved, strict=True) if not moves)
-    M[:, ~moved, ~moved] = 1.0
     size = np.sqrt(np.abs(np.diagonal(M, axis1=1, axis2=2)))
     scale = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(M / (scale[:, :, None] * scale[:, None, :]))
     worst = int(np.argmin(values[:, 0]))
     if values[worst, 0] > SINGULAR:
-        return tuple(f"{file}: {text}" for size, text in odd.values() if size > SLIGHT), massless
+        return tuple(f"{file}: {text}" for size, text in odd.values() if size > SLIGHT)
     joint = joints[int(np.argmax(np.abs(vectors[worst, :, 0])))]
     reason = odd[joint][1] or max(odd.values())[1] or f"{joint} moves {_links(model, model.getJointId(joint))}"
     raise RobotError(
@@ -61,14 +56,6 @@ def check_inertias(
         "what it moves a <mass> and an <inertia> in the URDF with positive principal moments, none above the sum of "
         f"the others, or leave {joint} out of the joints"
     )
-
-
-def with_specks(model: pin.Model, joints: Sequence[str]) -> pin.Model:
-    """The model with a body that is next to nothing behind each of some joints."""
-    dusty = model.copy()
-    for joint in joints:
-        dusty.inertias[model.getJointId(joint)] += pin.Inertia(SPECK[0], np.zeros(3), SPECK[1] * np.eye(3))
-    return dusty
 
 
 def _postures(limits: Array) -> Array:

@@ -19,7 +19,7 @@ from jointscope.robots.bodies.body_rates import BodyRates
 from jointscope.robots.bodies.coupling import Coupling, with_new_joints
 from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
 from jointscope.robots.bodies.mimic_joints import Follower
-from jointscope.robots.bodies.possible_inertias import check_inertias, with_specks
+from jointscope.robots.bodies.possible_inertias import check_inertias
 from jointscope.robots.bodies.urdf_bodies import UrdfBodies
 from jointscope.robots.bodies.usable_joints import (
     check_locked,
@@ -50,7 +50,6 @@ class RigidTree:
         coupling: coordinates of the model from those of `joints`; None where they are the same.
         locked: as given.
         remarks: what is odd about the inertias without making the equations impossible, sentences.
-        massless: joints that move nothing that has a mass; a rotor gives them an equation, here they get a speck.
 
     Raises:
         RobotError: no such joint, one that cannot move or be locked, or inertias without equations of motion.
@@ -74,7 +73,6 @@ class RigidTree:
         check_locked(self._bodies, self.joints, locked)
         check_within_limits(self._bodies, locked)
         self.remarks: tuple[str, ...] = ()
-        self.massless: tuple[str, ...] = ()
         self._need_inertias = inertias
         self._relatives: dict[tuple[tuple[str, float], ...], RigidTree] = {}  # the same tree in other postures
         self._lock(locked)
@@ -119,10 +117,9 @@ class RigidTree:
         self._use(model)
         if self._need_inertias:
             complaints = tuple(f"{self.urdf.name}: {complaint}" for complaint in self._bodies.complaints)
-            remarks, self.massless = check_inertias(self.urdf.name, model, self.joints, self.mass_matrix, self.limits)
-            self.remarks = complaints + remarks
-            if self.massless:
-                self._use(with_specks(model, self.massless))
+            self.remarks = complaints + check_inertias(
+                self.urdf.name, model, self.joints, self.mass_matrix, self.limits
+            )
 
     def _use(self, model: pin.Model) -> None:
         self.model, self.data = model, model.createData()

@@ -67,14 +67,7 @@ def _check_links(robot: Robot, place: str) -> None:
 
 
 def _check_springs(robot: Robot, place: str) -> None:
-    """Effects that act in a spring have one, and behind a spring there is a mass."""
-    loose = [joint for joint in robot.tree.massless if joint not in robot.choices.rigid_joints]
-    if loose and not robot.free_links:
-        raise RobotError(
-            f"{place}: {loose[0]} moves no mass in {robot.tree.urdf.name}, so behind its spring nothing has an "
-            f"equation of motion; list {', '.join(loose)} under model.rigid_joints, where the rotor's inertia gives "
-            "one, or add <inertial> to what it moves"
-        )
+    """Effects that act in a spring have one."""
     for here in robot.effects:
         spring = needed_spring(robot, here)
         if spring:

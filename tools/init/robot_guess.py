@@ -18,7 +18,7 @@ from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
 from jointscope.tools.bags.messages.open_bag import Progress
-from jointscope.tools.init.estimates.drive_values import TYPED, Drives, DriveValues, find_drives, find_signs
+from jointscope.tools.init.estimates.drive_values import Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
@@ -122,7 +122,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     noises = robot.noise(roles.motor_encoder)
 
     def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
-        return _drives(robot, positions, noises, torque, elastic, typed.unit)
+        return _drives(robot, positions, noises, torque, elastic)
 
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = robot.encoder, robot.links or robot.encoder
@@ -174,19 +174,16 @@ def _drives(
     noises: Sequence[NoiseGuess],
     torque: Stream | None,
     elastic: tuple[str, ...],
-    unit: str,
 ) -> Drives:
     """Unit of the command, and the drive of each joint."""
     roles, tree = robot.roles, robot.tree
     sigmas = _in_si(robot, noises)
     command = role_stream(roles.command, roles.joints)
     if not robot.masses:
-        found = find_signs(encoder, command, sigmas, torque, tree.gravity)
-        return replace(found, unit=(unit, TYPED)) if unit else found
+        return find_signs(encoder, command, sigmas, torque, tree.gravity)
     told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
-    held = not measured if told is None else told
-    return find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
+    return find_drives(tree, encoder, command, sigmas, held=not measured if told is None else told, elastic=elastic)
 
 
 def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:
@@ -208,8 +205,7 @@ def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]
 def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     """Joints that turn with a gyroscope behind them."""
     seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
-    rigid = (*tree.slides, *tree.massless)
-    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in rigid)
+    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
 
 
 def _gyros(

@@ -281,18 +281,14 @@ def test_a_bag_without_a_drive_is_refused_with_what_to_record(doggy, tmp_path):
     assert not (tmp_path / "own.yaml").exists()
 
 
-def test_links_without_masses_need_the_unit_of_the_command_or_encoders_on_the_links(doggy, bag, tmp_path):
+def test_links_without_masses_need_encoders_on_the_links(doggy, bag, tmp_path):
     text = doggy.tree.urdf.read_text()
     while "<inertial>" in text:
         start, end = text.index("<inertial>"), text.index("</inertial>") + len("</inertial>")
         text = text[:start] + text[end:]
     (tmp_path / "light.urdf").write_text(text)
-    with pytest.raises(RobotError, match=r"no moving link of light.urdf has a mass.*jointscope init .*--unit Nm -o"):
+    with pytest.raises(RobotError, match="no inertias for all moving links, and the bag no encoders"):
         run(tmp_path / "light.urdf", bag, "-o", tmp_path / "own.yaml")
-    assert not (tmp_path / "own.yaml").exists()
-    run(tmp_path / "light.urdf", bag, "-o", tmp_path / "own.yaml", "--unit", "duty")
-    robot = load_robot(tmp_path / "own.yaml")
-    assert robot.command.unit == "duty" and robot.choices.rigid_joints == robot.joints == robot.tree.massless
 
 
 def test_an_unknown_joint_is_named(doggy, bag, tmp_path):

@@ -75,7 +75,6 @@ def measured_robot(typed: Typed, signals: list[Signal]) -> MeasuredRobot:
     roles, masses = _roles(typed, signals, known, bodies)
     held = held_joints(bodies, roles, typed, free_links=not masses)
     tree = RigidTree(typed.urdf, roles.joints, np.array(GRAVITY), inertias=masses)
-    _unit_must_be_told(typed, tree)
     encoder = role_stream(roles.motor_encoder, roles.joints)
     links = None if roles.link_encoder is None else role_stream(roles.link_encoder, roles.joints)
     gyros = [signal.stream(("x", "y", "z")) for signal in roles.imus]
@@ -97,17 +96,15 @@ def _roles(typed: Typed, signals: list[Signal], known: tuple[str, ...], bodies: 
     """Who is who, and whether the robot has masses."""
     roles = assign_roles(signals, known, _slides(bodies), typed.wish)
     masses, trouble = _masses(typed.urdf, roles.joints)
-    if masses and not trouble:
+    if masses:
         return roles, True
-    linked = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
-    if linked.link_encoder is None and masses:
-        return roles, True
-    if linked.link_encoder is None:
+    roles = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
+    if roles.link_encoder is None:
         raise RobotError(
             f"{typed.urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected "
             f"one of them; add <inertial> to the links, or record a topic with the positions of the links ({trouble})"
         )
-    return linked, False
+    return roles, False
 
 
 def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
@@ -122,21 +119,6 @@ def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
                 f"{joint} is a mimic joint of {bodies.path.name}: {joint} follows {bodies.followers[joint].leader} and "
                 f"is modelled with it; leave it out of --joints and --lock"
             )
-
-
-def _unit_must_be_told(typed: Typed, tree: RigidTree) -> None:
-    """Asks for the unit of the command where nothing in the URDF or the recording can tell it.
-
-    Raises:
-        RobotError: no joint moves a mass, and the user has not said the unit.
-    """
-    if typed.unit or not tree.massless or len(tree.massless) < tree.n:
-        return
-    raise RobotError(
-        f"no moving link of {typed.urdf.name} has a mass, so a recording tells no torques, only their ratios: say the "
-        f"unit of the commands, or add <inertial> to the links; if they are in N m "
-        f"(else --unit A, V or duty): {replace(typed, unit='N m').command()}"
-    )
 
 
 def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
@@ -171,9 +153,9 @@ def _in_si(held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, found
 
 
 def _masses(urdf: Path, joints: tuple[str, ...]) -> tuple[bool, str]:
-    """Whether there are equations of motion with the masses of the URDF, and what is odd about these."""
+    """Whether the bodies have masses, and what is wrong if not."""
     try:
-        massless = RigidTree(urdf, joints, np.array(GRAVITY)).massless
+        RigidTree(urdf, joints, np.array(GRAVITY))
     except RobotError as err:
         return False, str(err)
-    return True, f"no masses behind {', '.join(massless)}" if massless else ""
+    return True, ""

@@ -28,7 +28,6 @@ class Typed:
         urdf, bag, output: paths.
         wish: joints, names and locks.
         name: of the robot; empty for that of the URDF.
-        unit: of the command; empty where the recording shall tell.
     """
 
     urdf: Path
@@ -36,7 +35,6 @@ class Typed:
     output: Path | None = None
     wish: Wish = field(default_factory=Wish)
     name: str = ""
-    unit: str = ""
 
     def command(self) -> str:
         """As it is typed."""
@@ -48,8 +46,6 @@ class Typed:
             words += ["--lock", ",".join(wish.locked)]
         if self.name:
             words += ["--name", self.name]
-        if self.unit:
-            words += ["--unit", self.unit.replace(" ", "")]
         words += ["-o", str(self.output or f"{self.urdf.stem}.yaml")]
         return shlex.join(words)
 
