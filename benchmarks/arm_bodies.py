@@ -136,6 +136,9 @@ class ArmBodies:
             index = self._model.body(name).id
             self._model.body_mass[index] = bodies[name].mass
             self._model.body_inertia[index] = bodies[name].principal()[1]
+        # the compiler keeps the inertia of bodies that turn nothing else as a constant
+        self._model.body_simple[:] = 0
+        self._model.dof_simplenum[:] = 0
         # the masses that hang on each body, which the compiler had summed up; its own function for that refuses bodies
         # without mass
         self._model.body_subtreemass[:] = self._model.body_mass

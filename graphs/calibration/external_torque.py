@@ -132,7 +132,7 @@ def _given(robot: Robot, recording: Recording) -> Array:
 
 def _impulses(robot: Robot, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
-    return defects[:, : robot.layout.n_link] * robot.kinematic_tree.free_inertias()
+    return defects[:, : robot.layout.n_link] * robot.free_inertias()
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:

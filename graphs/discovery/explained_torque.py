@@ -38,6 +38,8 @@ def explained_torque(robot: Robot, label: str, problem: BagProblem, x: Array) ->
     M = base.kinematic_tree.mass_matrix(full[1][:, base.layout.q_link])
     torque = (M @ link[:, :, None])[:, base.layout.joint_link, 0]
     b = np.array([base.drive_parameter(joint, "inertia").value for joint in base.joints])
+    rigid = [joint not in base.layout.motors for joint in base.joints]
+    torque[:, rigid] += (b * change[:, :n])[:, rigid]  # their rotors move with the links
     return np.hstack([torque, b * change[:, n:]])
 
 

@@ -84,7 +84,7 @@ class FreeTorques:
 def _impulse_densities(robot: Robot) -> dict[str, float]:
     """Density of each equation's process noise as a torque, by name [N m sqrt(s)]."""
     layout, noise = robot.layout, robot.noise
-    alone = robot.kinematic_tree.free_inertias()
+    alone = robot.free_inertias()
     motor = np.array([robot.drive_parameter(joint, "inertia").value for joint in layout.motors])
     density = np.concatenate([alone * noise.link_velocity, motor * noise.motor_velocity])
     return dict(zip(layout.rate_names, map(float, density), strict=False))

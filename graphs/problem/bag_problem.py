@@ -120,7 +120,7 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     layout, tree = robot.layout, robot.kinematic_tree
     q = np.zeros((len(middle), layout.n_link))
     q[:, layout.joint_link] = np.column_stack(angles) - robot.motor_encoder.zero
-    return tree.mass_matrix(q) / tree.free_inertias()[:, None]
+    return tree.weighing_inertia(q) / tree.free_inertias()[:, None]
 
 
 def _slack(recording: Recording, timeline: Timeline) -> Array | None:

@@ -106,6 +106,11 @@ class DriveEquation:
         worst = float(np.max(np.diag(noise) / _positive(np.diag(mean))))
         return np.asarray(noise * min(1.0, MOST_NOISE / max(worst, 1e-300)))
 
+    @property
+    def carries_nothing(self) -> bool:
+        """Whether the bodies ask for no torque at all: values are then known up to a common factor."""
+        return bool(self.rms[1] == 0.0)
+
     def missing(self, values: Mapping[str, float]) -> float:
         """Rms of the torque that is missing with given values, in the windows [N m]; all that are left out are zero."""
         weights = np.array([values[GAIN], -1.0, *(-values.get(name, 0.0) for name in PLACES)])
@@ -119,9 +124,11 @@ class DriveEquation:
     def direction(self) -> Value:
         """Whether the command turns the joint forwards (above zero), with its sigma.
 
-        The command is regressed on load, speed and direction, all of which it drives in its own direction.
+        The command is regressed on load (acceleration where nothing is carried), speed and direction, all of which it
+        drives in its own direction.
         """
-        some = [place for place in (1, 2, 3) if self.rms[place] > 0.0]
+        load = PLACES[INERTIA] if self.carries_nothing else 1
+        some = [place for place in (load, 2, 3) if self.rms[place] > 0.0]
         if len(self.sums.counts) < FEWEST_BLOCKS or self.rms[0] == 0.0 or not some:
             return Value(1.0, np.inf)
         combine = np.eye(5)[:, [0, *some]] / np.sqrt(_positive(np.diag(self.sums.total)[[0, *some]]))

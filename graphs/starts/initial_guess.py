@@ -109,9 +109,7 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
     low = butter(2, min(BAND[1], 0.4 / h), fs=1.0 / h, output="sos")
     a_smooth = sosfiltfilt(low, a_link, axis=0)
     # inverse dynamics: what the rigid bodies ask of the springs
-    load = np.linalg.solve(
-        _inverse_mass(robot, q_link), (a_smooth - robot.tree.acceleration(q_link, v_link, 0.0 * q_link))[:, :, None]
-    )[:, :, 0]
+    load = robot.tree.torque(q_link, v_link if robot.tree.coriolis else 0.0 * v_link, a_smooth)
     v_friction = v_link if robot.choices.friction_velocity == "link" else v_motor
     signals = {
         "load": -load,
@@ -127,10 +125,6 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
     filtered["load"] = -filtered["load"]
     keep = slice(None, None, max(round(0.25 / (BAND[1] * h)), 1))
     return {key: value[keep] for key, value in filtered.items()}
-
-
-def _inverse_mass(robot: Robot, q: Array) -> Array:
-    return np.asarray(np.linalg.inv(robot.tree.mass_matrix(q)), dtype=np.float64)
 
 
 def _regress(

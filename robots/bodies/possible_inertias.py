@@ -2,8 +2,9 @@
 """Whether the inertias of a URDF make equations of motion: a mass matrix that is positive definite in every posture.
 
 A body that cannot exist (principal moments of which one exceeds the sum of the other two) still has such equations.
-Makers round, and fill in guesses; that is worth a remark, not a refusal. A joint that moves nothing, or something
-negative, has none.
+Makers round, and fill in guesses; that is worth a remark, not a refusal. A joint that moves something negative has
+none. The last joint of a branch may move nothing at all, as the fingers of many grippers: its rotor has an inertia.
+Where it carries other joints, the file tells geometry only.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ Array = NDArray[np.float64]
 POSTURES = 64  # at which the mass matrix is looked at, besides zero
 SINGULAR = 1e-10  # eigenvalue of the mass matrix, scaled to a unit diagonal, that cannot be told from zero
 ROUNDING = 1e-9  # of moments, over m (extent of the body)^2
+NOTHING = 1e-15  # [kg m2] or [kg] of a row of the mass matrix: what rounding leaves of a body that has no inertia
 SLIGHT = 1e-3  # share of the largest moment by which printed digits alone miss the inequality
 
 
 def check_inertias(
     file: str, model: pin.Model, joints: Sequence[str], mass_matrix: Callable[[Array], Array], limits: Array
-) -> tuple[str, ...]:
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Looks at the bodies behind the moving joints, each with what is fixed to it.
 
     Args:
@@ -36,19 +38,26 @@ def check_inertias(
         limits: of the joints, shape (n, 2).
 
     Returns:
-        Remarks on bodies that cannot exist.
+        Remarks on bodies that cannot exist, and the last joints that move no inertia in any posture.
 
     Raises:
         RobotError: there is a posture without equations of motion.
     """
     odd = {model.names[j]: _oddity(model, j) for j in range(1, model.njoints)}
     M = mass_matrix(_postures(limits))
+    carriers = {model.names[model.parents[j]] for j in range(1, model.njoints) if model.names[j] in joints}
+    idle = np.abs(M).max(axis=(0, 2), initial=0.0) <= NOTHING
+    idle &= [joint not in carriers for joint in joints]
+    massless = tuple(joint for joint, nothing in zip(joints, idle, strict=True) if nothing)
+    M = M + np.diag(idle.astype(float))
     size = np.sqrt(np.abs(np.diagonal(M, axis1=1, axis2=2)))
     scale = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(M / (scale[:, :, None] * scale[:, None, :]))
     worst = int(np.argmin(values[:, 0]))
     if values[worst, 0] > SINGULAR:
-        return tuple(f"{file}: {text}" for size, text in odd.values() if size > SLIGHT)
+        remarks = [text for size, text in odd.values() if size > SLIGHT]
+        remarks += [f"{odd[joint][1] or joint + ' moves no inertia'}; its rotor has it all" for joint in massless]
+        return tuple(f"{file}: {text}" for text in remarks), massless
     joint = joints[int(np.argmax(np.abs(vectors[worst, :, 0])))]
     reason = odd[joint][1] or max(odd.values())[1] or f"{joint} moves {_links(model, model.getJointId(joint))}"
     raise RobotError(

@@ -50,6 +50,7 @@ class RigidTree:
         coupling: coordinates of the model from those of `joints`; None where they are the same.
         locked: as given.
         remarks: what is odd about the inertias without making the equations impossible, sentences.
+        massless: joints that move no inertia; they have equations where a rotor drives them without a spring.
 
     Raises:
         RobotError: no such joint, one that cannot move or be locked, or inertias without equations of motion.
@@ -73,6 +74,7 @@ class RigidTree:
         check_locked(self._bodies, self.joints, locked)
         check_within_limits(self._bodies, locked)
         self.remarks: tuple[str, ...] = ()
+        self.massless: tuple[str, ...] = ()
         self._need_inertias = inertias
         self._relatives: dict[tuple[tuple[str, float], ...], RigidTree] = {}  # the same tree in other postures
         self._lock(locked)
@@ -117,9 +119,8 @@ class RigidTree:
         self._use(model)
         if self._need_inertias:
             complaints = tuple(f"{self.urdf.name}: {complaint}" for complaint in self._bodies.complaints)
-            self.remarks = complaints + check_inertias(
-                self.urdf.name, model, self.joints, self.mass_matrix, self.limits
-            )
+            odd, self.massless = check_inertias(self.urdf.name, model, self.joints, self.mass_matrix, self.limits)
+            self.remarks = complaints + odd
 
     def _use(self, model: pin.Model) -> None:
         self.model, self.data = model, model.createData()
@@ -231,9 +232,14 @@ class RigidTree:
         """M(q), shape (m, n, n) [kg m^2], for positions q of shape (m, n) [rad]."""
         return self.equations.mass_matrix(q)
 
+    def weighing_inertia(self, q: Array) -> Array:
+        """M(q) as it weighs noise, shape (m, n, n) [kg m^2]: with a unit inertia for joints that move none."""
+        M = self.mass_matrix(q)
+        return M + np.diag([float(joint in self.massless) for joint in self.joints]) if self.massless else M
+
     def free_inertias(self) -> Array:
-        """Inertia of each coordinate at zero while all others are free to move, shape (n,) [kg m^2]."""
-        M = self.mass_matrix(np.zeros((1, self.n)))[0]
+        """Weighing inertia of each coordinate at zero while all others are free to move, shape (n,) [kg m^2]."""
+        M = self.weighing_inertia(np.zeros((1, self.n)))[0]
         return np.asarray(1.0 / np.diag(np.linalg.inv(M)))
 
     def body_rate(self, body: str, q: Array, v: Array) -> tuple[Array, Array, Array]:

@@ -23,6 +23,10 @@ DAMPING_RATIO = 0.05
 class BearingFlexibility(Structure):
     """Two sprung hinges; natural scales come from the joint's own spring and body."""
 
+    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
+        """Joints that move an inertia, which a tilted bearing would shake."""
+        return tuple(joint for joint in super().owners_of(robot) if joint not in robot.tree.massless)
+
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Starts ten times stiffer than the joint's spring, with the inertia of the model's body.
 

@@ -26,11 +26,14 @@ class JointElasticity(Structure):
         """Why it cannot act; empty if it can."""
         if owner in robot.joints and owner not in robot.choices.rigid_joints:
             return f"cannot act on {owner}, which has a spring already; only a joint declared rigid can get one"
+        if owner in robot.tree.massless:
+            return f"cannot act on {owner}, which moves no inertia in the URDF: nothing would swing on the spring"
         return super().may_act_on(robot, owner)
 
     def owners_of(self, robot: RobotView) -> tuple[str, ...]:
-        """The joints declared rigid."""
-        return tuple(joint for joint in robot.joints if joint in robot.choices.rigid_joints)
+        """The joints declared rigid that move an inertia."""
+        massless = robot.tree.massless
+        return tuple(j for j in robot.joints if j in robot.choices.rigid_joints and j not in massless)
 
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Starts at a resonance of 10 Hz with the inertia that the joint moves at zero angles."""

@@ -67,7 +67,13 @@ def _check_links(robot: Robot, place: str) -> None:
 
 
 def _check_springs(robot: Robot, place: str) -> None:
-    """Effects that act in a spring have one."""
+    """Effects that act in a spring have one, and a spring has an inertia behind it."""
+    empty = [joint for joint in robot.layout.motors if joint in robot.tree.massless]
+    if empty:
+        raise RobotError(
+            f"{place}: {', '.join(empty)} moves no inertia in {robot.tree.urdf.name}, so nothing swings on a spring; "
+            f"list {', '.join(empty)} under model.rigid_joints, or give the link a <mass> and an <inertia>"
+        )
     for here in robot.effects:
         spring = needed_spring(robot, here)
         if spring:

@@ -165,6 +165,16 @@ class Robot:
         tree = self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
         return tree.with_coriolis(True) if any(_is(here.effect, "coriolis") for here in self.effects) else tree
 
+    def free_inertias(self) -> NDArray[np.float64]:
+        """Inertia of each link coordinate while all others are free, that of the rotor where it moves nothing else.
+
+        Shape (n_link,) [kg m^2].
+        """
+        alone = self.kinematic_tree.free_inertias()
+        for joint in self.tree.massless:
+            alone[self.layout.joint_link[self.joints.index(joint)]] = self.drive_parameter(joint, "inertia").value
+        return alone
+
     @property
     def memories(self) -> dict[str, Memory]:
         """States that effects bring along, by the label of the effect, in the order of the layout."""

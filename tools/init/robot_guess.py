@@ -203,9 +203,10 @@ def _sample_times(roles: Roles, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]
 
 
 def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
-    """Joints that turn with a gyroscope behind them."""
+    """Joints that turn an inertia with a gyroscope behind them."""
     seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
-    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in tree.slides)
+    no_spring = {*tree.slides, *tree.massless}
+    return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in no_spring)
 
 
 def _gyros(

@@ -74,7 +74,7 @@ class StepNoise:
         half, moved = 0.5 * h, layout.velocities
         T[self._position_rows, moved], G[layout.positions, self._rate_rows[:k]] = -half / position, half * sigma[:k]
         n, q, v = layout.n_link, layout.q_link, layout.v_link
-        W = self._mass_matrix(x[q]) / self._alone[:, None]
+        W = self._tree.weighing_inertia(x[None, q])[0] / self._alone[:, None]
         W_inverse = lapack.dgesv(W, self._eye)[2]
         rates, positions = slice(0, n), slice(len(sigma), len(sigma) + n)
         by_position = W / position[:n, None]
@@ -82,6 +82,3 @@ class StepNoise:
         by_rate = W_inverse * sigma[:n]
         G[v, rates], G[q, rates], G[q, positions] = by_rate, half * by_rate, W_inverse * position[:n]
         return T, G
-
-    def _mass_matrix(self, q: Array) -> Array:
-        return self._tree.mass_matrix(q[None])[0]

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from robots_to_compare import MIMICKING
@@ -110,7 +112,7 @@ def test_an_inertia_that_no_body_has_is_a_remark(changed):
     assert RigidTree(changed(('ixx="0.005" iyy="0.004"', 'ixx="0.0005" iyy="0.0004"')), JOINTS, DOWN).remarks == ()
 
 
-def test_a_link_without_inertia_between_others_is_no_trouble_and_one_at_the_end_is(changed):
+def test_a_link_without_inertia_between_others_is_no_trouble_and_at_the_end_a_rotor_moves_it(changed):
     shin = ('<inertial><origin xyz="0.05 0 0.02"/><mass value="0.4"/>\n'
             '      <inertia ixx="0.004" iyy="0.005" izz="0.006" ixy="0" ixz="0.001" iyz="0"/></inertial>')  # fmt: skip
     assert RigidTree(changed((shin, "")), JOINTS, DOWN).remarks == ()
@@ -118,14 +120,40 @@ def test_a_link_without_inertia_between_others_is_no_trouble_and_one_at_the_end_
            '      <inertia ixx="0.005" iyy="0.004" izz="0.003" ixy="0" ixz="0" iyz="0"/></inertial>')  # fmt: skip
     path = changed((ear, ""))
     RigidTree(path, JOINTS, DOWN)
-    RigidTree(path, (*JOINTS, "ear"), DOWN, inertias=False)
+    assert RigidTree(path, (*JOINTS, "ear"), DOWN, inertias=False).massless == ()
+    tree = RigidTree(path, (*JOINTS, "ear"), DOWN)
+    assert tree.massless == ("ear",)
+    assert tree.remarks == ("arm.urdf: link ear, moved by ear, has no inertia; its rotor has it all",)
+    q = np.array([[0.3, -0.2, 0.5, 0.9]])
+    assert np.all(tree.mass_matrix(q)[0, 3] == 0.0)
+    # noise of the ear is weighed by itself, that of the others as without it
+    weighing = tree.weighing_inertia(q)[0]
+    np.testing.assert_array_equal(weighing[3], [0.0, 0.0, 0.0, 1.0])
+    np.testing.assert_allclose(weighing[:3, :3], RigidTree(path, JOINTS, DOWN).mass_matrix(q[:, :3])[0], rtol=1e-12)
+    assert tree.free_inertias()[3] == 1.0
+
+
+def test_a_chain_without_masses_has_no_equations(tmp_path):
+    urdf = tmp_path / "arm.urdf"
+    urdf.write_text(re.sub("<inertial>.*?</inertial>", "", MIMICKING.read_text(), flags=re.DOTALL))
     with pytest.raises(RobotError) as error:
-        RigidTree(path, (*JOINTS, "ear"), DOWN)
-    assert str(error.value) == (
-        "arm.urdf: link ear, moved by ear, has no inertia; the mass matrix is not positive definite, so ear has no "
-        "equation of motion. Give what it moves a <mass> and an <inertia> in the URDF with positive principal moments, "
-        "none above the sum of the others, or leave ear out of the joints"
+        RigidTree(urdf, JOINTS, DOWN)
+    assert str(error.value).endswith(
+        "has no inertia; the mass matrix is not positive definite, so joint1 has no equation of motion. Give what it "
+        "moves a <mass> and an <inertia> in the URDF with positive principal moments, none above the sum of the "
+        "others, or leave joint1 out of the joints"
     )
+    assert RigidTree(urdf, ("joint3",), DOWN).massless == ("joint3",)
+
+
+def test_a_mass_on_its_own_axis_without_moments_moves_as_none(changed):
+    ear = ('<inertial><origin xyz="0 0.1 0.1"/><mass value="0.5"/>\n'
+           '      <inertia ixx="0.005" iyy="0.004" izz="0.003" ixy="0" ixz="0" iyz="0"/></inertial>')  # fmt: skip
+    point = ('<inertial><origin xyz="0 0 0"/><mass value="0.5"/>'
+             '<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>')  # fmt: skip
+    tree = RigidTree(changed((ear, point)), (*JOINTS, "ear"), DOWN)
+    assert tree.massless == ("ear",)
+    assert "ear moves no inertia; its rotor has it all" in tree.remarks[0]
 
 
 def test_what_the_parser_leaves_out_is_said(changed):

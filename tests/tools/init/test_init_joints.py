@@ -274,3 +274,39 @@ def test_links_and_joints_may_have_the_same_names(tmp_path):
     arguments = (CASES / "arm_same_names.urdf", CASES / "arm_same_names.mcap", "--joints", "shoulder,elbow")
     assert init(*arguments, "-o", tmp_path / "a.yaml") == 0
     assert load_robot(tmp_path / "a.yaml").tree.locked == pytest.approx({"wrist": -1.0192}, abs=1e-3)
+
+
+@pytest.mark.parametrize("moving", [("finger",), ("arm", "finger")])
+def test_a_finger_without_a_mass_has_that_of_its_rotor(moving, tmp_path, capsys):
+    text = write_urdf(tmp_path / "g.urdf", {"arm": None, "finger": "arm"}).read_text()
+    before, link, after = text.partition('<link name="finger_link">')
+    (tmp_path / "g.urdf").write_text(before + link + re.sub("<inertial>.*?</inertial>", "", after, count=1))
+    still = {} if "arm" in moving else {"arm": 0.3}
+    motion = ArmMotion(tmp_path / "g.urdf", moving, still)
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, {"/s": motion.states(), "/cmd": motion.commands(moving)})
+    assert init(tmp_path / "g.urdf", bag, "-o", tmp_path / "a.yaml") == 0
+    said = capsys.readouterr().out
+    assert "g.urdf: link finger_link, moved by finger, has no inertia; its rotor has it all" in said
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.tree.massless == ("finger",) and robot.command.unit == "N m"
+    start = {name: parameter.value for name, parameter in robot.parameters.items()}
+    assert start["finger.inertia"] == pytest.approx(0.05, rel=0.05)  # the commands are held
+    assert start["finger.coulomb_torque"] == pytest.approx(0.3, rel=0.05)
+    assert main(["calibrate", str(tmp_path / "a.yaml"), str(bag), "-o", str(tmp_path / "c.yaml")]) == 0
+    found = load_robot(tmp_path / "c.yaml").parameters["finger.inertia"]
+    assert found.value == pytest.approx(0.05, rel=0.04)
+
+
+def test_a_spring_needs_an_inertia_behind_it(tmp_path, capsys):
+    text = write_urdf(tmp_path / "g.urdf", {"finger": None}).read_text()
+    (tmp_path / "g.urdf").write_text(re.sub("<inertial>.*?</inertial>", "", text, count=1))
+    motion = ArmMotion(tmp_path / "g.urdf", ("finger",))
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, {"/s": motion.states(), "/c": motion.commands(("finger",))})
+    assert init(tmp_path / "g.urdf", bag, "-o", tmp_path / "a.yaml") == 0
+    capsys.readouterr()
+    assert main(["add", str(tmp_path / "a.yaml"), "joint_elasticity@finger", "-o", str(tmp_path / "b.yaml")]) == 1
+    assert "which moves no inertia in the URDF: nothing would swing on the spring" in capsys.readouterr().err
+    own = (tmp_path / "a.yaml").read_text()
+    (tmp_path / "a.yaml").write_text(re.sub("rigid_joints: .finger.", "rigid_joints: []", own))
+    assert main(["info", str(bag), "--robot", str(tmp_path / "a.yaml")]) == 1
+    assert "finger moves no inertia in g.urdf, so nothing swings on a spring" in capsys.readouterr().err

@@ -23,7 +23,12 @@ ALIKE = 0.03  # relative
 
 
 def drive_unit(
-    joints: Sequence[str], gains: Sequence[Value | None], largest: float, heavy: Sequence[str] = ()
+    joints: Sequence[str],
+    gains: Sequence[Value | None],
+    largest: float,
+    heavy: Sequence[str] = (),
+    *,
+    massless: bool = False,
 ) -> tuple[str, str]:
     """Unit of the drives and why.
 
@@ -32,10 +37,13 @@ def drive_unit(
         gains: torque per unit of the command of each [N m]; None where the recording cannot tell.
         largest: largest absolute command.
         heavy: joints that commands in N m could not move as they moved.
+        massless: whether no joint carries anything, so that all values have the unit of the command, whatever it is.
     """
     told = {j: g for j, g in zip(joints, gains, strict=True) if g is not None and g.sigma < TOLD * abs(g.value)}
     small = largest <= LARGEST_DUTY
     size = f"it never exceeds {largest:.3g}" if small else f"it reaches {largest:.3g}"
+    if massless:
+        return "N m", f"{size}; without masses in the URDF all values are per unit of the command, whatever it is"
     if not told and heavy and not small:
         why = f"N m would be too little for the masses of {', '.join(heavy)} in the URDF"
         return "A", f"{size}; {why}; the recording does not tell how much torque it makes{_volts(largest)}"

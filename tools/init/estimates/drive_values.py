@@ -134,7 +134,9 @@ def find_drives(
         for joint, equation, (sign, _), link in zip(tree.joints, equations, directions, links, strict=True)
         if _needs_more_than_newton_metres(equation, sign, link)
     ]
-    unit = drive_unit(tree.joints, gains, float(np.nanmax(np.abs(command.values), initial=0.0)), heavy)
+    largest = float(np.nanmax(np.abs(command.values), initial=0.0))
+    massless = all(equation.carries_nothing for equation in equations)
+    unit = drive_unit(tree.joints, gains, largest, heavy, massless=massless)
     known = {GAIN: 1.0} if unit[0] == "N m" else {}
     drives = [
         _drive(equation, known, direction, link, joint in elastic)
@@ -221,7 +223,10 @@ def _drive(
     given = {name: sign * value for name, value in known.items()}
     found = equation.solve(given)
     guessed = not given and (GAIN not in found or found[GAIN].value * sign <= TOLD * found[GAIN].sigma)
-    if guessed:
+    if guessed and equation.carries_nothing:
+        given = {GAIN: sign}
+        found = equation.solve(given)
+    elif guessed:
         given = {INERTIA: MATCHED * link}
         found = {**equation.solve(given), INERTIA: Value(MATCHED * link, np.inf)}
     gain = given.get(GAIN, found.get(GAIN, Value(0.0, np.inf)).value)

@@ -95,16 +95,18 @@ def role_stream(chosen: Chosen, joints: tuple[str, ...], factor: float | np.ndar
 def _roles(typed: Typed, signals: list[Signal], known: tuple[str, ...], bodies: UrdfBodies) -> tuple[Roles, bool]:
     """Who is who, and whether the robot has masses."""
     roles = assign_roles(signals, known, _slides(bodies), typed.wish)
-    masses, trouble = _masses(typed.urdf, roles.joints)
-    if masses:
+    trouble, massless = _masses(typed.urdf, roles.joints)
+    if not (trouble or massless):
         return roles, True
-    roles = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
-    if roles.link_encoder is None:
+    linked = assign_roles(signals, known, _slides(bodies), typed.wish, linked=True)
+    if linked.link_encoder is not None:
+        return linked, False
+    if trouble:
         raise RobotError(
             f"{typed.urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected "
             f"one of them; add <inertial> to the links, or record a topic with the positions of the links ({trouble})"
         )
-    return roles, False
+    return roles, True
 
 
 def _no_followers(bodies: UrdfBodies, wish: Wish) -> None:
@@ -152,10 +154,9 @@ def _in_si(held: Sequence[HeldJoint], bodies: UrdfBodies, tree: RigidTree, found
     )
 
 
-def _masses(urdf: Path, joints: tuple[str, ...]) -> tuple[bool, str]:
-    """Whether the bodies have masses, and what is wrong if not."""
+def _masses(urdf: Path, joints: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Why there are no equations of motion with the masses of the URDF, and the joints that move none."""
     try:
-        RigidTree(urdf, joints, np.array(GRAVITY))
+        return "", RigidTree(urdf, joints, np.array(GRAVITY)).massless
     except RobotError as err:
-        return False, str(err)
-    return True, ""
+        return str(err), ()
