@@ -18,7 +18,7 @@ from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
 from jointscope.tools.bags.messages.open_bag import Progress
-from jointscope.tools.init.estimates.drive_values import Drives, DriveValues, find_drives, find_signs
+from jointscope.tools.init.estimates.drive_values import TYPED, Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
@@ -122,7 +122,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     noises = robot.noise(roles.motor_encoder)
 
     def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
-        return _drives(robot, positions, noises, torque, elastic)
+        return _drives(robot, positions, noises, torque, elastic, typed.unit)
 
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = robot.encoder, robot.links or robot.encoder
@@ -174,16 +174,19 @@ def _drives(
     noises: Sequence[NoiseGuess],
     torque: Stream | None,
     elastic: tuple[str, ...],
+    unit: str,
 ) -> Drives:
     """Unit of the command, and the drive of each joint."""
     roles, tree = robot.roles, robot.tree
     sigmas = _in_si(robot, noises)
     command = role_stream(roles.command, roles.joints)
     if not robot.masses:
-        return find_signs(encoder, command, sigmas, torque, tree.gravity)
+        found = find_signs(encoder, command, sigmas, torque, tree.gravity)
+        return replace(found, unit=(unit, TYPED)) if unit else found
     told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
-    return find_drives(tree, encoder, command, sigmas, held=not measured if told is None else told, elastic=elastic)
+    held = not measured if told is None else told
+    return find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
 
 
 def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:

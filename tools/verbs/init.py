@@ -46,6 +46,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--lock", default="", metavar="A,B,...", help="joints to hold at their mean although they move in the bag"
     )
+    parser.add_argument(
+        "--unit",
+        default="",
+        choices=("duty", "V", "A", "Nm"),
+        help="unit of the command, if you know it; else the masses of the URDF and its size tell",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
     parser.set_defaults(run=run)
 
@@ -63,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.init.text.robot_text import guesses, robot_text
 
     _check_order(args.urdf, args.bag)
-    typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name)
+    typed = Typed(
+        args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name, args.unit.replace("Nm", "N m")
+    )
     with progress_bar() as progress:
         guess = guess_robot(typed, reading(args.bag, progress))
         text = robot_text(guess, urdf_reference(args.urdf, args.output.parent))
@@ -101,8 +109,9 @@ def run(args: argparse.Namespace) -> int:
         lost = ", ".join(poor)
         print(f"The regression does not explain {lost} (table above): something is wrong there; look at it first.")
     calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
+    better = args.output.with_name(f"{args.output.stem}_better.yaml")
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
-    print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {calibrated}")
+    print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {better}")
     return 0
 
 

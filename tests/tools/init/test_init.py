@@ -313,3 +313,9 @@ def test_axes_without_a_second_encoder_are_left_out(tmp_path):
     robot = load_robot(tmp_path / "own.yaml")
     assert robot.joints == ("joint_a1", "joint_a2", "joint_a3")
     assert robot.command.topic == "/joint_states" and robot.command.unit == "N m"
+
+
+def test_a_unit_that_is_said_is_taken(doggy, bag, tmp_path):
+    run(doggy.tree.urdf, bag, "-o", tmp_path / "own.yaml", "--unit", "V")
+    assert load_robot(tmp_path / "own.yaml").command.unit == "V"
+    assert "as you said" in (tmp_path / "own.yaml").read_text()

@@ -43,6 +43,7 @@ SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
 USUAL = 0.005  # [rad/s] within which the dry friction of a joint that turns is thought to turn over
 MATTERS = 0.02  # of the rms speed, from which that is a good part of the motion
 TURNS_OVER = 0.1  # of the rms speed at most, for a start
+TYPED = "as you said"
 SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
 
 
@@ -104,6 +105,7 @@ def find_drives(
     *,
     held: bool = True,
     elastic: Sequence[str] = (),
+    unit: str = "",
 ) -> Drives:
     """Unit of the command and the drive of every joint.
 
@@ -114,6 +116,7 @@ def find_drives(
         sigmas: noise of the encoders, shape (n,) [rad].
         held: whether a command acts until the next one; else it was measured and is linear between samples.
         elastic: joints with a spring between motor and link.
+        unit: of the command, if it is known.
     """
     cells = motion_cells(encoder, command, sigmas, held)
     M = tree.mass_matrix(cells.q[:1])[0]
@@ -136,15 +139,15 @@ def find_drives(
     ]
     largest = float(np.nanmax(np.abs(command.values), initial=0.0))
     massless = all(equation.carries_nothing for equation in equations)
-    unit = drive_unit(tree.joints, gains, largest, heavy, massless=massless)
-    known = {GAIN: 1.0} if unit[0] == "N m" else {}
+    told = (unit, TYPED) if unit else drive_unit(tree.joints, gains, largest, heavy, massless=massless)
+    known = {GAIN: 1.0} if told[0] == "N m" else {}
     drives = [
         _drive(equation, known, direction, link, joint in elastic)
         for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
     ]
     shown = _turn_over(tree, equations, slope_noise(encoder.times, sigmas), elastic)
     drives = [replace(drive, sharpness=k) for drive, k in zip(drives, shown, strict=True)]
-    return Drives(unit, drives, tree.gravity, reason, held)
+    return Drives(told, drives, tree.gravity, reason, held)
 
 
 def _turn_over(

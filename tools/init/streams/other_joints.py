@@ -28,6 +28,7 @@ class Typed:
         urdf, bag, output: paths.
         wish: joints, names and locks.
         name: of the robot; empty for that of the URDF.
+        unit: of the command; empty where the recording shall tell.
     """
 
     urdf: Path
@@ -35,6 +36,7 @@ class Typed:
     output: Path | None = None
     wish: Wish = field(default_factory=Wish)
     name: str = ""
+    unit: str = ""
 
     def command(self) -> str:
         """As it is typed."""
@@ -46,6 +48,8 @@ class Typed:
             words += ["--lock", ",".join(wish.locked)]
         if self.name:
             words += ["--name", self.name]
+        if self.unit:
+            words += ["--unit", self.unit.replace(" ", "")]
         words += ["-o", str(self.output or f"{self.urdf.stem}.yaml")]
         return shlex.join(words)
 
