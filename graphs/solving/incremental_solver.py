@@ -59,10 +59,12 @@ class Incremental:
 
     Attributes:
         told: called after every stretch.
+        gave_up: called with a sentence where iSAM2 cannot go on; the batch then begins at the start values.
         done: whether the stretches were gone through.
     """
 
     told: Callable[[KnownSoFar], None]
+    gave_up: Callable[[str], None] = lambda text: None
     done: bool = False
 
     def __call__(
@@ -87,9 +89,17 @@ class Incremental:
             max_iterations=max_iterations,
             hold=hold,
             progress=progress,
-            first=lambda graph, values: incrementally(graph, values, self.told),
+            first=self._first,
             length=length,
         )
+
+    def _first(self, graph: CondensedGraph, values: gtsam.Values) -> gtsam.Values | None:
+        """Where iSAM2 ends; None where it ran away."""
+        try:
+            return incrementally(graph, values, self.told)
+        except SolveError as err:
+            self.gave_up(str(err))
+            return None
 
 
 def incrementally(graph: CondensedGraph, values: gtsam.Values, told: Callable[[KnownSoFar], None]) -> gtsam.Values:
@@ -123,10 +133,10 @@ def incrementally(graph: CondensedGraph, values: gtsam.Values, told: Callable[[K
             recording, ticks = graph.problems[bag].recording, graph.problems[bag].timeline.ticks
             seconds = float(ticks[tick] - ticks[0])
             told(KnownSoFar(recording, seconds, number + 1, stretches, calibration, sigmas))
-        except RuntimeError as err:
+        except (RuntimeError, SolveError) as err:
             raise SolveError(
-                f"iSAM2 cannot go on at stretch {number + 1} of {stretches}: {' '.join(str(err).split())[:120]}; "
-                "leave out `--incremental`"
+                f"iSAM2 runs away at stretch {number + 1} of {stretches}: start values may be far off, or the model "
+                "contradicts the recording; all stretches are solved together instead"
             ) from err
     return smoother.calculateBestEstimate()
 

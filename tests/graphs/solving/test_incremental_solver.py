@@ -83,3 +83,21 @@ def test_values_that_isam2_made_worse_are_not_taken(simulated, doggy, monkeypatc
     monkeypatch.setattr("jointscope.graphs.solving.incremental_solver.incrementally", astray)
     found = calibrate(robot, [part], solver=Incremental(lambda known: None))
     assert found.cost == pytest.approx(right.cost, rel=1e-6)
+
+
+def test_where_isam2_runs_away_the_batch_begins_at_the_start_values(simulated, doggy, monkeypatch):
+    robot = replace(doggy, noise=replace(doggy.noise, estimate=False))
+    part = simulated.recording.between(4.0, 5.0)
+    right = calibrate(robot, [part])
+
+    def runs_away(smoother, added, new, keys):
+        raise RuntimeError("Indeterminant linear system detected")
+
+    monkeypatch.setattr("jointscope.graphs.solving.incremental_solver._settle", runs_away)
+    said = []
+    found = calibrate(robot, [part], solver=Incremental(lambda known: None, said.append))
+    assert found.cost == pytest.approx(right.cost, rel=1e-6)
+    assert said == [
+        "iSAM2 runs away at stretch 1 of 8: start values may be far off, or the model contradicts the recording; "
+        "all stretches are solved together instead"
+    ]
