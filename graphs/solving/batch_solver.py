@@ -37,7 +37,7 @@ from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
-First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values]
+First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
 LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
@@ -102,7 +102,7 @@ def solve(
         step_tolerance: largest step of a shared value, in its sigmas times the misfit, at which it has converged.
         hold: blocks that stay at their start, for example "dynamics".
         progress: called with a text and the share done.
-        first: finds values to go on from; where they cost more than the start, the start is taken.
+        first: finds values to go on from; where it finds none, or they cost more than the start, the start is taken.
         length: steps in one condensed factor; chosen by the number of samples if 0.
 
     Raises:
@@ -110,7 +110,11 @@ def solve(
     """
     graph, values = CondensedGraph.of(problems, start, hold, length)
     if first is not None:
-        values = min(values, first(graph, values), key=graph.cost)
+        begin, found = graph.cost(values), first(graph, values)
+        if found is not None and graph.cost(found) <= begin:
+            values = found
+        else:  # the states inside stretches have gone astray, too
+            graph, values = CondensedGraph.of(problems, start, hold, length)
     cost, bends = graph.cost(values), StateDamping.of([problem.timeline.ticks for problem in problems])
     descent = _Descent(graph, values, cost, graph.costs, bends)
     if not np.isfinite(descent.cost):

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 MOVED = 0.1  # [sigma] from its linearisation point at which a variable is linearised anew
 FEWEST, SHORTEST = 8, 100  # stretches of a recording, and steps in one
-MOST_UPDATES = 12  # of one stretch; where values go on jumping, the stretches to come may settle them
+MOST_UPDATES = 6  # of one stretch; where dry friction keeps values jumping, the stretches to come may settle them
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,6 @@ class KnownSoFar:
         recording: that the stretch is from.
         seconds: how much of it has been seen [s].
         stretch, stretches: number of stretches so far, and of all.
-        turn: which time the stretches are gone through; more than once where the noise was found to be another.
         calibration: shared values.
         sigmas: standard deviations of the free dynamic parameters in their units, shape (p,).
     """
@@ -48,7 +47,6 @@ class KnownSoFar:
     seconds: float
     stretch: int
     stretches: int
-    turn: int
     calibration: Calibration
     sigmas: Array
 
@@ -57,13 +55,17 @@ class KnownSoFar:
 class Incremental:
     """Takes the place of `batch_solver.solve`: iSAM2 first, then the steps that the batch's end still asks for.
 
+    Where the noise is found to be another when all samples are in, the batch goes on from where iSAM2 ended.
+
     Attributes:
         told: called after every stretch.
-        turns: how often the stretches were gone through.
+        gave_up: called with a sentence where iSAM2 cannot go on; the batch then begins at the start values.
+        done: whether the stretches were gone through.
     """
 
     told: Callable[[KnownSoFar], None]
-    turns: int = 0
+    gave_up: Callable[[str], None] = lambda text: None
+    done: bool = False
 
     def __call__(
         self,
@@ -75,7 +77,9 @@ class Incremental:
         progress: Progress | None,
     ) -> Solution:
         """Arguments and result as of `solve`."""
-        self.turns += 1
+        if self.done:
+            return solve(problems, start, max_iterations=max_iterations, hold=hold, progress=progress)
+        self.done = True
         samples = max(len(problem.dynamics) for problem in problems)
         length = min(max(samples // FEWEST, SHORTEST), STRETCH)
         length = max(length, sum(len(problem.dynamics) for problem in problems) // MOST_STRETCHES)
@@ -85,21 +89,26 @@ class Incremental:
             max_iterations=max_iterations,
             hold=hold,
             progress=progress,
-            first=lambda graph, values: incrementally(graph, values, self.told, self.turns),
+            first=self._first,
             length=length,
         )
 
+    def _first(self, graph: CondensedGraph, values: gtsam.Values) -> gtsam.Values | None:
+        """Where iSAM2 ends; None where it ran away."""
+        try:
+            return incrementally(graph, values, self.told)
+        except SolveError as err:
+            self.gave_up(str(err))
+            return None
 
-def incrementally(
-    graph: CondensedGraph, values: gtsam.Values, told: Callable[[KnownSoFar], None], turn: int = 1
-) -> gtsam.Values:
+
+def incrementally(graph: CondensedGraph, values: gtsam.Values, told: Callable[[KnownSoFar], None]) -> gtsam.Values:
     """Where iSAM2 ends after all stretches, one after the other.
 
     Args:
         graph: of whole recordings.
         values: start values of all variables.
         told: called after every stretch.
-        turn: told, too.
 
     Raises:
         SolveError: a variable that the stretches so far do not determine.
@@ -123,11 +132,11 @@ def incrementally(
             calibration, sigmas = _shared(graph, smoother, bag)
             recording, ticks = graph.problems[bag].recording, graph.problems[bag].timeline.ticks
             seconds = float(ticks[tick] - ticks[0])
-            told(KnownSoFar(recording, seconds, number + 1, stretches, turn, calibration, sigmas))
-        except RuntimeError as err:
+            told(KnownSoFar(recording, seconds, number + 1, stretches, calibration, sigmas))
+        except (RuntimeError, SolveError) as err:
             raise SolveError(
-                f"iSAM2 cannot go on at stretch {number + 1} of {stretches}: {' '.join(str(err).split())[:120]}; "
-                "leave out `--incremental`"
+                f"iSAM2 runs away at stretch {number + 1} of {stretches}: start values may be far off, or the model "
+                "contradicts the recording; all stretches are solved together instead"
             ) from err
     return smoother.calculateBestEstimate()
 

@@ -22,8 +22,6 @@ def known_so_far_text(known: KnownSoFar, units: Mapping[str, str]) -> str:
     """
     name = Path(known.recording.path).name
     head = f"after {known.seconds:.1f} s of {name} (stretch {known.stretch} of {known.stretches})"
-    if known.turn > 1 and known.stretch == 1:
-        head = f"once more, with the noise that all samples ask for:\n\n{head}"
     calibration = known.calibration
     cells = []
     for parameter, value, sigma in zip(calibration.names, calibration.values, known.sigmas, strict=True):

@@ -102,7 +102,11 @@ def _solver(args: argparse.Namespace, robot: Any) -> Any:
         from jointscope.tools.terminal.known_so_far import known_so_far_text
 
         units = {parameter.name: parameter.unit for parameter in robot.parameters.values()}
-        return Incremental(lambda known: print(known_so_far_text(known, units), end="\n\n", flush=True))
+
+        def say(text: str) -> None:
+            print(text, end="\n\n", flush=True)
+
+        return Incremental(lambda known: say(known_so_far_text(known, units)), say)
     if args.solver == "samples":
         from jointscope.graphs.solving.samples_solver import solve_samples
 
