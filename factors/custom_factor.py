@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """GTSAM's view of a factor: one `gtsam.CustomFactor` per sample, on the same residual code as the batch solver.
 
-Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) and B(i) the bias of gyro i. States and
-biases of a second recording follow at a distance.
+Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) and B(i) the bias of gyro i; blocks of
+other kinds of recordings say theirs. States and blocks that a second recording has for itself follow at a distance.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from collections.abc import Callable
 import gtsam
 import numpy as np
 
-from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
+from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 
 TICKS_PER_BAG = 10**9
-GYROS_PER_BAG = 1000
 
 
 def state_key(tick: int, bag: int = 0) -> int:
@@ -26,24 +25,14 @@ def state_key(tick: int, bag: int = 0) -> int:
 
 def block_key(block: str, calibration: Calibration, bag: int = 0) -> int:
     """Key of a block of the calibration."""
-    if block == DYNAMICS:
-        return gtsam.symbol("d", 0)
-    for i, name in enumerate(calibration.rotations):
-        if block == rotation_block(name):
-            return gtsam.symbol("r", i)
-        if block == bias_block(name):
-            return gtsam.symbol("b", bag * GYROS_PER_BAG + i)
-    raise KeyError(block)
+    return calibration.layout[block].key(bag)
 
 
 def insert_calibration(values: gtsam.Values, calibration: Calibration, bag: int = 0) -> None:
-    """Puts all blocks into GTSAM's values; for a further recording only its biases."""
-    if bag == 0:
-        values.insert(block_key(DYNAMICS, calibration), calibration.dynamics)
-        for name, R in calibration.rotations.items():
-            values.insert(block_key(rotation_block(name), calibration), gtsam.Rot3(R))
-    for name, bias in calibration.biases.items():
-        values.insert(block_key(bias_block(name), calibration, bag), bias)
+    """Puts all blocks into GTSAM's values; those that are there already, as shared ones are, stay."""
+    for name, block in calibration.layout.items():
+        if not values.exists(block.key(bag)):
+            values.insert(block.key(bag), block.kind.to_gtsam(calibration[name]))
 
 
 def extract_calibration(
@@ -51,14 +40,8 @@ def extract_calibration(
 ) -> Calibration:
     """Reads blocks from GTSAM's values; the others stay as in `like`."""
     wanted = like.blocks if blocks is None else blocks
-    dynamics = values.atVector(block_key(DYNAMICS, like)) if DYNAMICS in wanted else like.dynamics
-    rotations, biases = dict(like.rotations), dict(like.biases)
-    for name in rotations:
-        if rotation_block(name) in wanted:
-            rotations[name] = values.atRot3(block_key(rotation_block(name), like)).matrix()
-        if bias_block(name) in wanted:
-            biases[name] = values.atVector(block_key(bias_block(name), like, bag))
-    return Calibration(like.names, like.positive, dynamics, biases, rotations)
+    layout = like.layout
+    return like.with_points({name: layout[name].kind.from_gtsam(values, layout[name].key(bag)) for name in wanted})
 
 
 def custom_factor(

@@ -106,7 +106,7 @@ def _calibrated(
         first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
     else:
-        calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
+        calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), sigmas=near is None and not biases_only)
     solved = stage.solve(problems, noise, calibrations)
@@ -174,7 +174,7 @@ def _windows_stage(
         # the regression filters its signals and wants them long
         whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
         guess = initial_dynamics(problems, whole, bags[0])
-        calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
+        calibrations = [c.with_points({DYNAMICS: guess.dynamics}) for c in calibrations]
     windows, estimate = with_best_shifts(windows, Estimate(tuple(states), tuple(calibrations)), hold)
     # nearly linear in the states alone: bring them to the parameters before both move
     solution = solve(windows, estimate, max_iterations=4, step_tolerance=0.5, hold=(DYNAMICS,))
@@ -187,7 +187,7 @@ def _windows_stage(
     if noise.estimate:
         noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
     found = estimate.calibrations[0]
-    return noise, [replace(bag, dynamics=found.dynamics, rotations=found.rotations) for bag in bags]
+    return noise, [bag.with_points(found.common) for bag in bags]
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

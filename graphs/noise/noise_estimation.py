@@ -176,7 +176,7 @@ def _cycle(
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
-    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
+    shared = SharedLayout.of(estimate.calibrations, BagProblem.owners(problems))
     here = Solution(estimate, float("nan"), shared, systems)
     step = newton_step(problems, here, hold)
     cost = sum(system.cost for system in systems)

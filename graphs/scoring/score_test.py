@@ -112,7 +112,9 @@ class ScoreTest:
 
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
-        self._shared = SharedLayout.of(segments[0].calibration, BagProblem.owners([s.problem for s in segments]))
+        self._shared = SharedLayout.of(
+            [s.calibration for s in segments], BagProblem.owners([s.problem for s in segments])
+        )
 
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""
@@ -214,7 +216,7 @@ class ScoreTest:
             dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
             ticks = segment.problem.timeline.ticks
             block = ((ticks - ticks[0]) / BLOCK).astype(int)
-            count, blocks = int(block[-1]) + 1, self._shared.columns
+            count, blocks = int(block[-1]) + 1, segment.calibration.columns
             total = np.zeros((count, k))
             own = [np.zeros((count, c.stop - c.start, c.stop - c.start)) for c in columns]
             for part in rows:

@@ -210,7 +210,7 @@ def newton_step(
 
 def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
     """Where one hardly damped step leads; for starts from which every step is an improvement."""
-    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
+    shared = SharedLayout.of(estimate.calibrations, BagProblem.owners(problems))
     here = Solution(estimate, float("nan"), shared, _build(problems, estimate))
     return newton_step(problems, here, hold, LAMBDA_START).estimate
 
@@ -258,9 +258,10 @@ def reduced_system(
 def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
     """Indices of the shared values that may change."""
     held = np.zeros(shared.size, dtype=bool)
-    for bag in range(len(shared.owners)):
+    for places in shared.places:
         for block in hold:
-            held[shared.indices(bag)[shared.columns[block]]] = True
+            if block in places:
+                held[places[block]] = True
     return np.flatnonzero(~held)
 
 

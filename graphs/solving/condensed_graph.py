@@ -23,7 +23,6 @@ from jointscope.factors.condensed import CondensedFactor
 from jointscope.factors.custom_factor import (
     block_key,
     extract_calibration,
-    insert_calibration,
     stacked_factor,
     state_key,
 )
@@ -94,7 +93,7 @@ class CondensedGraph:
                 values.insert(state_key(tick, piece), x[tick])
             stretches.append(cuts)
         held = _add_rows_without_states(graph, problems, owners, likes, blocks)
-        shared = SharedLayout.of(start.calibrations[0], owners)
+        shared = SharedLayout.of(start.calibrations, owners)
         return CondensedGraph(tuple(problems), graph, tuple(stretches), blocks, shared, likes, held), values
 
     def cost(self, values: gtsam.Values) -> float:
@@ -145,9 +144,9 @@ class CondensedGraph:
         """Keys of all shared blocks that may change, with their places in the vector of all shared values."""
         found: dict[int, NDArray[np.intp]] = {}
         for piece, owner in enumerate(self.shared.owners):
-            index = self.shared.indices(piece)
             for block in self.blocks:
-                found[block_key(block, self.likes[piece], owner)] = index[self.shared.columns[block]]
+                place = self.shared.places[piece][block]
+                found[block_key(block, self.likes[piece], owner)] = np.arange(place.start, place.stop)
         return list(found.items())
 
     def estimate(self, values: gtsam.Values) -> Estimate:
@@ -176,18 +175,14 @@ class CondensedGraph:
 
 def _shared_values(start: Estimate, owners: Sequence[int], blocks: Sequence[str]) -> gtsam.Values:
     """Values of all blocks that may change."""
-    everything, values = gtsam.Values(), gtsam.Values()
+    values = gtsam.Values()
     for piece, owner in enumerate(owners):
-        if owner not in owners[:piece]:
-            insert_calibration(everything, start.calibrations[piece], owner)
         for block in blocks:
             key = block_key(block, start.calibrations[piece], owner)
             if values.exists(key):
                 continue
-            if block.endswith(".rotation"):
-                values.insert(key, everything.atRot3(key))
-            else:
-                values.insert(key, everything.atVector(key))
+            calibration = start.calibrations[piece]
+            values.insert(key, calibration.layout[block].kind.to_gtsam(calibration[block]))
     return values
 
 

@@ -24,7 +24,7 @@ from jointscope.factors.factor import Factor
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
-from jointscope.graphs.solving.normal_equations import Linearized, layout, whitened
+from jointscope.graphs.solving.normal_equations import Linearized, whitened
 from jointscope.graphs.solving.unobservable import unobservable
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ def residual_parts(
         calibration: gives the layout of the shared values.
         posterior: uncertainty of the recording's states.
     """
-    columns = layout(calibration)
+    columns = calibration.columns
     p = posterior.shared.shape[0]
     for factor, ticks, linear in linearized:
         r, J, by_block = whitened(factor, linear)

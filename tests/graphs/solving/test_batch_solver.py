@@ -94,7 +94,7 @@ def test_two_recordings_share_parameters_as_in_the_gtsam_graph(simulated, doggy)
     np.testing.assert_array_equal(a[0].dynamics, a[1].dynamics)
     assert not np.allclose(a[0].biases["imu1"], a[1].biases["imu1"])
     _, covariance = posteriors(problems, fast)
-    sigma = np.sqrt(np.diag(covariance))[fast.shared.indices(1)[fast.shared.columns["imu1.bias"]]]
+    sigma = np.sqrt(np.diag(covariance))[fast.shared.places[1]["imu1.bias"]]
     assert np.max(np.abs(a[1].biases["imu1"] - b[1].biases["imu1"]) / sigma) < 0.05
 
 
