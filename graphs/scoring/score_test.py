@@ -21,11 +21,11 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import fdtrc
 
 from jointscope.factors.priors import shared_priors
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
+from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
 
 Array = NDArray[np.float64]
@@ -112,9 +112,7 @@ class ScoreTest:
 
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
-        self._shared = SharedLayout.of(
-            [s.calibration for s in segments], BagProblem.owners([s.problem for s in segments])
-        )
+        self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
 
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""

@@ -61,7 +61,7 @@ class NormalEquations:
         parts = (np.zeros((m, d, d)), np.zeros((m, d))) if split else (None, None)
         return NormalEquations(
             np.zeros((m, d, d)),
-            np.zeros((m - 1, d, d)),
+            np.zeros((max(m - 1, 0), d, d)),
             np.zeros((m, d, p)),
             np.zeros((p, p)),
             np.zeros((m, d)),

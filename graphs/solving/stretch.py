@@ -99,8 +99,15 @@ class RecordingStretch:
         """Columns of a free block."""
         return self._columns[block]
 
-    def visit(self, first: Array, last: Array, calibration: Calibration) -> float:
+    def damp(self, damping: float, bends: Array | None) -> None:
+        """Sets the damping of all states, larger where `bends` says so, of all states of the recording."""
+        first, last = self.ticks
+        own = np.zeros(len(self.damping)) if bends is None else bends[first : last + 1]
+        self.damping = np.maximum(own, damping)
+
+    def visit(self, ends: Sequence[Array], calibration: Calibration) -> float:
         """Evaluates everything at new ends and shared values; returns the cost there."""
+        first, last = ends
         if self._base.is_at(first, last, calibration):
             self._trial = self._base
         elif not self._trial.is_at(first, last, calibration):
