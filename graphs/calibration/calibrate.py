@@ -27,6 +27,7 @@ from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
@@ -57,6 +58,7 @@ def calibrate(
     *,
     biases_only: bool = False,
     near: Sequence[Calibration] | None = None,
+    sets: Sequence[SetProblem] = (),
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrates a robot with one or more recordings.
@@ -67,6 +69,7 @@ def calibrate(
         biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
         near: values with the biases of each recording that are near the solution already, where the robot's own values
             and noise are, too: nothing is guessed, no windows are cut.
+        sets: recordings of other kinds than motion, which share the robot's values.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -75,11 +78,11 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
-    result = _calibrated(robot, recordings, biases_only, near, report)
+    result = _calibrated(robot, recordings, biases_only, near, sets, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:
         report("again, with mountings held", 0.0)
-        anew = _calibrated(held(robot, turned), recordings, False, None, report)
+        anew = _calibrated(held(robot, turned), recordings, False, None, sets, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -90,6 +93,7 @@ def _calibrated(
     recordings: Sequence[Recording],
     biases_only: bool,
     near: Sequence[Calibration] | None,
+    sets: Sequence[SetProblem],
     report: Progress,
 ) -> CalibrationResult:
     """One calibration; arguments as in `calibrate`."""
@@ -108,7 +112,7 @@ def _calibrated(
     else:
         calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
-    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), sigmas=near is None and not biases_only)
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), sigmas=near is None and not biases_only, sets=sets)
     solved = stage.solve(problems, noise, calibrations)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
@@ -116,7 +120,8 @@ def _calibrated(
     if near is not None or biases_only:
         return result
     estimate = solved.solution.estimate
-    timing = drive_timing(solved.problems, estimate.states, estimate.calibrations)
+    motions = len(solved.problems)
+    timing = drive_timing(solved.problems, estimate.states[:motions], estimate.calibrations[:motions])
     return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
 
 
