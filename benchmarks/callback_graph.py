@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import gtsam
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.gtsam_solvers.reference_graph import initial_values, nonlinear_graph
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Solution, newton_step, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import build
-from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.initial_guess import initial_states

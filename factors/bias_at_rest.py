@@ -62,7 +62,7 @@ class BiasAtRestFactor:
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Bias - measured, shape (m, 3) [rad/s]."""
-        return calibration.biases[self.sensor.name] - self.measured
+        return calibration[bias_block(self.sensor.name)] - self.measured
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and its constant derivative."""

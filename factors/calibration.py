@@ -1,32 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The values that all samples share: dynamic parameters, gyro biases and mounting rotations, as one manifold.
+"""The values that all samples share, block by block, as one manifold.
 
-A block is one variable of the factor graph: "dynamics" (a vector; positive parameters as logarithms),
-"imu1.bias" (a vector) and "imu1.rotation" (a Rot3, changed from the right: R exp(delta)).
+A motion has "dynamics" (a vector; positive parameters as logarithms), "imu1.rotation" (a Rot3, changed from the right:
+R exp(delta)) and "imu1.bias" (a vector of each recording's own). Other kinds of recordings bring blocks of theirs.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from jointscope.factors.block import ROT3, VECTOR, Block
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 DYNAMICS = "dynamics"
+BIAS, ROTATION = ".bias", ".rotation"
 
 
 def bias_block(gyro: str) -> str:
     """Name of the block with a gyro's bias."""
-    return f"{gyro}.bias"
+    return f"{gyro}{BIAS}"
 
 
 def rotation_block(gyro: str) -> str:
     """Name of the block with a gyro's mounting rotation R_imu_body."""
-    return f"{gyro}.rotation"
+    return f"{gyro}{ROTATION}"
 
 
 @dataclass(frozen=True)
@@ -36,16 +39,14 @@ class Calibration:
     Attributes:
         names: names of the free dynamic parameters, shape (p,).
         positive: which of them are estimated as logarithms, shape (p,).
-        dynamics: their coordinates: log(value) for positive ones, else the value, shape (p,).
-        biases: bias of each gyro, shape (3,) [rad/s].
-        rotations: R_imu_body of each gyro, shape (3, 3).
+        layout: what is known of each block, by name, in their order: those that each recording has for itself last.
+        points: value of each block, by name.
     """
 
     names: tuple[str, ...]
     positive: NDArray[np.bool_]
-    dynamics: Array
-    biases: dict[str, Array]
-    rotations: dict[str, Array]
+    layout: Mapping[str, Block]
+    points: Mapping[str, Array]
 
     @staticmethod
     def of(robot: Robot) -> Calibration:
@@ -53,13 +54,33 @@ class Calibration:
         free = [parameter for parameter in robot.parameters.values() if not parameter.fixed]
         positive = np.array([p.positive for p in free], dtype=bool)
         values = np.array([p.value for p in free], dtype=float)
-        return Calibration(
-            names=tuple(p.name for p in free),
-            positive=positive,
-            dynamics=np.where(positive, np.log(np.where(positive, values, 1.0)), values),
-            biases={gyro.name: gyro.bias.copy() for gyro in robot.gyros},
-            rotations={gyro.name: gyro.R_imu_body.copy() for gyro in robot.gyros},
-        )
+        coordinates = np.where(positive, np.log(np.where(positive, values, 1.0)), values)
+        blocks = [(Block(DYNAMICS, VECTOR, "robot", len(free), "d"), coordinates)]
+        for i, gyro in enumerate(robot.gyros):
+            blocks.append((Block(rotation_block(gyro.name), ROT3, "robot", 3, "r", i), gyro.R_imu_body.copy()))
+        for i, gyro in enumerate(robot.gyros):
+            blocks.append((Block(bias_block(gyro.name), VECTOR, "recording", 3, "b", i), gyro.bias.copy()))
+        layout, points = {b.name: b for b, _ in blocks}, {b.name: value for b, value in blocks}
+        return Calibration(tuple(p.name for p in free), positive, layout, points)
+
+    def __getitem__(self, block: str) -> Array:
+        """Value of a block."""
+        return self.points[block]
+
+    @property
+    def dynamics(self) -> Array:
+        """Coordinates of the free dynamic parameters: log(value) for positive ones, else the value, shape (p,)."""
+        return self.points[DYNAMICS]
+
+    @cached_property
+    def biases(self) -> dict[str, Array]:
+        """Bias of each gyro, shape (3,) [rad/s]."""
+        return {name.removesuffix(BIAS): value for name, value in self.points.items() if name.endswith(BIAS)}
+
+    @cached_property
+    def rotations(self) -> dict[str, Array]:
+        """R_imu_body of each gyro, shape (3, 3)."""
+        return {name.removesuffix(ROTATION): R for name, R in self.points.items() if name.endswith(ROTATION)}
 
     @property
     def values(self) -> Array:
@@ -73,24 +94,66 @@ class Calibration:
 
     @property
     def blocks(self) -> tuple[str, ...]:
-        """Names of all blocks in their order: dynamics, rotations, biases (which belong to one bag) last."""
-        rotations = tuple(rotation_block(name) for name in self.rotations)
-        return (DYNAMICS, *rotations, *(bias_block(name) for name in self.biases))
+        """Names of all blocks in their order."""
+        return tuple(self.layout)
+
+    @property
+    def own(self) -> dict[str, Array]:
+        """Values of the blocks that each recording has for itself, by name."""
+        return {name: self.points[name] for name, block in self.layout.items() if block.own}
+
+    @property
+    def common(self) -> dict[str, Array]:
+        """Values of the blocks that recordings share, by name."""
+        return {name: self.points[name] for name, block in self.layout.items() if not block.own}
+
+    @cached_property
+    def columns(self) -> dict[str, slice]:
+        """Columns of each block where all stand side by side."""
+        stops = np.cumsum([block.size for block in self.layout.values()]).tolist()
+        return {b.name: slice(stop - b.size, stop) for b, stop in zip(self.layout.values(), stops, strict=True)}
+
+    @cached_property
+    def size(self) -> int:
+        """Number of coordinates of all blocks."""
+        return sum(block.size for block in self.layout.values())
 
     def block_size(self, block: str) -> int:
         """Number of coordinates of a block."""
-        return len(self.names) if block == DYNAMICS else 3
+        return self.layout[block].size
 
-    def retract(self, step: dict[str, Array]) -> Calibration:
+    def with_points(self, points: Mapping[str, Array]) -> Calibration:
+        """The same with other values of some blocks.
+
+        Raises:
+            KeyError: a block that is not there.
+        """
+        unknown = points.keys() - self.layout.keys()
+        if unknown:
+            raise KeyError(f"no block {', '.join(sorted(unknown))}; there are {', '.join(self.layout)}")
+        return replace(self, points={**self.points, **points})
+
+    def with_blocks(self, more: Sequence[tuple[Block, Array]]) -> Calibration:
+        """The same with further blocks; those that each recording has for itself stay last."""
+        everything = [(block, self.points[name]) for name, block in self.layout.items()] + list(more)
+        ordered = sorted(everything, key=lambda pair: pair[0].own)
+        layout, points = {b.name: b for b, _ in ordered}, {b.name: value for b, value in ordered}
+        return replace(self, layout=layout, points=points)
+
+    def only(self, blocks: Sequence[str]) -> Calibration:
+        """The same with these blocks alone, in the order that they have here."""
+        layout = {name: block for name, block in self.layout.items() if name in blocks}
+        return replace(self, layout=layout, points={name: self.points[name] for name in layout})
+
+    def retract(self, step: Mapping[str, Array]) -> Calibration:
         """Moves along a tangent vector given block by block; missing blocks stay."""
-        nothing = np.zeros(3)
-        return Calibration(
-            self.names,
-            self.positive,
-            self.dynamics + step.get(DYNAMICS, 0.0),
-            {name: bias + step.get(bias_block(name), nothing) for name, bias in self.biases.items()},
-            {
-                name: R @ Rotation.from_rotvec(step.get(rotation_block(name), nothing)).as_matrix()
-                for name, R in self.rotations.items()
-            },
-        )
+        moved = {name: self.layout[name].kind.retract(self.points[name], d) for name, d in step.items()}
+        return self.with_points(moved)
+
+    def local(self, other: Calibration, block: str) -> Array:
+        """Tangent step of a block from here to another point."""
+        return self.layout[block].kind.local(self.points[block], other.points[block])
+
+    def is_at(self, other: Calibration) -> bool:
+        """Whether that is the same point, to the last digit."""
+        return all(np.array_equal(value, other.points[name]) for name, value in self.points.items())

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A whole stretch of motion as one `gtsam.CustomFactor`: its inner states are eliminated before GTSAM sees it.
 
-Variables: X(a) and X(b), the states at the two ends of the stretch, and the blocks of shared values that may change.
+Variables: X(a) and X(b), the states at the two ends of the stretch, and the blocks of shared values that may change. A
+recording of another kind than motion has no ends: it is a factor on its blocks alone.
 With H and g the Gauss-Newton system that the eliminated stretch leaves on these variables, the factor's rows are a
 square root of it,
 
@@ -30,11 +31,11 @@ NOTHING = 1e-15  # of the largest eigenvalue; directions below are not determine
 
 
 class Stretch(Protocol):
-    """Many samples between two states; it remembers where it was linearised and where it was tried."""
+    """Many samples between two states, or without; it remembers where it was linearised and where it was tried."""
 
     @property
-    def ticks(self) -> tuple[int, int]:
-        """First and last tick."""
+    def ticks(self) -> tuple[int, ...]:
+        """First and last tick, or none."""
 
     @property
     def size(self) -> int:
@@ -43,7 +44,7 @@ class Stretch(Protocol):
     def columns(self, block: str) -> slice:
         """Columns of a free block."""
 
-    def visit(self, first: Array, last: Array, calibration: Calibration) -> float:
+    def visit(self, ends: Sequence[Array], calibration: Calibration) -> float:
         """Evaluates everything at new ends and shared values; returns the cost there."""
 
     def settle(self) -> tuple[Array, Array, float]:
@@ -65,26 +66,26 @@ class CondensedFactor:
         self.stretch = stretch
         self.blocks = tuple(blocks)
         self._owner, self._like = owner, like
-        first, last = (state_key(tick, piece) for tick in stretch.ticks)
-        self.keys = [first, last, *(block_key(block, like, owner) for block in self.blocks)]
+        self._ends = [state_key(tick, piece) for tick in stretch.ticks]
+        self.keys = [*self._ends, *(block_key(block, like, owner) for block in self.blocks)]
 
     def factor(self) -> gtsam.CustomFactor:
         """The factor to put into a graph."""
         return gtsam.CustomFactor(gtsam.noiseModel.Unit.Create(self.stretch.size + 1), self.keys, self._evaluate)
 
     def _evaluate(self, this: gtsam.CustomFactor, values: gtsam.Values, H: list | None) -> Array:
-        first, last = (values.atVector(key) for key in self.keys[:2])
+        ends = [values.atVector(key) for key in self._ends]
         calibration = extract_calibration(values, self._like, self.blocks, self._owner)
-        cost = self.stretch.visit(first, last, calibration)
+        cost = self.stretch.visit(ends, calibration)
         rows = np.zeros(self.stretch.size + 1)
         if H is None:
             rows[-1] = np.sqrt(2.0 * cost)
             return rows
         J, rows = _square_root(*self.stretch.settle())
-        d = len(first)
-        H[0], H[1] = np.asfortranarray(J[:, :d]), np.asfortranarray(J[:, d : 2 * d])
-        for i, block in enumerate(self.blocks):
-            H[2 + i] = np.asfortranarray(J[:, self.stretch.columns(block)])
+        for i, end in enumerate(ends):
+            H[i] = np.asfortranarray(J[:, i * len(end) : (i + 1) * len(end)])
+        for i, block in enumerate(self.blocks, len(ends)):
+            H[i] = np.asfortranarray(J[:, self.stretch.columns(block)])
         return rows
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
@@ -108,7 +108,7 @@ class DistortedFactor:
     def _undisturbed(self, residual: Array, calibration: Calibration) -> Array:
         """Reading without zero, bias and effects, shape (m, c)."""
         if isinstance(self.inner, GyroFactor):
-            return residual + self.inner.measured - calibration.biases[self.inner.name]
+            return residual + self.inner.measured - calibration[bias_block(self.inner.name)]
         return residual + self.inner.measured - self.inner.sensor.zero
 
     def _values(self, calibration: Calibration) -> dict[str, float]:

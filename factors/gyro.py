@@ -45,15 +45,15 @@ class GyroFactor(SensorFactor[Gyro]):
         """Predicted - measured, shape (m, 3) [rad/s]."""
         layout = self.layout
         omega_body = self.tree.body_rate(self.sensor.body, x[0][:, layout.q_link], x[0][:, layout.v_link])[0]
-        R = calibration.rotations[self.name]
-        return omega_body @ R.T + calibration.biases[self.name] - self.measured
+        R = calibration[rotation_block(self.name)]
+        return omega_body @ R.T + calibration[bias_block(self.name)] - self.measured
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives."""
         m, layout = len(self.measured), self.layout
         motion = x[0][:, layout.q_link], x[0][:, layout.v_link]
         omega_body, by_q, by_v = self.tree.body_rate(self.sensor.body, *motion)
-        R = calibration.rotations[self.name]
+        R = calibration[rotation_block(self.name)]
         by_state = np.zeros((m, 3, layout.size))
         by_state[:, :, layout.q_link] = R @ by_q
         by_state[:, :, layout.v_link] = R @ by_v
@@ -61,7 +61,7 @@ class GyroFactor(SensorFactor[Gyro]):
             rotation_block(self.name): -R @ skew(omega_body),
             bias_block(self.name): np.broadcast_to(np.eye(3), (m, 3, 3)),
         }
-        residual = omega_body @ R.T + calibration.biases[self.name] - self.measured
+        residual = omega_body @ R.T + calibration[bias_block(self.name)] - self.measured
         return Linearization(residual, (by_state,), by_block)
 
 

@@ -113,7 +113,7 @@ class BiasPrior(_Prior):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Bias - mean, shape (1, 3) [rad/s]."""
-        return (calibration.biases[self.sensor.name] - self.sensor.bias)[None]
+        return (calibration[bias_block(self.sensor.name)] - self.sensor.bias)[None]
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and its constant derivative."""
@@ -152,7 +152,7 @@ class RotationPrior(_Prior):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Rotation vector from the prior's mean, shape (1, 3) [rad]."""
-        R = calibration.rotations[self.sensor.name]
+        R = calibration[rotation_block(self.sensor.name)]
         return Rotation.from_matrix(self.sensor.R_prior.T @ R).as_rotvec()[None]
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:

@@ -64,12 +64,12 @@ class RelativeGyroFactor(SensorFactor[Gyro]):
         m, n, layout = len(self.measured), self.tree.n, self.layout
         q, v = x[0][:, layout.joint_q], x[0][:, layout.joint_v]
         own, other = self.name, self.reference.name
-        R_own, R_other = calibration.rotations[own], calibration.rotations[other]
+        R_own, R_other = calibration[rotation_block(own)], calibration[rotation_block(other)]
         v_between = v.copy()
         v_between[:, 0] = 0.0
         omega_relative, by_q, by_v = self.tree.body_rate(self.sensor.body, q, v_between)
         by_q, by_v = by_q.copy(), by_v.copy()
-        omega_1 = (self.measured_reference - calibration.biases[other]) @ R_other
+        omega_1 = (self.measured_reference - calibration[bias_block(other)]) @ R_other
         R_body_reference = self._R_body_reference(q)
         carried = np.einsum("kij,kj->ki", R_body_reference, omega_1)
         # turning a joint in between turns the body away from the carried rate, about the joint's axis in the body
@@ -86,7 +86,7 @@ class RelativeGyroFactor(SensorFactor[Gyro]):
             rotation_block(other): R_own @ R_body_reference @ skew(omega_1),
             bias_block(other): -R_own @ R_body_reference @ R_other.T,
         }
-        residual = omega_body @ R_own.T + calibration.biases[own] - self.measured
+        residual = omega_body @ R_own.T + calibration[bias_block(own)] - self.measured
         return Linearization(residual, (by_state,), by_block)
 
     def _R_body_reference(self, q: Array) -> Array:

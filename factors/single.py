@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Any factor as one `gtsam.CustomFactor` per sample, on the same residual code as the condensed factors.
 
-Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) and B(i) the bias of gyro i. States and
-biases of a second recording follow at a distance.
+Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) and B(i) the bias of gyro i; blocks of
+other kinds of recordings say theirs. States and blocks that a second recording has for itself follow at a distance.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from __future__ import annotations
 import gtsam
 import numpy as np
 
-from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
+from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 from jointscope.robots.errors import SolveError
 
 TICKS_PER_BAG = 10**9
-GYROS_PER_BAG = 1000
 
 
 def state_key(tick: int, bag: int = 0) -> int:
@@ -25,28 +24,16 @@ def state_key(tick: int, bag: int = 0) -> int:
 
 def block_key(block: str, calibration: Calibration, bag: int = 0) -> int:
     """Key of a block of the calibration."""
-    if block == DYNAMICS:
-        return gtsam.symbol("d", 0)
-    for i, name in enumerate(calibration.rotations):
-        if block == rotation_block(name):
-            return gtsam.symbol("r", i)
-        if block == bias_block(name):
-            return gtsam.symbol("b", bag * GYROS_PER_BAG + i)
-    raise KeyError(block)
+    return calibration.layout[block].key(bag)
 
 
 def insert_calibration(
     values: gtsam.Values, calibration: Calibration, bag: int = 0, blocks: tuple[str, ...] | None = None
 ) -> None:
-    """Puts blocks, all if None, into GTSAM's values; those that are there already stay."""
-    wanted = calibration.blocks if blocks is None else blocks
-    found: dict[str, np.ndarray | gtsam.Rot3] = {DYNAMICS: calibration.dynamics}
-    found |= {rotation_block(name): gtsam.Rot3(R) for name, R in calibration.rotations.items()}
-    found |= {bias_block(name): bias for name, bias in calibration.biases.items()}
-    for block in wanted:
-        key = block_key(block, calibration, bag)
-        if not values.exists(key):
-            values.insert(key, found[block])
+    """Puts blocks, all if None, into GTSAM's values; those that are there already, as shared ones are, stay."""
+    for name, block in calibration.layout.items():
+        if (blocks is None or name in blocks) and not values.exists(block.key(bag)):
+            values.insert(block.key(bag), block.kind.to_gtsam(calibration[name]))
 
 
 def extract_calibration(
@@ -54,14 +41,8 @@ def extract_calibration(
 ) -> Calibration:
     """Reads blocks from GTSAM's values; the others stay as in `like`."""
     wanted = like.blocks if blocks is None else blocks
-    dynamics = values.atVector(block_key(DYNAMICS, like)) if DYNAMICS in wanted else like.dynamics
-    rotations, biases = dict(like.rotations), dict(like.biases)
-    for name in rotations:
-        if rotation_block(name) in wanted:
-            rotations[name] = values.atRot3(block_key(rotation_block(name), like)).matrix()
-        if bias_block(name) in wanted:
-            biases[name] = values.atVector(block_key(bias_block(name), like, bag))
-    return Calibration(like.names, like.positive, dynamics, biases, rotations)
+    layout = like.layout
+    return like.with_points({name: layout[name].kind.from_gtsam(values, layout[name].key(bag)) for name in wanted})
 
 
 def single_factor(

@@ -68,7 +68,7 @@ class VerticalGyroFactor(SensorFactor[Gyro]):
         m = len(self.measured)
         by_state = np.zeros((m, 1, self.layout.size))
         by_state[:, 0, self.layout.joint_v[0]] = 1.0
-        R, omega_body = calibration.rotations[self.name], self._body_rate(calibration)
+        R, omega_body = calibration[rotation_block(self.name)], self._body_rate(calibration)
         by_block = {
             rotation_block(self.name): -(self.axis @ skew(omega_body))[:, None, :],
             bias_block(self.name): np.broadcast_to(self.axis @ R.T, (m, 1, 3)),
@@ -77,4 +77,4 @@ class VerticalGyroFactor(SensorFactor[Gyro]):
 
     def _body_rate(self, calibration: Calibration) -> Array:
         """Measured rate in the body's frame, shape (m, 3)."""
-        return (self.measured - calibration.biases[self.name]) @ calibration.rotations[self.name]
+        return (self.measured - calibration[bias_block(self.name)]) @ calibration[rotation_block(self.name)]

@@ -21,13 +21,14 @@ from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
+from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.samples_solver import must_be_short, solve_samples
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
@@ -59,6 +60,7 @@ def calibrate(
     biases_only: bool = False,
     near: Sequence[Calibration] | None = None,
     solver: Solver = solve,
+    sets: Sequence[SetProblem] = (),
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrates a robot with one or more recordings.
@@ -70,6 +72,7 @@ def calibrate(
         near: values with the biases of each recording that are near the solution already, where the robot's own values
             and noise are, too: nothing is guessed, no windows are cut.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
+        sets: recordings of other kinds than motion, which share the robot's values.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -78,11 +81,11 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
-    result = _calibrated(robot, recordings, biases_only, near, solver, report)
+    result = _calibrated(robot, recordings, biases_only, near, solver, sets, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:
         report("again, with mountings held", 0.0)
-        anew = _calibrated(held(robot, turned), recordings, False, None, solver, report)
+        anew = _calibrated(held(robot, turned), recordings, False, None, solver, sets, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -94,6 +97,7 @@ def _calibrated(
     biases_only: bool,
     near: Sequence[Calibration] | None,
     solver: Solver,
+    sets: Sequence[SetProblem],
     report: Progress,
 ) -> CalibrationResult:
     """One calibration; arguments as in `calibrate`."""
@@ -112,9 +116,9 @@ def _calibrated(
         first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
     else:
-        calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
+        calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
-    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver)
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
@@ -122,7 +126,8 @@ def _calibrated(
     if near is not None or biases_only:
         return result
     estimate = solved.solution.estimate
-    timing = drive_timing(solved.problems, estimate.states, estimate.calibrations)
+    motions = len(solved.problems)
+    timing = drive_timing(solved.problems, estimate.states[:motions], estimate.calibrations[:motions])
     return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
 
 
@@ -180,7 +185,7 @@ def _windows_stage(
         # the regression filters its signals and wants them long
         whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
         guess = initial_dynamics(problems, whole, bags[0])
-        calibrations = [replace(c, dynamics=guess.dynamics) for c in calibrations]
+        calibrations = [c.with_points({DYNAMICS: guess.dynamics}) for c in calibrations]
     windows, estimate = with_best_shifts(windows, Estimate(tuple(states), tuple(calibrations)), hold)
     # nearly linear in the states alone: bring them to the parameters before both move
     solution = solve(windows, estimate, max_iterations=4, step_tolerance=0.5, hold=(DYNAMICS,))
@@ -193,7 +198,7 @@ def _windows_stage(
     if noise.estimate:
         noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
     found = estimate.calibrations[0]
-    return noise, [replace(bag, dynamics=found.dynamics, rotations=found.rotations) for bag in bags]
+    return noise, [bag.with_points(found.common) for bag in bags]
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.single import block_key, extract_calibration, state_key
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.gtsam_solvers.reference_graph import (
+    initial_values,
+    marquardt_parameters,
+    nonlinear_graph,
+    unsolvable,
+)
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.reference_graph import initial_values, marquardt_parameters, nonlinear_graph, unsolvable
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]

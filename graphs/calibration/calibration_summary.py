@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, ROTATION, Calibration, bias_block, rotation_block
 from jointscope.graphs.calibration.calibration_result import (
     BagFit,
     CalibrationResult,
@@ -28,6 +28,8 @@ from jointscope.graphs.noise.robust_sigma import inflation
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StatePosterior, posteriors
+from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import AXES, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
@@ -43,12 +45,13 @@ class Solved:
     """A converged problem with its residuals and uncertainties.
 
     Attributes:
-        problems: factors of each recording, with the noise used.
-        solution: states and shared values.
+        problems: factors of each motion, with the noise used.
+        solution: states and shared values, of the motions first.
         posteriors: uncertainty of each recording's states.
         covariance: of all shared values, shape (s, s).
         residuals: of each recording.
         evidence: what the residuals say about the process noise.
+        sets: recordings of other kinds.
     """
 
     problems: list[BagProblem]
@@ -57,6 +60,7 @@ class Solved:
     covariance: Array
     residuals: list[BagResiduals]
     evidence: NoiseEvidence
+    sets: Sequence[SetProblem] = ()
 
     @property
     def robot(self) -> Robot:
@@ -70,15 +74,17 @@ class Solved:
         return estimated_sigmas(encoder, [EncoderFit(*fit) for fit in fits])
 
     @staticmethod
-    def of(problems: list[BagProblem], solution: Solution, hold: Sequence[str]) -> Solved:
+    def of(
+        problems: list[BagProblem], solution: Solution, hold: Sequence[str], sets: Sequence[SetProblem] = ()
+    ) -> Solved:
         """Uncertainties and one pass over all residuals."""
-        found, covariance = posteriors(problems, solution, hold)
+        found, covariance = posteriors([*problems, *sets], solution, hold)
         evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
         residuals = [
             collect(problem, solution, i, posterior, evidence)
-            for i, (problem, posterior) in enumerate(zip(problems, found, strict=True))
+            for i, (problem, posterior) in enumerate(zip(problems, found[: len(problems)], strict=True))
         ]
-        return Solved(problems, solution, found, covariance, residuals, evidence)
+        return Solved(problems, solution, found, covariance, residuals, evidence, sets)
 
 
 def summarize(
@@ -102,10 +108,10 @@ def summarize(
     factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
     covariance = solved.covariance * np.outer(factor, factor)
     bags = tuple(_bag_fit(solved, i, c, factor) for i, c in enumerate(collected))
-    names = _names(robot, solution.estimate.calibrations[0], shared.bags)
+    names = _names(solution.estimate.calibrations, shared)
     sigmas = np.sqrt(np.diag(covariance))
     calibration = solution.estimate.calibrations[0]
-    parameters = _parameters(robot, calibration, sigmas)
+    parameters = _parameters(robot, calibration, sigmas, shared)
     weak = () if hold else weak_directions(robot, calibration, shared, covariance)
     correlation = covariance / np.maximum(np.outer(sigmas, sigmas), 1e-300)
     noise = solved.problems[0].dynamics.steps.noise
@@ -122,7 +128,8 @@ def summarize(
         sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
         iterations=iterations,
         cost=solution.cost,
-        samples=sum(len(p.factor) for problem in solved.problems for p in problem.sensors),
+        samples=sum(len(p.factor) for problem in solved.problems for p in problem.sensors)
+        + sum(other.measured for other in solved.sets),
         recording_seconds=sum(problem.recording.duration for problem in solved.problems),
         wall_seconds=0.0,
         converged=not solution.flat,
@@ -174,14 +181,26 @@ def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
     return found
 
 
-def _names(robot: Robot, calibration: Calibration, bags: int) -> tuple[str, ...]:
-    rotations = [f"{gyro}.R_imu_body.{axis}" for gyro in calibration.rotations for axis in AXES]
-    biases = [f"{gyro}.bias.{axis}" for gyro in calibration.biases for axis in AXES]
-    own = biases if bags == 1 else [f"{name} (bag {i + 1})" for i in range(bags) for name in biases]
-    return (*calibration.names, *rotations, *own)
+def _names(calibrations: Sequence[Calibration], shared: SharedLayout) -> tuple[str, ...]:
+    """Name of every shared value, with the number of the recording where several have their own."""
+    names = [""] * shared.size
+    starts: dict[str, set[int]] = {}
+    for places in shared.places:
+        for block, place in places.items():
+            starts.setdefault(block, set()).add(place.start)
+    for calibration, places, owner in zip(calibrations, shared.places, shared.owners, strict=True):
+        for block, place in places.items():
+            behind = f" (bag {owner + 1})" if len(starts[block]) > 1 else ""
+            stem = block.removesuffix(ROTATION) + ".R_imu_body" if block.endswith(ROTATION) else block
+            axes = AXES if calibration.block_size(block) == len(AXES) else [str(i) for i in range(len(names[place]))]
+            own = calibration.names if block == DYNAMICS else [f"{stem}.{axis}" for axis in axes]
+            names[place] = [name + behind for name in own]
+    return tuple(names)
 
 
-def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[ParameterEstimate, ...]:
+def _parameters(
+    robot: Robot, calibration: Calibration, sigmas: Array, shared: SharedLayout
+) -> tuple[ParameterEstimate, ...]:
     """The table of all shared values (biases of the first recording)."""
     found = []
     slopes = calibration.value_by_coordinate
@@ -194,8 +213,8 @@ def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[
         elif sigmas[i] > HELD_BY_PRIOR * relative_prior:
             note = "held by its prior"
         found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
-    start = len(calibration.names)
     for gyro in robot.gyros:
+        start = shared.places[0][rotation_block(gyro.name)].start
         angle = Rotation.from_matrix(gyro.R_prior.T @ calibration.rotations[gyro.name]).as_rotvec()
         before = Rotation.from_matrix(gyro.R_prior.T @ gyro.R_imu_body).as_rotvec()
         for j, axis in enumerate(AXES):
@@ -204,15 +223,14 @@ def _parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> tuple[
             name = f"{gyro.name}.R_imu_body.{axis}"
             row = (float(angle[j]), sigma, "rad", float(before[j]), 0.0, gyro.R_prior_sigma, None, note)
             found.append(ParameterEstimate(name, *row))
-        start += 3
     for gyro in robot.gyros:
+        start = shared.places[0][bias_block(gyro.name)].start
         for j, axis in enumerate(AXES):
             sigma = float(sigmas[start + j])
             note = "held by its prior" if sigma > HELD_BY_PRIOR * gyro.bias_prior_sigma else ""
             value, before_bias = float(calibration.biases[gyro.name][j]), float(gyro.bias[j])
             row = (value, sigma, "rad/s", before_bias, before_bias, gyro.bias_prior_sigma, None, note)
             found.append(ParameterEstimate(f"{gyro.name}.bias.{axis}", *row))
-        start += 3
     return tuple(found)
 
 

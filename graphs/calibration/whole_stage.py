@@ -22,6 +22,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve, total_cost
 from jointscope.graphs.solving.convergence import measured_rows
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.set_problem import Problem, SetProblem
 from jointscope.graphs.starts.encoder_motion import hides_reversals
 from jointscope.graphs.starts.initial_guess import initial_states
 from jointscope.graphs.starts.memory_start import with_filled_memories
@@ -70,6 +71,7 @@ class WholeStage:
         progress: called with a text and the share done.
         sigmas: whether the sigmas of encoders are estimated, too.
         solver: minimises the cost of all samples.
+        sets: recordings of other kinds, which share the values of the motions from here on.
     """
 
     hold: tuple[str, ...]
@@ -77,12 +79,14 @@ class WholeStage:
     progress: Progress
     sigmas: bool
     solver: Solver = solve
+    sets: Sequence[SetProblem] = ()
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
         blunt = blunt_sharpness(problems[0].robot, [p.recording for p in problems])
         softer = [anchored([blunted(p, sharpness) for p in problems], calibrations) for sharpness in blunt]
         estimate = approach(softer[0] if softer else problems, noise, calibrations, self.hold)
+        estimate = self._with_sets(estimate)
         for soft in softer:
             estimate = self._step("blunt friction", soft, noise, estimate, FEW_ITERATIONS).estimate
         solved = self._settled(problems, noise, estimate)
@@ -97,7 +101,7 @@ class WholeStage:
             solution = self._step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
             _must_converge(solution, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
-            solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold)
+            solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
             other = _with_sigmas(problems, solved) if self.sigmas else None
             better = scaled(noise, solved.evidence.factors) if noise.estimate else noise
             if other is None and np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
@@ -124,10 +128,20 @@ class WholeStage:
     def _step(
         self, name: str, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int
     ) -> Solution:
-        now = [p.with_noise(noise) for p in problems]
+        now: list[Problem] = [*(p.with_noise(noise) for p in problems), *self._sets_of(problems)]
         solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
         return solution
+
+    def _sets_of(self, problems: Sequence[BagProblem]) -> list[SetProblem]:
+        """The recordings of other kinds on the robot of the motions."""
+        return [other.of_robot(problems[0].robot) for other in self.sets]
+
+    def _with_sets(self, estimate: Estimate) -> Estimate:
+        """The estimate of the motions with states and blocks of the other kinds."""
+        starts = [other.start(estimate.calibrations[0]) for other in self.sets]
+        states, calibrations = [x for x, _ in starts], [c for _, c in starts]
+        return Estimate((*estimate.states, *states), (*estimate.calibrations, *calibrations))
 
 
 def blunt_sharpness(robot: Robot, recordings: Sequence[Recording]) -> tuple[float, ...]:

@@ -130,7 +130,7 @@ def _answer(
 def _smoothed(free: BagProblem, own: BagProblem, states: Array, calibration: Calibration) -> tuple[Array, Array]:
     """States with free torques and their standard deviations, shape (m, d) each."""
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in free.robot.gyros))
-    known = replace(Calibration.of(free.robot), biases=calibration.biases, rotations=calibration.rotations)
+    known = Calibration.of(free.robot).with_points({b: calibration[b] for b in calibration.blocks if b != DYNAMICS})
     start = Estimate((free.robot.layout.carried_over(states, own.robot.layout),), (known,))
     near = first_step([free], start, hold)
     solution = solve([free], near, max_iterations=1, hold=hold)

@@ -134,7 +134,7 @@ def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[
         problem = replace(BagProblem.of(robot, piece), owner=span.bag)
         problems.append(problem)
         states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
-        calibrations.append(replace(Calibration.of(robot), biases=base.calibrations[span.bag].biases))
+        calibrations.append(Calibration.of(robot).with_points(base.calibrations[span.bag].own))
     return problems, Estimate(tuple(states), tuple(calibrations))
 
 
@@ -153,6 +153,6 @@ def _biases(base: BaseModel, spans: Sequence[Span], found: Sequence[Calibration]
     result = []
     for bag, calibration in enumerate(base.calibrations):
         own = [c for span, c in zip(spans, found, strict=True) if span.bag == bag]
-        mean = {name: np.mean([c.biases[name] for c in own], axis=0) for name in calibration.biases} if own else {}
-        result.append(replace(calibration, biases={**calibration.biases, **mean}))
+        mean = {name: np.mean([c[name] for c in own], axis=0) for name in calibration.own} if own else {}
+        result.append(calibration.with_points(mean))
     return tuple(result)

@@ -9,7 +9,7 @@ no recording is smoothed anew for a candidate.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ def validation_error(
     for bag in sorted({span.bag for span in spans}):
         recording = base.recordings[bag]
         problem = BagProblem.of(robot, recording)
-        calibration = replace(Calibration.of(robot), biases=biases[bag].biases)
+        calibration = Calibration.of(robot).with_points(biases[bag].own)
         x = base.states_at(bag, problem.timeline.ticks, robot.layout)
         causal = filter_states(problem, x, calibration)
         predictor = Predictor(problem.robot, problem.timeline)

@@ -27,6 +27,7 @@ from jointscope.graphs.solving.convergence import measured_rows, short_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts
+from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import ProcessNoise
 
@@ -176,7 +177,7 @@ def _cycle(
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
-    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
+    shared = SharedLayout.of(estimate.calibrations, owners(problems))
     here = Solution(estimate, float("nan"), shared, systems)
     step = newton_step(problems, here, hold)
     cost = sum(system.cost for system in systems)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.noise.free_torque import CORRELATION_TIME, FreeTorques
 from jointscope.graphs.noise.linear_smoother import LinearSmoother, Smoothed
 from jointscope.graphs.noise.noise_estimation import FixedPoint, NoiseEvidence, settled
@@ -56,7 +56,7 @@ def separate_noise(
     """
     free = FreeTorques.of(problem.robot, correlation_time)
     own, noise = problem.dynamics.steps.noise, free.robot.noise
-    known = replace(Calibration.of(free.robot), biases=calibration.biases, rotations=calibration.rotations)
+    known = Calibration.of(free.robot).with_points({b: calibration[b] for b in calibration.blocks if b != DYNAMICS})
     windows = [BagProblem.of(free.robot, piece) for _, piece in windows_of([problem.recording])]
     states = [_states_in(window, problem, x) for window in windows]
     widened = {gyro.name: np.ones(len(gyro.channels)) for gyro in problem.robot.gyros if _whole(windows, gyro.name)}

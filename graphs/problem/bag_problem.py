@@ -9,7 +9,6 @@ initial  enc,  gyro                          ...          gyro: full, vertical o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,11 +99,6 @@ class BagProblem:
     def of_robot(self, robot: Robot) -> BagProblem:
         """The same recording, the same piece, of a robot with other choices, constants or sensors."""
         return replace(BagProblem.of(robot, self.recording), owner=self.owner)
-
-    @staticmethod
-    def owners(problems: Sequence[BagProblem]) -> tuple[int, ...]:
-        """Recording of each problem: all of them whole, or all of them pieces."""
-        return tuple(i if problem.owner is None else problem.owner for i, problem in enumerate(problems))
 
     @property
     def sensors(self) -> tuple[Placed, ...]:

@@ -12,12 +12,12 @@ by how much it would change the values. Nothing is estimated anew.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_system import Segment
@@ -74,7 +74,7 @@ def drive_timing(
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
     found = calibrations[0]
-    moved = replace(found, dynamics=found.dynamics + response[: len(found.names), 0] * delay)
+    moved = found.retract({DYNAMICS: response[: len(found.names), 0] * delay})
     changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
     return DriveTiming(delay, sigma, changes)
 

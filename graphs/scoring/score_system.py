@@ -164,7 +164,7 @@ def hypothesis_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> Hy
     m, d, p = len(base.W) // base.d, base.d, base.W.shape[1]
     # LAPACK wants column after column
     B, C_pk, C_kk, g_k = np.zeros((k, m, d)).transpose(1, 2, 0), np.zeros((p, k)), np.zeros((k, k)), np.zeros(k)
-    columns = _block_columns(segment.calibration)
+    columns = segment.calibration.columns
     for part in rows:
         flat = part.by_size.reshape(-1, k)
         C_kk += flat.T @ flat
@@ -177,14 +177,6 @@ def hypothesis_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> Hy
     assert info == 0
     H = np.block([[base.S, C_pk - base.W.T @ W], [(C_pk - base.W.T @ W).T, C_kk - W.T @ W]])
     return HypothesisSystem(H, np.concatenate([base.s, g_k - W.T @ base.w]), W)
-
-
-def _block_columns(calibration: Calibration) -> dict[str, slice]:
-    start, columns = 0, {}
-    for block in calibration.blocks:
-        columns[block] = slice(start, start + calibration.block_size(block))
-        start += calibration.block_size(block)
-    return columns
 
 
 def _defects(steps: Steps, first: Array, last: Array) -> Array:

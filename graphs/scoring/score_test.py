@@ -21,11 +21,11 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import fdtrc
 
 from jointscope.factors.priors import shared_priors
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
+from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
 
 Array = NDArray[np.float64]
@@ -112,7 +112,7 @@ class ScoreTest:
 
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
-        self._shared = SharedLayout.of(segments[0].calibration, BagProblem.owners([s.problem for s in segments]))
+        self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
 
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""
@@ -214,7 +214,7 @@ class ScoreTest:
             dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
             ticks = segment.problem.timeline.ticks
             block = ((ticks - ticks[0]) / BLOCK).astype(int)
-            count, blocks = int(block[-1]) + 1, self._shared.columns
+            count, blocks = int(block[-1]) + 1, segment.calibration.columns
             total = np.zeros((count, k))
             own = [np.zeros((count, c.stop - c.start, c.stop - c.start)) for c in columns]
             for part in rows:

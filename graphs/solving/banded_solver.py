@@ -44,13 +44,13 @@ class Elimination:
 
     def states(self, dp: Array) -> Array:
         """Change of all states for a change dp of the shared values, shape (m, d)."""
-        return self.solve_transposed(-(self.w + self.W @ dp)[:, None])[:, 0].reshape(-1, self.d)
+        return self.solve_transposed(-(self.w + self.W @ dp)[:, None])[:, 0].reshape(len(self.w) // self.d, self.d)
 
     def blocks(self) -> tuple[Array, Array]:
         """Blocks of L on and below the diagonal, shape (m, d, d) and (m - 1, d, d)."""
-        columns = self.L.T.reshape(-1, self.d, 2 * self.d)
+        columns = self.L.T.reshape(self.L.shape[1] // self.d, self.d, 2 * self.d)
         m, d = len(columns), self.d
-        diagonal, below = np.zeros((m, d, d)), np.zeros((m - 1, d, d))
+        diagonal, below = np.zeros((m, d, d)), np.zeros((max(m - 1, 0), d, d))
         for b in range(d):
             diagonal[:, b:, b] = columns[:, b, : d - b]
             below[:, :, b] = columns[:-1, b, d - b : 2 * d - b]
@@ -58,7 +58,7 @@ class Elimination:
 
     def solve_transposed(self, right: Array) -> Array:
         """L^-T times a matrix of shape (m d, k)."""
-        if right.shape[1] == 0:
+        if right.size == 0:
             return right
         x, info = lapack.dtbtrs(self.L, right, uplo="L", trans="T")
         _check(info)
@@ -77,6 +77,8 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
         SolveError: a state is not determined.
     """
     m, d, p = system.B.shape
+    if m == 0:
+        return Elimination(np.zeros((2 * d, 0)), np.zeros((0, p)), np.zeros(0), system.C, system.g_p, d)
     L, info = lapack.dpbtrf(_banded(system, damping), lower=1, overwrite_ab=1)
     if info > 0:
         tick, component = divmod(info - 1, d)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.priors import shared_priors
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
@@ -30,7 +29,8 @@ from jointscope.graphs.solving.convergence import (
 )
 from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import NormalEquations, build, cost
+from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
 from jointscope.robots.errors import SolveError
@@ -72,7 +72,7 @@ class Solver(Protocol):
 
     def __call__(
         self,
-        problems: Sequence[BagProblem],
+        problems: Sequence[Problem],
         start: Estimate,
         *,
         max_iterations: int,
@@ -83,7 +83,7 @@ class Solver(Protocol):
 
 
 def solve(
-    problems: Sequence[BagProblem],
+    problems: Sequence[Problem],
     start: Estimate,
     *,
     max_iterations: int = 30,
@@ -115,7 +115,11 @@ def solve(
             values = found
         else:  # the states inside stretches have gone astray, too
             graph, values = CondensedGraph.of(problems, start, hold, length)
-    cost, bends = graph.cost(values), StateDamping.of([problem.timeline.ticks for problem in problems])
+    ticks = [
+        problem.timeline.ticks if isinstance(problem, BagProblem) else np.arange(float(len(x)))
+        for problem, x in zip(problems, start.states, strict=True)
+    ]
+    cost, bends = graph.cost(values), StateDamping.of(ticks)
     descent = _Descent(graph, values, cost, graph.costs, bends)
     if not np.isfinite(descent.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
@@ -211,7 +215,7 @@ class NewtonStep:
 
 
 def newton_step(
-    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
+    problems: Sequence[Problem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
 ) -> NewtonStep:
     """One step from the solution's normal equations, not checked against the cost.
 
@@ -224,42 +228,38 @@ def newton_step(
     shared = solution.shared
     free = free_indices(shared, hold)
     eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
-    H, g = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    H, g = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
 
-def first_step(problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
+def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
     """Where one hardly damped step leads; for starts from which every step is an improvement."""
-    shared = SharedLayout.of(estimate.calibrations[0], BagProblem.owners(problems))
+    shared = SharedLayout.of(estimate.calibrations, owners(problems))
     here = Solution(estimate, float("nan"), shared, _build(problems, estimate))
     return newton_step(problems, here, hold, LAMBDA_START).estimate
 
 
-def _build(problems: Sequence[BagProblem], estimate: Estimate) -> list[NormalEquations]:
+def _build(problems: Sequence[Problem], estimate: Estimate) -> list[NormalEquations]:
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    return [build(problem, x, calibration) for problem, x, calibration in bags]
+    return [linearized(problem, x, calibration) for problem, x, calibration in bags]
 
 
-def _prior_cost(problem: BagProblem, calibration: Calibration) -> float:
-    residuals = [prior.residual((), calibration) / prior.sigmas for prior in shared_priors(problem.robot)]
-    return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
-
-
-def total_cost(problems: Sequence[BagProblem], estimate: Estimate) -> float:
+def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:
     """Cost of all recordings and of the priors they share."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    total = sum(cost(problem, x, calibration) for problem, x, calibration in bags)
-    return total + _prior_cost(problems[0], estimate.calibrations[0])
+    total = sum(cost_of(problem, x, calibration) for problem, x, calibration in bags)
+    for prior, piece in priors_of(problems, estimate.calibrations):
+        total += 0.5 * float(np.sum((prior.residual((), estimate.calibrations[piece]) / prior.sigmas) ** 2))
+    return total
 
 
 def reduced_system(
-    problem: BagProblem,
-    systems: Sequence[NormalEquations],
+    problems: Sequence[Problem],
     eliminations: Sequence[Elimination],
     shared: SharedLayout,
-    calibration: Calibration,
+    calibrations: Sequence[Calibration],
 ) -> tuple[Array, Array]:
     """Hessian and gradient on the shared values of all recordings, states eliminated, priors added."""
     H, g = np.zeros((shared.size, shared.size)), np.zeros(shared.size)
@@ -267,10 +267,10 @@ def reduced_system(
         index = shared.indices(bag)
         H[np.ix_(index, index)] += elimination.S
         g[index] += elimination.s
-    for prior in shared_priors(problem.robot):
-        linear = prior.linearize((), calibration)
+    for prior, piece in priors_of(problems, calibrations):
+        linear = prior.linearize((), calibrations[piece])
         for block, J in linear.by_block.items():
-            columns = shared.columns[block]
+            columns = shared.places[piece][block]
             J = J[0] / prior.sigmas[:, None]
             H[columns, columns] += J.T @ J
             g[columns] += J.T @ (linear.residual[0] / prior.sigmas)
@@ -280,7 +280,8 @@ def reduced_system(
 def free_indices(shared: SharedLayout, hold: Sequence[str]) -> NDArray[np.intp]:
     """Indices of the shared values that may change."""
     held = np.zeros(shared.size, dtype=bool)
-    for bag in range(len(shared.owners)):
+    for places in shared.places:
         for block in hold:
-            held[shared.indices(bag)[shared.columns[block]]] = True
+            if block in places:
+                held[places[block]] = True
     return np.flatnonzero(~held)

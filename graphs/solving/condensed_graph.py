@@ -20,20 +20,19 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.condensed import CondensedFactor
-from jointscope.factors.factor import Factor
-from jointscope.factors.priors import shared_priors
 from jointscope.factors.single import (
     block_key,
     extract_calibration,
-    insert_calibration,
     stacked_factor,
     state_key,
 )
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
+from jointscope.graphs.solving.set_problem import Problem, motions, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.stretch import RecordingStretch, cut
+from jointscope.graphs.solving.whole_set import WholeSet
 
 Array = NDArray[np.float64]
 
@@ -48,56 +47,61 @@ class CondensedGraph:
     Attributes:
         problems: the recordings, or pieces of them.
         graph: condensed factors, and one factor for each prior and bias.
-        stretches: of each piece, in the order of time.
-        blocks: names of the blocks that may change.
+        stretches: of each piece, in the order of time; of another kind than motion the one that holds everything.
+        blocks: names of the blocks that may change, of each piece.
         shared: where the shared values stand in one vector.
         likes: calibration of each piece, for the blocks that are held.
         held_cost: cost of priors whose block is held.
     """
 
-    problems: tuple[BagProblem, ...]
+    problems: tuple[Problem, ...]
     graph: gtsam.NonlinearFactorGraph
-    stretches: tuple[tuple[RecordingStretch, ...], ...]
-    blocks: tuple[str, ...]
+    stretches: tuple[tuple[RecordingStretch | WholeSet, ...], ...]
+    blocks: tuple[tuple[str, ...], ...]
     shared: SharedLayout
     likes: tuple[Calibration, ...]
     held_cost: float
 
     @staticmethod
     def of(
-        problems: Sequence[BagProblem], start: Estimate, hold: Sequence[str] = (), length: int = 0
+        problems: Sequence[Problem], start: Estimate, hold: Sequence[str] = (), length: int = 0
     ) -> tuple[CondensedGraph, gtsam.Values]:
         """The graph, and the values of an estimate.
 
         Args:
-            problems: factors of each recording, all of one robot.
+            problems: recordings of any kinds, all of one robot.
             start: where it is linearised first.
             hold: blocks that stay as they are; they are no variables of the graph.
             length: steps in one stretch; chosen by the number of samples if 0.
         """
-        owners = BagProblem.owners(problems)
-        length = length or max(STRETCH, sum(len(p.dynamics) for p in problems) // MOST_STRETCHES)
-        like = start.calibrations[0]
+        places = owners(problems)
+        length = length or max(STRETCH, sum(len(p.dynamics) for p in motions(problems)) // MOST_STRETCHES)
         # nothing is no variable: a robot may have no free parameter
-        blocks = tuple(block for block in like.blocks if block not in hold and like.block_size(block))
-        values = gtsam.Values()
-        for calibration, owner in zip(start.calibrations, owners, strict=True):
-            insert_calibration(values, calibration, owner, blocks)
+        free = [
+            tuple(block for block in like.blocks if block not in hold and like.block_size(block))
+            for like in start.calibrations
+        ]
+        values = _shared_values(start, places, free)
         likes = tuple(
             extract_calibration(values, calibration, blocks, owner)
-            for calibration, owner in zip(start.calibrations, owners, strict=True)
+            for calibration, blocks, owner in zip(start.calibrations, free, places, strict=True)
         )
         graph, stretches = gtsam.NonlinearFactorGraph(), []
         for piece, (problem, x, like) in enumerate(zip(problems, start.states, likes, strict=True)):
-            cuts = tuple(cut(problem, x, like, length, blocks))
+            blocks = free[piece]
+            cuts: tuple[RecordingStretch | WholeSet, ...]
+            if isinstance(problem, BagProblem):
+                cuts = tuple(cut(problem, x, like, length, blocks))
+            else:
+                cuts = (WholeSet(problem, x, like, blocks),)
             for stretch in cuts:
-                graph.add(CondensedFactor(stretch, piece, owners[piece], blocks, like).factor())
-            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts)):
+                graph.add(CondensedFactor(stretch, piece, places[piece], blocks, like).factor())
+            for tick in _between(cuts):
                 values.insert(state_key(tick, piece), x[tick])
             stretches.append(cuts)
-        held = _add_rows_without_states(graph, problems, owners, likes, blocks)
-        shared = SharedLayout.of(start.calibrations[0], owners)
-        return CondensedGraph(tuple(problems), graph, tuple(stretches), blocks, shared, likes, held), values
+        held = _add_rows_without_states(graph, problems, places, likes, free)
+        shared = SharedLayout.of(start.calibrations, places)
+        return CondensedGraph(tuple(problems), graph, tuple(stretches), tuple(free), shared, likes, held), values
 
     def cost(self, values: gtsam.Values) -> float:
         """Half the sum of squared whitened residuals, priors of held blocks included."""
@@ -120,22 +124,20 @@ class CondensedGraph:
         """
         for piece, cuts in enumerate(self.stretches):
             for stretch in cuts:
-                first, last = stretch.ticks
-                own = bends[piece][first : last + 1] if len(bends) else np.zeros(last + 1 - first)
-                stretch.damping = np.maximum(own, damping)
+                stretch.damp(damping, bends[piece] if len(bends) else None)
         return self.graph.linearize(values)
 
     @property
     def dynamics_key(self) -> int | None:
         """Key of the dynamic parameters; None where they are held or there are none."""
-        return block_key(DYNAMICS, self.likes[0]) if DYNAMICS in self.blocks else None
+        return block_key(DYNAMICS, self.likes[0]) if DYNAMICS in self.blocks[0] else None
 
     @property
     def states_ordering(self) -> gtsam.Ordering:
         """The states between stretches, piece after piece."""
         ordering = gtsam.Ordering()
         for piece, cuts in enumerate(self.stretches):
-            for tick in (cuts[0].ticks[0], *(stretch.ticks[1] for stretch in cuts)):
+            for tick in _between(cuts):
                 ordering.push_back(state_key(tick, piece))
         return ordering
 
@@ -152,16 +154,16 @@ class CondensedGraph:
         """Keys of all shared blocks that may change, with their places in the vector of all shared values."""
         found: dict[int, NDArray[np.intp]] = {}
         for piece, owner in enumerate(self.shared.owners):
-            index = self.shared.indices(piece)
-            for block in self.blocks:
-                found[block_key(block, self.likes[piece], owner)] = index[self.shared.columns[block]]
+            for block in self.blocks[piece]:
+                place = self.shared.places[piece][block]
+                found[block_key(block, self.likes[piece], owner)] = np.arange(place.start, place.stop)
         return list(found.items())
 
     def estimate(self, values: gtsam.Values) -> Estimate:
         """All states and shared values where the graph was evaluated last, which must be at these values."""
         calibrations = tuple(
-            extract_calibration(values, like, self.blocks, owner)
-            for like, owner in zip(self.likes, self.shared.owners, strict=True)
+            extract_calibration(values, like, blocks, owner)
+            for like, blocks, owner in zip(self.likes, self.blocks, self.shared.owners, strict=True)
         )
         states = tuple(
             np.vstack([cuts[0].states, *(stretch.states[1:] for stretch in cuts[1:])]) for cuts in self.stretches
@@ -174,6 +176,9 @@ class CondensedGraph:
         for problem, cuts, x, calibration in zip(
             self.problems, self.stretches, estimate.states, estimate.calibrations, strict=True
         ):
+            if not isinstance(problem, BagProblem):
+                found.append(cuts[0].system)
+                continue
             alone = replace(problem, placed=tuple(p for p in problem.placed if p.factor.states == 0))
             system = _joined([stretch.system for stretch in cuts])
             _add_shared(system, alone, x[:2], calibration)
@@ -181,20 +186,39 @@ class CondensedGraph:
         return found
 
 
+def _between(cuts: Sequence[RecordingStretch | WholeSet]) -> list[int]:
+    """Ticks at the ends of stretches."""
+    return list(dict.fromkeys(tick for stretch in cuts for tick in stretch.ticks))
+
+
+def _shared_values(start: Estimate, owners: Sequence[int], free: Sequence[Sequence[str]]) -> gtsam.Values:
+    """Values of all blocks that may change."""
+    values = gtsam.Values()
+    for piece, owner in enumerate(owners):
+        for block in free[piece]:
+            key = block_key(block, start.calibrations[piece], owner)
+            if values.exists(key):
+                continue
+            calibration = start.calibrations[piece]
+            values.insert(key, calibration.layout[block].kind.to_gtsam(calibration[block]))
+    return values
+
+
 def _add_rows_without_states(
     graph: gtsam.NonlinearFactorGraph,
-    problems: Sequence[BagProblem],
+    problems: Sequence[Problem],
     owners: Sequence[int],
     likes: Sequence[Calibration],
-    blocks: Sequence[str],
+    free: Sequence[Sequence[str]],
 ) -> float:
     """Adds priors and what else touches no state; returns the cost of those whose block is held."""
-    alone: list[tuple[Factor, int]] = [(prior, 0) for prior in shared_priors(problems[0].robot)]
+    alone = list(priors_of(problems, likes))
     for piece, problem in enumerate(problems):
-        alone += [(placed.factor, piece) for placed in problem.placed if placed.factor.states == 0]
+        if isinstance(problem, BagProblem):
+            alone += [(placed.factor, piece) for placed in problem.placed if placed.factor.states == 0]
     held = 0.0
     for factor, piece in alone:
-        if set(factor.blocks) <= set(blocks):
+        if set(factor.blocks) <= set(free[piece]):
             graph.add(stacked_factor(factor, likes[piece], owners[piece]))
         else:
             residual = factor.residual((), likes[piece]) / factor.sigmas

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.set_problem import Problem, motions
 
 SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
 SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
@@ -35,9 +36,11 @@ class Iteration:
         return (self.cost_before - self.cost_after) / max(self.cost_before, 1e-300)
 
 
-def measured_rows(problems: Sequence[BagProblem]) -> int:
+def measured_rows(problems: Sequence[Problem]) -> int:
     """Number of measured values in all recordings."""
-    return sum(len(p.factor) * len(p.factor.rows) for problem in problems for p in problem.sensors)
+    placed = [p.factor for problem in motions(problems) for p in problem.sensors]
+    others = [problem.measured for problem in problems if not isinstance(problem, BagProblem)]
+    return sum(len(factor) * len(factor.rows) for factor in placed) + sum(others)
 
 
 def misfit(cost: float, measured: int) -> float:

@@ -61,7 +61,7 @@ class NormalEquations:
         parts = (np.zeros((m, d, d)), np.zeros((m, d))) if split else (None, None)
         return NormalEquations(
             np.zeros((m, d, d)),
-            np.zeros((m - 1, d, d)),
+            np.zeros((max(m - 1, 0), d, d)),
             np.zeros((m, d, p)),
             np.zeros((p, p)),
             np.zeros((m, d)),
@@ -70,16 +70,6 @@ class NormalEquations:
             np.zeros(m),
             *parts,
         )
-
-
-def layout(calibration: Calibration) -> dict[str, slice]:
-    """Columns of each block among the shared values of one recording."""
-    start, columns = 0, {}
-    for block in calibration.blocks:
-        size = calibration.block_size(block)
-        columns[block] = slice(start, start + size)
-        start += size
-    return columns
 
 
 def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool = False) -> NormalEquations:
@@ -105,8 +95,8 @@ def accumulate(
 
     Without shared values, which are known then, the linearizations must hold no derivatives by them.
     """
-    columns = layout(calibration)
-    p = max(c.stop for c in columns.values()) if with_shared else 0
+    columns = calibration.columns
+    p = calibration.size if with_shared else 0
     system = NormalEquations.zeros(len(x), x.shape[1], p, split)
     for factor, ticks, linear in linearized:
         _accumulate(system, factor, ticks, linear, columns)

@@ -21,10 +21,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
-from jointscope.graphs.solving.normal_equations import Linearized, layout, whitened
+from jointscope.graphs.solving.normal_equations import Linearized, whitened
+from jointscope.graphs.solving.set_problem import Problem
 from jointscope.graphs.solving.unobservable import unobservable
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ class StatePosterior:
 
 
 def posteriors(
-    problems: Sequence[BagProblem], solution: Solution, hold: Sequence[str] = ()
+    problems: Sequence[Problem], solution: Solution, hold: Sequence[str] = ()
 ) -> tuple[list[StatePosterior], Array]:
     """Uncertainty of all recordings at a solution, and the covariance of all shared values.
 
@@ -91,7 +91,7 @@ def posteriors(
     """
     shared = solution.shared
     eliminations = [eliminate(system) for system in solution.systems]
-    H, _ = reduced_system(problems[0], solution.systems, eliminations, shared, solution.estimate.calibrations[0])
+    H, _ = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     free = free_indices(shared, hold)
     covariance = np.zeros_like(H)
     try:
@@ -134,7 +134,7 @@ def residual_parts(
         calibration: gives the layout of the shared values.
         posterior: uncertainty of the recording's states.
     """
-    columns = layout(calibration)
+    columns = calibration.columns
     p = posterior.shared.shape[0]
     for factor, ticks, linear in linearized:
         r, J, by_block = whitened(factor, linear)

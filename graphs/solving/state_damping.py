@@ -40,7 +40,7 @@ class StateDamping:
     @staticmethod
     def of(ticks: Sequence[Array]) -> StateDamping:
         """None yet; ticks of each recording, shape (m,) [s]."""
-        steps = [max(float(np.median(np.diff(t))), 1e-9) for t in ticks]
+        steps = [max(float(np.median(np.diff(t))), 1e-9) if len(t) > 1 else REACH for t in ticks]
         return StateDamping([np.zeros(len(t)) for t in ticks], [max(round(REACH / h), 1) for h in steps])
 
     def raised(self, before: Sequence[Array], there: Sequence[Array]) -> bool:
@@ -57,7 +57,7 @@ class StateDamping:
         rises = [uniform_filter1d(b - a, 2 * n + 1, mode="constant") for a, b, n in pairs]
         if not all(np.all(np.isfinite(rise)) for rise in rises):
             return False
-        largest = max(float(np.max(rise)) for rise in rises)
+        largest = max((float(np.max(rise)) for rise in rises if len(rise)), default=0.0)
         marked = [
             maximum_filter1d((rise > OF_LARGEST * largest).astype(int), 2 * n + 1) > 0
             for rise, n in zip(rises, self.reach, strict=True)

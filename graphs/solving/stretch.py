@@ -13,12 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from jointscope.factors.calibration import Calibration, bias_block, rotation_block
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
-from jointscope.graphs.solving.normal_equations import NormalEquations, build, layout
+from jointscope.graphs.solving.normal_equations import NormalEquations, build
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,7 @@ class Point:
         return (
             np.array_equal(self.x[0], first)
             and np.array_equal(self.x[-1], last)
-            and _same(self.calibration, calibration)
+            and self.calibration.is_at(calibration)
         )
 
 
@@ -64,7 +63,7 @@ class RecordingStretch:
         self.problem, self._start = problem, start
         self.damping = np.zeros(len(x))
         self._d = x.shape[1]
-        own = layout(calibration)
+        own = calibration.columns
         self._kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
         self._columns: dict[str, slice] = {}
         n = 2 * self._d
@@ -100,8 +99,15 @@ class RecordingStretch:
         """Columns of a free block."""
         return self._columns[block]
 
-    def visit(self, first: Array, last: Array, calibration: Calibration) -> float:
+    def damp(self, damping: float, bends: Array | None) -> None:
+        """Sets the damping of all states, larger where `bends` says so, of all states of the recording."""
+        first, last = self.ticks
+        own = np.zeros(len(self.damping)) if bends is None else bends[first : last + 1]
+        self.damping = np.maximum(own, damping)
+
+    def visit(self, ends: Sequence[Array], calibration: Calibration) -> float:
         """Evaluates everything at new ends and shared values; returns the cost there."""
+        first, last = ends
         if self._base.is_at(first, last, calibration):
             self._trial = self._base
         elif not self._trial.is_at(first, last, calibration):
@@ -159,7 +165,7 @@ class RecordingStretch:
                 self._elimination, self._eliminated_with = self._eliminated(), self.damping
             assert self._elimination is not None
             parts = [first - base.x[0], last - base.x[-1]]
-            parts += [change_of(base.calibration, calibration, block) for block in self._columns]
+            parts += [base.calibration.local(calibration, block) for block in self._columns]
             x[1:-1] += self._elimination.states(np.concatenate(parts))
         return x
 
@@ -189,21 +195,3 @@ def cut(
                 placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
         part = replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))
         yield RecordingStretch(part, x[a : b + 1], calibration, a, blocks)
-
-
-def _same(one: Calibration, other: Calibration) -> bool:
-    return (
-        np.array_equal(one.dynamics, other.dynamics)
-        and all(np.array_equal(one.biases[name], other.biases[name]) for name in one.biases)
-        and all(np.array_equal(one.rotations[name], other.rotations[name]) for name in one.rotations)
-    )
-
-
-def change_of(before: Calibration, now: Calibration, block: str) -> Array:
-    """Coordinates of a block's way from one calibration to another, shape (size,)."""
-    for name in before.biases:
-        if block == bias_block(name):
-            return now.biases[name] - before.biases[name]
-        if block == rotation_block(name):
-            return Rotation.from_matrix(before.rotations[name].T @ now.rotations[name]).as_rotvec()
-    return now.dynamics - before.dynamics

@@ -41,9 +41,8 @@ def unobservable(H: Array, free: NDArray[np.intp], shared: SharedLayout, calibra
 def value_names(shared: SharedLayout, calibration: Calibration) -> list[str]:
     """Name of every shared value, shape (s,): parameters by their own, else their block's."""
     names = [""] * shared.size
-    for bag in range(shared.bags):
-        index = shared.indices(shared.owners.index(bag))
-        for block, columns in shared.columns.items():
-            for k, i in enumerate(index[columns]):
+    for places in shared.places:
+        for block, place in places.items():
+            for k, i in enumerate(range(place.start, place.stop)):
                 names[i] = calibration.names[k] if block == DYNAMICS else block.replace(".rotation", ".R_imu_body")
     return names

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.starts.drive_regression import (
     DRY,
@@ -146,4 +146,4 @@ def _with_values(calibration: Calibration, found: dict[str, float]) -> Calibrati
     for i, name in enumerate(calibration.names):
         values[i] = found.get(name, values[i])
     dynamics = np.where(calibration.positive, np.log(np.where(calibration.positive, values, 1.0)), values)
-    return replace(calibration, dynamics=dynamics)
+    return calibration.with_points({DYNAMICS: dynamics})

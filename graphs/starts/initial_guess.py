@@ -14,14 +14,13 @@ Both are used at elastic joints; rigid ones have a regression of their own, `sta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.starts.drive_starts import with_drive_starts
 from jointscope.graphs.starts.encoder_motion import encoder_motion
@@ -66,12 +65,12 @@ def initial_biases(problem: BagProblem, calibration: Calibration) -> Calibration
     """Biases from the rest before the first command, where there is one."""
     if not problem.rests:
         return calibration
-    biases = dict(calibration.biases)
+    biases: dict[str, Array] = {}
     for gyro in problem.robot.gyros:
         resting = problem.recording.streams[gyro.name].between(-np.inf, first_command_time(problem.recording))
         if len(resting) >= 10:
-            biases[gyro.name] = resting.values.mean(axis=0)
-    return replace(calibration, biases=biases)
+            biases[bias_block(gyro.name)] = resting.values.mean(axis=0)
+    return calibration.with_points(biases)
 
 
 def initial_dynamics(problems: Sequence[BagProblem], states: Sequence[Array], calibration: Calibration) -> Calibration:
@@ -176,7 +175,7 @@ def _with_values(calibration: Calibration, found: dict[str, list[tuple[float, fl
         if values[i] / 20.0 < mean < values[i] * 20.0:
             values[i] = mean
     dynamics = np.where(calibration.positive, np.log(np.where(calibration.positive, values, 1.0)), values)
-    return replace(calibration, dynamics=dynamics)
+    return calibration.with_points({DYNAMICS: dynamics})
 
 
 def _link_rates(problem: BagProblem, calibration: Calibration, q: Array, fallback: Array) -> Array:

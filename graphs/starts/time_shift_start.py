@@ -127,5 +127,5 @@ def _with_value(estimate: Estimate, name: str, value: float) -> Estimate:
     for calibration in estimate.calibrations:
         i, dynamics = calibration.names.index(name), calibration.dynamics.copy()
         dynamics[i] = np.log(value) if calibration.positive[i] else value
-        calibrations.append(replace(calibration, dynamics=dynamics))
+        calibrations.append(calibration.with_points({DYNAMICS: dynamics}))
     return Estimate(estimate.states, tuple(calibrations))

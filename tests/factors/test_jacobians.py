@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jointscope.factors.bias_at_rest import BiasAtRestFactor
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.initial_state import InitialStateFactor
@@ -135,7 +135,7 @@ def _point(factor, robot):
         if effect is not None:  # a tenth beside its size, whatever its unit
             values[i] = robot.parameters[name].value * 1.1
     dynamics = np.where(calibration.positive, np.log(np.where(calibration.positive, values, 1.0)), values)
-    return (x0, x1)[: factor.states], replace(calibration, dynamics=dynamics)
+    return (x0, x1)[: factor.states], calibration.with_points({DYNAMICS: dynamics})
 
 
 def _difference(function, size, steps=None):

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from jointscope.graphs.solving.incremental_solver import KnownSoFar
+from jointscope.graphs.gtsam_solvers.incremental_solver import KnownSoFar
 from jointscope.tools.presentation.numbers import with_sigma
 from jointscope.tools.terminal.text_table import text_table
 

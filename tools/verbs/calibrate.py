@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
 def _solver(args: argparse.Namespace, robot: Any) -> Any:
     """What minimises the cost of all samples."""
     if args.incremental:
-        from jointscope.graphs.solving.incremental_solver import Incremental
+        from jointscope.graphs.gtsam_solvers.incremental_solver import Incremental
         from jointscope.tools.terminal.known_so_far import known_so_far_text
 
         units = {parameter.name: parameter.unit for parameter in robot.parameters.values()}
@@ -108,7 +108,7 @@ def _solver(args: argparse.Namespace, robot: Any) -> Any:
 
         return Incremental(lambda known: say(known_so_far_text(known, units)), say)
     if args.solver == "samples":
-        from jointscope.graphs.solving.samples_solver import solve_samples
+        from jointscope.graphs.gtsam_solvers.samples_solver import solve_samples
 
         return solve_samples
     from jointscope.graphs.solving.batch_solver import solve

@@ -16,7 +16,7 @@ from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.solving.banded_solver import eliminate
-from jointscope.graphs.solving.normal_equations import accumulate, layout, whitened
+from jointscope.graphs.solving.normal_equations import accumulate, whitened
 
 TRIED = ("motor_viscous@joint2", "cogging@joint1", "motor_lag@joint3", "gyro_scale@imu2", "encoder_delay@robot")
 
@@ -39,7 +39,7 @@ def short():
 def dense(segment, x, hypothesis):
     """Hessian and gradient on (states, shared values, sizes), every residual row by row, with all priors."""
     d, k = x.shape[1], len(hypothesis.sizes)
-    columns = layout(segment.calibration)
+    columns = segment.calibration.columns
     p = max(c.stop for c in columns.values())
     rows = rows_of(segment, columns_of(hypothesis, segment.signals))
     touched = [f for f, _, _ in segment.linearized if f.states and f.name != "initial_state"]

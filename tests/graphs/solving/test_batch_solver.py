@@ -8,14 +8,14 @@ import pytest
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.comparison.causal_filter import filter_around, filter_states
+from jointscope.graphs.gtsam_solvers.reference_graph import initial_values, nonlinear_graph
+from jointscope.graphs.gtsam_solvers.samples_solver import solve_samples
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.batch_solver import solve, total_cost
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import build, linearize_all
 from jointscope.graphs.solving.posterior import StatePosterior, posteriors, residual_parts
-from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
-from jointscope.graphs.solving.samples_solver import solve_samples
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_states
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot
@@ -95,7 +95,7 @@ def test_two_recordings_share_parameters_as_in_the_gtsam_graph(simulated, doggy)
     np.testing.assert_array_equal(a[0].dynamics, a[1].dynamics)
     assert not np.allclose(a[0].biases["imu1"], a[1].biases["imu1"])
     _, covariance = posteriors(problems, fast)
-    sigma = np.sqrt(np.diag(covariance))[fast.shared.indices(1)[fast.shared.columns["imu1.bias"]]]
+    sigma = np.sqrt(np.diag(covariance))[fast.shared.places[1]["imu1.bias"]]
     assert np.max(np.abs(a[1].biases["imu1"] - b[1].biases["imu1"]) / sigma) < 1e-3
 
 

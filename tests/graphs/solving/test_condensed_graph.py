@@ -41,9 +41,7 @@ def test_what_the_states_leave_on_the_shared_values_is_that_of_the_whole_band(mo
     _, rest = graph.linearized(values).eliminatePartialSequential(graph.states_ordering)
     H, right = rest.hessian(graph.shared_ordering)
     systems = [build(p, x, c) for p, x, c in zip(problems, estimate.states, estimate.calibrations, strict=True)]
-    wanted, gradient = reduced_system(
-        problems[0], systems, [eliminate(s) for s in systems], graph.shared, estimate.calibrations[0]
-    )
+    wanted, gradient = reduced_system(problems, [eliminate(s) for s in systems], graph.shared, estimate.calibrations)
     index = np.concatenate([index for _, index in graph.shared_keys])
     scale = np.sqrt(np.diag(wanted))[index]
     reduced, wanted_step = np.ravel(right) / scale, -gradient[index] / scale
@@ -79,7 +77,7 @@ def test_inner_states_follow_a_step_of_the_shared_values(moving):
 def test_a_held_block_is_no_variable(moving):
     problems, estimate = moving
     graph, values = CondensedGraph.of(problems, estimate, hold=(DYNAMICS,))
-    assert all("dynamics" not in block for block in graph.blocks)
+    assert all("dynamics" not in blocks for blocks in graph.blocks)
     assert graph.cost(values) == pytest.approx(total_cost(problems, estimate), rel=1e-12)
     moved = graph.estimate(damped_step(graph, values, 1e-9).values)
     assert np.array_equal(moved.calibrations[0].dynamics, estimate.calibrations[0].dynamics)

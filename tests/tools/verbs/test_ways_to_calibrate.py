@@ -46,7 +46,7 @@ def test_incremental_says_what_is_known_after_each_stretch_and_writes_the_same_f
     ],
 )
 def test_what_does_not_go_together_is_one_line(bag, tmp_path, capsys, monkeypatch, robot, ways, wanted):
-    monkeypatch.setattr("jointscope.graphs.solving.samples_solver.LONGEST", 5.0)
+    monkeypatch.setattr("jointscope.graphs.gtsam_solvers.samples_solver.LONGEST", 5.0)
     out = tmp_path / "out.yaml"
     assert main(["calibrate", robot, str(bag), "-o", str(out), *ways]) == 1
     told = capsys.readouterr().err.strip()

@@ -15,13 +15,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.single import extract_calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import eliminate
-from jointscope.graphs.solving.batch_solver import Progress, Solution, free_indices, reduced_system, total_cost
-from jointscope.graphs.solving.convergence import Iteration
-from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import build
-from jointscope.graphs.solving.reference_graph import (
+from jointscope.graphs.gtsam_solvers.reference_graph import (
     estimate_of,
     free_blocks,
     initial_values,
@@ -29,8 +23,14 @@ from jointscope.graphs.solving.reference_graph import (
     nonlinear_graph,
     unsolvable,
 )
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving.batch_solver import Progress, Solution, free_indices, reduced_system, total_cost
+from jointscope.graphs.solving.convergence import Iteration
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import build
+from jointscope.graphs.solving.set_problem import Problem, motions_only
 from jointscope.graphs.solving.shared_layout import SharedLayout
-from jointscope.graphs.solving.stretch import change_of
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def must_be_short(problems: Sequence[BagProblem]) -> None:
 
 
 def solve_samples(
-    problems: Sequence[BagProblem],
+    given: Sequence[Problem],
     start: Estimate,
     *,
     max_iterations: int = 30,
@@ -69,8 +69,9 @@ def solve_samples(
     """Minimises with `gtsam.LevenbergMarquardtOptimizer`; arguments and result as of `batch_solver.solve`.
 
     Raises:
-        SolveError: a direction is not determined.
+        SolveError: a direction is not determined, or a recording is of another kind than motion.
     """
+    problems = motions_only(given, "`--solver samples`")
     parameters = marquardt_parameters()
     parameters.setLinearSolverType("MULTIFRONTAL_QR")
     graph, values = nonlinear_graph(problems, start, hold), initial_values(start, hold)
@@ -117,9 +118,9 @@ def _solution(
     """The end of a path with its normal equations; its steps in the sigmas that hold there."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
     systems = [build(problem, x, calibration) for problem, x, calibration in bags]
-    shared = SharedLayout.of(estimate.calibrations[0], len(problems))
+    shared = SharedLayout.of(estimate.calibrations, len(problems))
     eliminated = [eliminate(system) for system in systems]
-    H, _ = reduced_system(problems[0], systems, eliminated, shared, estimate.calibrations[0])
+    H, _ = reduced_system(problems, eliminated, shared, estimate.calibrations)
     free = free_indices(shared, hold)
     sigmas = np.full(shared.size, np.inf)
     sigmas[free] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(H[np.ix_(free, free)], hermitian=True)), 1e-300))
@@ -134,6 +135,6 @@ def _longest(before: Sequence[Calibration], after: Sequence[Calibration], shared
     """Largest change of a shared value in its sigmas."""
     largest = 0.0
     for bag, (one, other) in enumerate(zip(before, after, strict=True)):
-        change = np.concatenate([change_of(one, other, block) for block in shared.columns])
+        change = np.concatenate([one.local(other, block) for block in shared.places[bag]])
         largest = max(largest, float(np.max(np.abs(change) / sigmas[shared.indices(bag)], initial=0.0)))
     return largest

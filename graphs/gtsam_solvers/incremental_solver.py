@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.single import extract_calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.condensed_graph import MOST_STRETCHES, STRETCH, CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.set_problem import Problem, motions, motions_only
 from jointscope.robots.errors import SolveError
 from jointscope.robots.outside_modules import need_module
 from jointscope.robots.recordings.recording import Recording
@@ -69,7 +69,7 @@ class Incremental:
 
     def __call__(
         self,
-        problems: Sequence[BagProblem],
+        problems: Sequence[Problem],
         start: Estimate,
         *,
         max_iterations: int,
@@ -80,9 +80,8 @@ class Incremental:
         if self.done:
             return solve(problems, start, max_iterations=max_iterations, hold=hold, progress=progress)
         self.done = True
-        samples = max(len(problem.dynamics) for problem in problems)
-        length = min(max(samples // FEWEST, SHORTEST), STRETCH)
-        length = max(length, sum(len(problem.dynamics) for problem in problems) // MOST_STRETCHES)
+        steps = [len(problem.dynamics) for problem in motions_only(problems, "`--incremental`")]
+        length = max(min(max(max(steps) // FEWEST, SHORTEST), STRETCH), sum(steps) // MOST_STRETCHES)
         return solve(
             problems,
             start,
@@ -130,7 +129,8 @@ def incrementally(graph: CondensedGraph, values: gtsam.Values, told: Callable[[K
         try:
             _settle(smoother, added, new, seen)
             calibration, sigmas = _shared(graph, smoother, bag)
-            recording, ticks = graph.problems[bag].recording, graph.problems[bag].timeline.ticks
+            problem = motions(graph.problems)[bag]
+            recording, ticks = problem.recording, problem.timeline.ticks
             seconds = float(ticks[tick] - ticks[0])
             told(KnownSoFar(recording, seconds, number + 1, stretches, calibration, sigmas))
         except (RuntimeError, SolveError) as err:
@@ -175,7 +175,7 @@ def _in_sigmas(smoother: gtsam.ISAM2, key: int, change: Array) -> float:
 
 def _shared(graph: CondensedGraph, smoother: gtsam.ISAM2, bag: int) -> tuple[Calibration, Array]:
     """Shared values with the biases of a recording, and sigmas of the dynamic parameters in their units."""
-    found = extract_calibration(smoother.calculateEstimate(), graph.likes[bag], graph.blocks, bag)
+    found = extract_calibration(smoother.calculateEstimate(), graph.likes[bag], graph.blocks[bag], bag)
     if graph.dynamics_key is None:
         return found, np.zeros(len(found.names))
     return found, np.sqrt(np.diag(smoother.marginalCovariance(graph.dynamics_key))) * found.value_by_coordinate

@@ -13,11 +13,11 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.priors import DynamicsPrior
 from jointscope.factors.single import single_factor
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.gtsam_solvers.reference_graph import initial_values, nonlinear_graph
+from jointscope.graphs.gtsam_solvers.samples_solver import solve_samples
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import total_cost
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.reference_graph import initial_values, nonlinear_graph
-from jointscope.graphs.solving.samples_solver import solve_samples
 from jointscope.graphs.starts.initial_guess import initial_states
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot

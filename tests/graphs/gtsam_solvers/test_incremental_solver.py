@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.gtsam_solvers.incremental_solver import Incremental, incrementally
 from jointscope.graphs.solving.batch_solver import Solution, solve
-from jointscope.graphs.solving.incremental_solver import Incremental, incrementally
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_isam2_alone_ends_within_a_thousandth_of_a_sigma(simulated, doggy, monke
         ends.append(solution)
         return solution
 
-    monkeypatch.setattr("jointscope.graphs.solving.incremental_solver.solve", watched)
+    monkeypatch.setattr("jointscope.graphs.gtsam_solvers.incremental_solver.solve", watched)
     robot = replace(doggy, noise=replace(doggy.noise, estimate=False))
     calibrate(robot, [simulated.recording.between(4.0, 6.0)], solver=Incremental(lambda known: None))
     steps = [i.step_in_sigmas for i in ends[-1].iterations]
@@ -80,7 +80,7 @@ def test_values_that_isam2_made_worse_are_not_taken(simulated, doggy, monkeypatc
     robot = replace(doggy, noise=replace(doggy.noise, estimate=False))
     part = simulated.recording.between(4.0, 5.0)
     right = calibrate(robot, [part])
-    monkeypatch.setattr("jointscope.graphs.solving.incremental_solver.incrementally", astray)
+    monkeypatch.setattr("jointscope.graphs.gtsam_solvers.incremental_solver.incrementally", astray)
     found = calibrate(robot, [part], solver=Incremental(lambda known: None))
     assert found.cost == pytest.approx(right.cost, rel=1e-6)
 
@@ -93,7 +93,7 @@ def test_where_isam2_runs_away_the_batch_begins_at_the_start_values(simulated, d
     def runs_away(smoother, added, new, keys):
         raise RuntimeError("Indeterminant linear system detected")
 
-    monkeypatch.setattr("jointscope.graphs.solving.incremental_solver._settle", runs_away)
+    monkeypatch.setattr("jointscope.graphs.gtsam_solvers.incremental_solver._settle", runs_away)
     said = []
     found = calibrate(robot, [part], solver=Incremental(lambda known: None, said.append))
     assert found.cost == pytest.approx(right.cost, rel=1e-6)
