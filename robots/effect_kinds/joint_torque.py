@@ -39,7 +39,7 @@ class JointSignals:
     v_motor: Any
     tau_spring: Any
     stiffness: Any
-    sharpness: float = SHARPNESS
+    sharpness: Any = SHARPNESS
     memory: Any = 0.0
 
     @property
