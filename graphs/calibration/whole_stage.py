@@ -153,7 +153,10 @@ def blunt_sharpness(robot: Robot, recordings: Sequence[Recording]) -> tuple[floa
 
 
 def blunted(problem: BagProblem, sharpness: float) -> BagProblem:
-    """The same recording on a robot whose friction turns over more slowly."""
+    """The same recording on a robot whose friction turns over more slowly.
+
+    Joints with a sharpness of their own keep it: it is a value that all stages look for, and its start says how sharp.
+    """
     choices = replace(problem.robot.choices, friction_sharpness=sharpness)
     return problem.of_robot(replace(problem.robot, choices=choices))
 

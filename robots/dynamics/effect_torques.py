@@ -20,6 +20,7 @@ from jointscope.robots.dynamics.torque_terms import TorqueTerms
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Law, signals_used
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
+from jointscope.robots.model.robot import SHARPNESS
 from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]
@@ -89,6 +90,12 @@ class EffectTorques:
                     moved[j] += 1j * STEP
                     change = _imaginary(effect.law(replace(signals, **{name: moved}), p))
                     self._put(terms.by_parameter[:, :, index], (slope * change[0], slope * change[1]))
+        for j, joint in enumerate(self._joints):
+            if f"{joint}.{SHARPNESS}" in self._names:
+                moved = signals.sharpness.astype(complex)
+                moved[j] += 1j * STEP
+                change = _imaginary(effect.law(replace(signals, sharpness=moved), p))
+                self._put(terms.by_parameter[:, :, self._names.index(f"{joint}.{SHARPNESS}")], change)
         for name, value in p.items():
             full = here.parameter(name)
             if full in self._names:
@@ -160,6 +167,8 @@ class _LocalLaw:
             index = layout.memories.index(here.label)
             self._columns["memory"] = layout.memory.start + index
             self._memory_row = layout.n_link + layout.n_motor + index
+        own = f"{here.owner}.{SHARPNESS}"
+        self._sharpness = names.index(own) if own in names else None
         self._names = {name.rsplit(".", 1)[1]: k for k, name in enumerate(names) if name.startswith(here.parameter(""))}
 
     def add(
@@ -205,6 +214,10 @@ class _LocalLaw:
                 continue
             for row, sign in rows:
                 self._chain(terms, row, name, sign * slope, springs, j)
+        if self._sharpness is not None:
+            slope = np.imag(law(replace(signals, sharpness=signals.sharpness + 1j * STEP), p)) / STEP
+            for row, sign in rows:
+                terms.by_parameter[:, row, self._sharpness] += sign * slope
         for name, index in self._names.items():
             slope = np.imag(law(signals, {**p, name: p[name] + 1j * STEP})) / STEP
             for row, sign in rows:

@@ -29,7 +29,7 @@ class JointSignals:
         tau_spring: K (q_link - q_motor) + D (v_link - v_motor) of the base model; of a rigid joint the weight that it
             carries [N m].
         stiffness: K [N m/rad].
-        sharpness: k of the base model's friction law [s/rad], a real number.
+        sharpness: k of the base model's friction law [s/rad]; complex while a derivative by it is wanted.
         memory: the effect's own state, if its kind has one.
     """
 
@@ -39,7 +39,7 @@ class JointSignals:
     v_motor: Any
     tau_spring: Any
     stiffness: Any
-    sharpness: float = SHARPNESS
+    sharpness: Any = SHARPNESS
     memory: Any = 0.0
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from jointscope.robots.errors import EffectError
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 SIGNS = ("+", "+-")
 STEP = 1e-30
-SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring")
+SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "sharpness")
 
 
 def check_effect(effect: Effect, place: str) -> None:
@@ -112,8 +113,8 @@ def _check_complex(law: Callable[[JointSignals], np.ndarray], signals: JointSign
             )
 
 
-def _with(signals: JointSignals, parts: dict[str, np.ndarray]) -> JointSignals:
-    return JointSignals(**parts, stiffness=signals.stiffness, sharpness=signals.sharpness, memory=signals.memory)
+def _with(signals: JointSignals, parts: dict[str, Any]) -> JointSignals:
+    return JointSignals(**parts, stiffness=signals.stiffness, memory=signals.memory)
 
 
 def _sample_signals() -> JointSignals:
