@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 DYNAMICS = "dynamics"
 
 
-def bias_block(gyro: str) -> str:
-    """Name of the block with a gyro's bias."""
-    return f"{gyro}.bias"
+def bias_block(sensor: str) -> str:
+    """Name of the block with the bias of a gyro or accelerometer."""
+    return f"{sensor}.bias"
 
 
 def rotation_block(gyro: str) -> str:
@@ -37,7 +37,7 @@ class Calibration:
         names: names of the free dynamic parameters, shape (p,).
         positive: which of them are estimated as logarithms, shape (p,).
         dynamics: their coordinates: log(value) for positive ones, else the value, shape (p,).
-        biases: bias of each gyro, shape (3,) [rad/s].
+        biases: bias of each gyro and accelerometer, shape (3,) [rad/s], [m/s^2].
         rotations: R_imu_body of each gyro, shape (3, 3).
     """
 
@@ -57,7 +57,7 @@ class Calibration:
             names=tuple(p.name for p in free),
             positive=positive,
             dynamics=np.where(positive, np.log(np.where(positive, values, 1.0)), values),
-            biases={gyro.name: gyro.bias.copy() for gyro in robot.gyros},
+            biases={sensor.name: sensor.bias.copy() for sensor in robot.biased},
             rotations={gyro.name: gyro.R_imu_body.copy() for gyro in robot.gyros},
         )
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """GTSAM's view of a factor: one `gtsam.CustomFactor` per sample, on the same residual code as the batch solver.
 
-Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) and B(i) the bias of gyro i. States and
-biases of a second recording follow at a distance.
+Keys: X(k) the state at tick k, D(0) the dynamics, R(i) the rotation (a Rot3) of gyro i, B(i) the bias of sensor i:
+gyros, then accelerometers. States and biases of a second recording follow at a distance.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ def block_key(block: str, calibration: Calibration, bag: int = 0) -> int:
     for i, name in enumerate(calibration.rotations):
         if block == rotation_block(name):
             return gtsam.symbol("r", i)
+    for i, name in enumerate(calibration.biases):
         if block == bias_block(name):
             return gtsam.symbol("b", bag * GYROS_PER_BAG + i)
     raise KeyError(block)
@@ -56,6 +57,7 @@ def extract_calibration(
     for name in rotations:
         if rotation_block(name) in wanted:
             rotations[name] = values.atRot3(block_key(rotation_block(name), like)).matrix()
+    for name in biases:
         if bias_block(name) in wanted:
             biases[name] = values.atVector(block_key(bias_block(name), like, bag))
     return Calibration(like.names, like.positive, dynamics, biases, rotations)
