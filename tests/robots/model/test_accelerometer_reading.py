@@ -85,7 +85,11 @@ def test_a_robot_file_with_an_accelerometer_is_written_and_read_again(written):
         ("gyro: imu2", "gyro: imu9", "sensors.acc.gyro: expected the gyro of the same IMU (imu1, imu2), got 'imu9'"),
         ("unit: g", "unit: rad/s", "sensors.acc.unit: an accelerometer gives m/s^2 or g, got 'rad/s'"),
         ("    gravity: [0.0, 0.0, -9.81]\n", "", "add gravity: [0.0, 0.0, -9.81] to the sensor"),
-        ("acc.lever_y", "acc.lefer_y", "parameters: 'acc.lever_y' is missing, where acc sits on link3; write acc.lever_y"),
+        (
+            "acc.lever_y",
+            "acc.lefer_y",
+            "parameters: 'acc.lever_y' is missing, where acc sits on link3; write acc.lever_y",
+        ),
         ("positive: false", "positive: true", "parameters.acc.lever_x.positive: expected false"),
     ],
 )
