@@ -61,6 +61,18 @@ class Calibration:
             rotations={gyro.name: gyro.R_imu_body.copy() for gyro in robot.gyros},
         )
 
+    def carried_to(self, other: Calibration) -> Calibration:
+        """The values of another robot's calibration, with those that this one knows, too."""
+        known = dict(zip(self.names, self.dynamics.tolist(), strict=True))
+        pairs = zip(other.names, other.dynamics.tolist(), strict=True)
+        return Calibration(
+            other.names,
+            other.positive,
+            np.array([known.get(name, value) for name, value in pairs], dtype=float),
+            {name: self.biases.get(name, bias) for name, bias in other.biases.items()},
+            {name: self.rotations.get(name, R) for name, R in other.rotations.items()},
+        )
+
     @property
     def values(self) -> Array:
         """Values of the free dynamic parameters in their units, shape (p,)."""

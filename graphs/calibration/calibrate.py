@@ -107,7 +107,7 @@ def _calibrated(
         plain = plain if seen.accelerometers else problems
         first = [blunted(problem, sharpness) for problem in plain for sharpness in blunt] or plain
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
-        calibrations = [_with_accelerometers(c, Calibration.of(seen)) for c in calibrations]
+        calibrations = [c.carried_to(Calibration.of(seen)) for c in calibrations]
     else:
         calibrations = [replace(Calibration.of(robot), biases=c.biases) for c in near]
     problems = anchored(problems, calibrations)
@@ -156,22 +156,6 @@ def _with_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> tuple[R
     else:
         return known, []
     return known, [Notice("command", "info", 0, text)]
-
-
-def _with_accelerometers(found: Calibration, start: Calibration) -> Calibration:
-    """Values found without accelerometers as the start of a calibration with them.
-
-    An acceleration is a second difference of positions: far from the solution its rows only lead astray.
-    """
-    known = dict(zip(found.names, found.dynamics.tolist(), strict=True))
-    dynamics = [known.get(name, value) for name, value in zip(start.names, start.dynamics.tolist(), strict=True)]
-    return replace(
-        found,
-        names=start.names,
-        positive=start.positive,
-        dynamics=np.array(dynamics),
-        biases={**start.biases, **found.biases},
-    )
 
 
 def _windows_stage(
