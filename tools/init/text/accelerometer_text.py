@@ -44,9 +44,10 @@ def accelerometer_lines(gyro: GuessedGyro, gravity: Sequence[float]) -> list[str
         "    bias: {value: [0.0, 0.0, 0.0], prior_sigma: 0.5}",
     ]
     places = [f"  {name}.lever_{axis}: {{value: 0.0, unit: m, positive: false, prior_sigma: 0.1}}" for axis in AXES]
+    bare = [text.split("  #")[0].rstrip() for text in section]  # what is guessed in a comment is no guess yet
     return [
-        f"  # {signal.topic} has an accelerometer, too, which feels gravity in {unit}; to use it, take "  # " away:",
-        * (f"  #{text[1:].split('  #')[0].rstrip()}" for text in section),
+        f"  # {signal.topic} has an accelerometer, too, which feels gravity in {unit}; to use it, take '# ' away:",
+        *(f"  # {text[2:]}" for text in bare),
         "  # and write where it sits on its link under parameters:",
-        *(f"  #{text[1:]}" for text in places),
+        *(f"  # {text[2:]}" for text in places),
     ]
