@@ -19,7 +19,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, ro
 from jointscope.factors.factor import Linearization
 from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
-from jointscope.robots.bodies.body_accelerations import SpecificForce
+from jointscope.robots.bodies.body_accelerations import SpecificForce, specific_force
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.sensors import Accelerometer
 from jointscope.robots.parts.state_layout import StateLayout
@@ -81,4 +81,4 @@ class AccelerometerFactor(SensorFactor[Accelerometer]):
         values = {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
         lever = np.array([values[name] for name in self.sensor.lever])
         motion = x[:, self.layout.q_link], x[:, self.layout.v_link], x[:, self.layout.size :]
-        return self.tree.specific_force(self.body, lever, *motion, self.gravity)
+        return specific_force(self.tree, self.body, lever, *motion, self.gravity)

@@ -159,7 +159,8 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     if isinstance(sensor, LinkEncoder):
         return LinkEncoderFactor(sensor, values, robot.layout)
     if isinstance(sensor, Accelerometer):
-        seat = robot.kinematic_tree, robot.layout, robot.body_of(sensor), robot.gravity_at(sensor)
+        body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
+        seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
         return AccelerometerFactor(sensor, values, *seat, _values(robot))
     assert not isinstance(sensor, TorqueSensor)
     if isinstance(sensor, MotorEncoder):

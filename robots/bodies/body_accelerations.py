@@ -13,13 +13,14 @@ with R = Exp(-e q) R_i^T. Derivatives by positions, velocities and accelerations
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.body_rates import turned_back
+from jointscope.robots.bodies.rigid_tree import RigidTree
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,29 @@ class _Link:
     p_parent: Array
     turn: Array
     slide: Array
+
+
+def specific_force(
+    tree: RigidTree, body: str, lever: Array, q: Array, v: Array, a: Array, gravity: Array | None = None
+) -> SpecificForce:
+    """What an accelerometer on a body feels: the acceleration of its place less that of gravity.
+
+    Args:
+        tree: rigid bodies.
+        body: name of the link.
+        lever: p_body of the sensor, shape (3,) [m].
+        q: positions, shape (m, n) [rad].
+        v: velocities, shape (m, n) [rad/s].
+        a: accelerations, shape (m, n) [rad/s^2].
+        gravity: in the base frame, shape (3,) [m/s^2]; None for that of the tree.
+    """
+    frame, coupling, chain = tree.frame_id(body), tree.coupling, BodyAccelerations(tree.model)
+    g = tree.gravity if gravity is None else gravity
+    if coupling is None:
+        return chain.at(frame, lever, g, q, v, a)
+    found = chain.at(frame, lever, g, coupling.positions(q), coupling.rates(v), coupling.rates(a))
+    by_q, by_v, by_a = (J @ coupling.G for J in (found.by_q, found.by_v, found.by_a))
+    return replace(found, by_q=by_q, by_v=by_v, by_a=by_a)
 
 
 class BodyAccelerations:

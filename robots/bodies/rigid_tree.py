@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -16,7 +15,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.body_accelerations import BodyAccelerations, SpecificForce
 from jointscope.robots.bodies.body_rates import BodyRates
 from jointscope.robots.bodies.coupling import Coupling, with_new_joints
 from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
@@ -128,7 +126,6 @@ class RigidTree:
         self.coupling = Coupling.of(tuple(model.names)[1:], self.joints, self._bodies.followers)
         self.equations: Equations = equations_of(model, self.coupling)
         self._rates = BodyRates(model)
-        self._accelerations = BodyAccelerations(model)
 
     def with_coriolis(self, coriolis: bool) -> RigidTree:
         """The same tree with or without Coriolis and centrifugal terms."""
@@ -255,27 +252,6 @@ class RigidTree:
             return self._rates.rate(frame, q, v)
         omega, by_q, by_v = self._rates.rate(frame, coupling.positions(q), coupling.rates(v))
         return omega, by_q @ coupling.G, by_v @ coupling.G
-
-    def specific_force(
-        self, body: str, lever: Array, q: Array, v: Array, a: Array, gravity: Array | None = None
-    ) -> SpecificForce:
-        """What an accelerometer on a body feels: the acceleration of its place less that of gravity.
-
-        Args:
-            body: name of the link.
-            lever: p_body of the sensor, shape (3,) [m].
-            q: positions, shape (m, n) [rad].
-            v: velocities, shape (m, n) [rad/s].
-            a: accelerations, shape (m, n) [rad/s^2].
-            gravity: in the base frame, shape (3,) [m/s^2]; None for that of the tree.
-        """
-        frame, coupling = self.frame_id(body), self.coupling
-        g = self.gravity if gravity is None else gravity
-        if coupling is None:
-            return self._accelerations.at(frame, lever, g, q, v, a)
-        found = self._accelerations.at(frame, lever, g, coupling.positions(q), coupling.rates(v), coupling.rates(a))
-        by_q, by_v, by_a = (J @ coupling.G for J in (found.by_q, found.by_v, found.by_a))
-        return replace(found, by_q=by_q, by_v=by_v, by_a=by_a)
 
     def joint_rates(self, q: Array, v: Array, wanted: Collection[int] | None = None) -> dict[int, Array]:
         """Angular velocities behind joints of `model`, see `BodyRates.of_joints`, each of shape (m, 3) [rad/s]."""

@@ -79,7 +79,7 @@ class ReadingsAtOneState:
         return reading + offset, J
 
     def _force(self, seat: _Seat, x: Array) -> tuple[Array, Array]:
-        """As `RigidTree.specific_force`, by pinocchio's frame accelerations, which are faster for one state."""
+        """As `specific_force` of many, by pinocchio's frame accelerations, which are faster for one state."""
         layout, coupling, local = self._layout, self._coupling, pin.ReferenceFrame.LOCAL
         q, v, a = x[layout.q_link], x[layout.v_link], x[layout.size :]
         if coupling is not None:
@@ -134,7 +134,7 @@ class _Seat:
     @staticmethod
     def of(robot: Robot, sensor: Accelerometer) -> _Seat:
         gyro = next(gyro for gyro in robot.gyros if gyro.name == sensor.gyro)
-        place = robot.lever_of(sensor), gyro.R_imu_body
+        place = sensor.place(robot.parameters), gyro.R_imu_body
         return _Seat(robot.kinematic_tree.frame_id(gyro.body), *place, robot.gravity_at(sensor))
 
 

@@ -164,17 +164,9 @@ class Robot:
         sensors = {name: sensor for name, sensor in self.sensors.items() if name not in gone}
         return replace(self, sensors=sensors, parameters=parameters)
 
-    def body_of(self, accelerometer: Accelerometer) -> str:
-        """Link that carries the IMU of an accelerometer."""
-        return next(gyro.body for gyro in self.gyros if gyro.name == accelerometer.gyro)
-
     def gravity_at(self, accelerometer: Accelerometer) -> Array:
         """Gravity as an accelerometer feels it, in the base frame, shape (3,) [m/s^2]."""
         return self.tree.gravity if accelerometer.gravity is None else accelerometer.gravity
-
-    def lever_of(self, accelerometer: Accelerometer) -> Array:
-        """Where an accelerometer sits on its body, p_body, shape (3,) [m]."""
-        return np.array([self.parameters[name].value for name in accelerometer.lever])
 
     @property
     def channels(self) -> tuple[str, ...]:

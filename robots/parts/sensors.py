@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.units import si_factor, si_unit
 
 AXES = ("x", "y", "z")
@@ -259,6 +261,10 @@ class Accelerometer:
     def lever(self) -> tuple[str, ...]:
         """Names of the parameters with its place on the body."""
         return tuple(f"{self.name}.lever_{axis}" for axis in AXES)
+
+    def place(self, parameters: Mapping[str, Parameter]) -> NDArray[np.float64]:
+        """Where it sits on its body, p_body, shape (3,) [m]."""
+        return np.array([parameters[name].value for name in self.lever])
 
 
 Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro | Accelerometer

@@ -65,7 +65,7 @@ def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
         _add_site(spec, robot, gyro.name, gyro.body)
     bodies = {gyro.name: gyro.body for gyro in robot.gyros}
     for sensor in robot.accelerometers:
-        _add_site(spec, robot, sensor.name, bodies[sensor.gyro], robot.lever_of(sensor))
+        _add_site(spec, robot, sensor.name, bodies[sensor.gyro], sensor.place(robot.parameters))
         spec.add_sensor(
             name=sensor.name,
             type=mujoco.mjtSensor.mjSENS_ACCELEROMETER,
