@@ -67,8 +67,8 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     notices += check_accelerometers(recording, robot)
     for name in robot.sensors:
         _check_changes(recording, recording.streams[name], robot)
-    for sensor in robot.biased:
-        _check_frozen(recording.streams[sensor.name])
+    for biased in robot.biased:
+        _check_frozen(recording.streams[biased.name])
     notices += _check_limits(motion, robot)
     notices += _check_motion(recording, robot, every_joint)
     odd = check_gyros(recording, robot, motion)
