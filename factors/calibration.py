@@ -22,9 +22,9 @@ DYNAMICS = "dynamics"
 BIAS, ROTATION = ".bias", ".rotation"
 
 
-def bias_block(gyro: str) -> str:
-    """Name of the block with a gyro's bias."""
-    return f"{gyro}{BIAS}"
+def bias_block(sensor: str) -> str:
+    """Name of the block with the bias of a gyro or accelerometer."""
+    return f"{sensor}{BIAS}"
 
 
 def rotation_block(gyro: str) -> str:
@@ -58,8 +58,8 @@ class Calibration:
         blocks = [(Block(DYNAMICS, VECTOR, "robot", len(free), "d"), coordinates)]
         for i, gyro in enumerate(robot.gyros):
             blocks.append((Block(rotation_block(gyro.name), ROT3, "robot", 3, "r", i), gyro.R_imu_body.copy()))
-        for i, gyro in enumerate(robot.gyros):
-            blocks.append((Block(bias_block(gyro.name), VECTOR, "recording", 3, "b", i), gyro.bias.copy()))
+        for i, sensor in enumerate(robot.biased):
+            blocks.append((Block(bias_block(sensor.name), VECTOR, "recording", 3, "b", i), sensor.bias.copy()))
         layout, points = {b.name: b for b, _ in blocks}, {b.name: value for b, value in blocks}
         return Calibration(tuple(p.name for p in free), positive, layout, points)
 
@@ -74,13 +74,21 @@ class Calibration:
 
     @cached_property
     def biases(self) -> dict[str, Array]:
-        """Bias of each gyro, shape (3,) [rad/s]."""
+        """Bias of each gyro and accelerometer, shape (3,) [rad/s], [m/s^2]."""
         return {name.removesuffix(BIAS): value for name, value in self.points.items() if name.endswith(BIAS)}
 
     @cached_property
     def rotations(self) -> dict[str, Array]:
         """R_imu_body of each gyro, shape (3, 3)."""
         return {name.removesuffix(ROTATION): R for name, R in self.points.items() if name.endswith(ROTATION)}
+
+    def carried_to(self, other: Calibration) -> Calibration:
+        """The values of another robot's calibration, with those that this one knows, too."""
+        known = dict(zip(self.names, self.dynamics.tolist(), strict=True))
+        pairs = zip(other.names, other.dynamics.tolist(), strict=True)
+        dynamics = np.array([known.get(name, value) for name, value in pairs], dtype=float)
+        shared = {name: value for name, value in self.points.items() if name in other.layout}
+        return other.with_points({**shared, DYNAMICS: dynamics})
 
     @property
     def values(self) -> Array:

@@ -82,14 +82,30 @@ class InterpolatedFactor:
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
         fraction, _ = self._fraction(calibration)
-        return self.inner.residual((interpolate(self.layout, x[0], x[1], fraction, self.h),), calibration)
+        return self.inner.residual((self.between(x[0], x[1], fraction),), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives by both states, and by what makes the stamps late."""
         fraction, slopes = self._fraction(calibration)
-        inner = self.inner.linearize((interpolate(self.layout, x[0], x[1], fraction, self.h),), calibration)
-        J, s = inner.by_state[0], fraction[:, None, None]
-        J0, J1 = np.empty_like(J), np.empty_like(J)
+        inner = self.inner.linearize((self.between(x[0], x[1], fraction),), calibration)
+        J = inner.by_state[0]
+        by_block = dict(inner.by_block)
+        if slopes:
+            rate = (J @ self.motion(x[0], x[1], fraction)[:, :, None])[:, :, 0]
+            by_block[DYNAMICS] = self._by_lateness(rate, slopes, by_block, calibration)
+        return Linearization(inner.residual, self.by_ends(J, fraction), by_block)
+
+    def between(self, x0: Array, x1: Array, fraction: Array) -> Array:
+        """What the factor of the sensor takes as its state, shape (m, d)."""
+        return interpolate(self.layout, x0, x1, fraction, self.h)
+
+    def motion(self, x0: Array, x1: Array, fraction: Array) -> Array:
+        """Time derivative of `between`."""
+        return rate_between(self.layout, x0, x1, fraction, self.h)
+
+    def by_ends(self, J: Array, fraction: Array) -> tuple[Array, Array]:
+        """Derivatives by both ends of something with derivative J by the state between them, shape (m, r, d)."""
+        J0, J1, s = np.empty_like(J), np.empty_like(J), fraction[:, None, None]
         position, velocity = ([w[:, None, None] for w in part] for part in weights_between(fraction, self.h))
         q, v, z = self.layout.positions, self.layout.velocities, self.layout.memory
         J0[:, :, q] = position[0] * J[:, :, q] + velocity[0] * J[:, :, v]
@@ -97,11 +113,7 @@ class InterpolatedFactor:
         J1[:, :, q] = position[2] * J[:, :, q] + velocity[2] * J[:, :, v]
         J1[:, :, v] = position[3] * J[:, :, q] + velocity[3] * J[:, :, v]
         J0[:, :, z], J1[:, :, z] = (1.0 - s) * J[:, :, z], s * J[:, :, z]
-        by_block = dict(inner.by_block)
-        if slopes:
-            motion = rate_between(self.layout, x[0], x[1], fraction, self.h)
-            by_block[DYNAMICS] = self._by_lateness((J @ motion[:, :, None])[:, :, 0], slopes, by_block, calibration)
-        return Linearization(inner.residual, (J0, J1), by_block)
+        return J0, J1
 
     def _by_lateness(
         self, rate: Array, slopes: dict[str, Array], by_block: dict[str, Array], calibration: Calibration

@@ -18,7 +18,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, ro
 from jointscope.factors.factor import Factor, Linearization, Samples
 from jointscope.factors.gyro import skew
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import AXES, Gyro
+from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
@@ -83,13 +83,13 @@ class DynamicsPrior(_Prior):
 
 @dataclass(frozen=True)
 class BiasPrior(_Prior):
-    """Prior on a gyro's bias.
+    """Prior on the bias of a gyro or accelerometer.
 
     Attributes:
-        sensor: the gyro with the prior's mean and sigma.
+        sensor: the sensor with the prior's mean and sigma.
     """
 
-    sensor: Gyro
+    sensor: Gyro | Accelerometer
 
     @property
     def name(self) -> str:

@@ -19,6 +19,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "V": ("V", 1.0),
     "A": ("A", 1.0),
     "N m": ("N m", 1.0),
+    "m/s^2": ("m/s^2", 1.0),
+    "g": ("m/s^2", 9.80665),
 }
 """Unit in a bag: its SI unit and the factor that turns a value into it."""
 

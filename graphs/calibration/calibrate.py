@@ -113,8 +113,11 @@ def _calibrated(
     history = History()
     if near is None:
         blunt = blunt_sharpness(seen, recordings)[:1]
-        first = [blunted(problem, sharpness) for problem in problems for sharpness in blunt] or problems
+        plain = [problem.of_robot(problem.robot.without_accelerometers()) for problem in problems]
+        plain = plain if seen.accelerometers else problems
+        first = [blunted(problem, sharpness) for problem in plain for sharpness in blunt] or plain
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
+        calibrations = [c.carried_to(Calibration.of(seen)) for c in calibrations]
     else:
         calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)

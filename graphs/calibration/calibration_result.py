@@ -232,4 +232,7 @@ class CalibrationResult:
                 "sigma": R_sigma,
                 "unit": "1; sigma about the axes of the body [rad]",
             }
+        for sensor in self.robot.accelerometers:
+            sigma = None if sensor.bias_sigma is None else sensor.bias_sigma.tolist()
+            found[f"{sensor.name}.bias"] = {"value": sensor.bias.tolist(), "sigma": sigma, "unit": "m/s^2"}
         return found

@@ -31,7 +31,7 @@ from jointscope.graphs.solving.posterior import StatePosterior, posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import AXES, Gyro, LinkEncoder, MotorEncoder, Sensor
+from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
 
 Array = NDArray[np.float64]
@@ -223,14 +223,14 @@ def _parameters(
             name = f"{gyro.name}.R_imu_body.{axis}"
             row = (float(angle[j]), sigma, "rad", float(before[j]), 0.0, gyro.R_prior_sigma, None, note)
             found.append(ParameterEstimate(name, *row))
-    for gyro in robot.gyros:
-        start = shared.places[0][bias_block(gyro.name)].start
+    for biased in robot.biased:
+        start = shared.places[0][bias_block(biased.name)].start
         for j, axis in enumerate(AXES):
             sigma = float(sigmas[start + j])
-            note = "held by its prior" if sigma > HELD_BY_PRIOR * gyro.bias_prior_sigma else ""
-            value, before_bias = float(calibration.biases[gyro.name][j]), float(gyro.bias[j])
-            row = (value, sigma, "rad/s", before_bias, before_bias, gyro.bias_prior_sigma, None, note)
-            found.append(ParameterEstimate(f"{gyro.name}.bias.{axis}", *row))
+            note = "held by its prior" if sigma > HELD_BY_PRIOR * biased.bias_prior_sigma else ""
+            value, before_bias = float(calibration.biases[biased.name][j]), float(biased.bias[j])
+            row = (value, sigma, biased.units[j], before_bias, before_bias, biased.bias_prior_sigma, None, note)
+            found.append(ParameterEstimate(f"{biased.name}.bias.{axis}", *row))
     return tuple(found)
 
 
@@ -251,6 +251,9 @@ def _calibrated(
     for name, sensor in robot.sensors.items():
         if isinstance(sensor, Gyro):
             sensors[name] = _calibrated_gyro(sensor, calibration, table)
+        elif isinstance(sensor, Accelerometer):
+            bias_sigma = np.array([table[f"{name}.bias.{axis}"].sigma for axis in AXES])
+            sensors[name] = replace(sensor, bias=calibration.biases[name], bias_sigma=bias_sigma)
         elif isinstance(sensor, MotorEncoder | LinkEncoder):
             used = solved.robot.sensors[name]
             sensors[name] = replace(sensor, sigmas=used.sigmas)

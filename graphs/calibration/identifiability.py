@@ -43,9 +43,10 @@ def weak_directions(
         columns = shared.columns[rotation_block(gyro.name)]
         names = [f"{gyro.name}.R_imu_body.{axis}" for axis in AXES]
         found += _weak_block(names, covariance[columns, columns], gyro.R_prior_sigma, gyro.body, "rad")
-        columns = shared.columns[bias_block(gyro.name)]
-        names = [f"{gyro.name}.bias.{axis}" for axis in AXES]
-        found += _weak_block(names, covariance[columns, columns], gyro.bias_prior_sigma, "", "rad/s")
+    for sensor in robot.biased:
+        columns = shared.columns[bias_block(sensor.name)]
+        names = [f"{sensor.name}.bias.{axis}" for axis in AXES]
+        found += _weak_block(names, covariance[columns, columns], sensor.bias_prior_sigma, "", sensor.units[0])
     return tuple(found)
 
 

@@ -167,7 +167,17 @@ def approach(
     """One step over all samples with noise that is loose enough for states straight from the measurements.
 
     Where that one step leads away, as it may under a model that lacks much, several checked ones are taken.
+    Accelerometers wait: an acceleration is a second difference of positions, and far from the solution its rows lead
+    astray.
     """
+    plain = problems[0].robot.without_accelerometers()
+    if plain is not problems[0].robot:
+        without = [p.of_robot(p.robot.without_accelerometers()) for p in problems]
+        known = [c.carried_to(Calibration.of(plain)) for c in calibrations]
+        near = approach(without, noise, known, hold)
+        return Estimate(
+            near.states, tuple(c.carried_to(full) for c, full in zip(near.calibrations, calibrations, strict=True))
+        )
     states = [initial_states(p, c) for p, c in zip(problems, calibrations, strict=True)]
     loose = not_below(noise, APPROACH * LOOSE)
     now = [p.with_noise(loose) for p in problems]

@@ -122,10 +122,11 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     """Smoothed states and biases of a recording under a model whose parameters stay as they are.
 
     All three components of every gyro are predicted from the state, also where the robot calibrates with the forms of
-    the paper. A robot that was never calibrated gets process noise from the recording.
+    the paper. A robot that was never calibrated gets process noise from the recording. Accelerometers are not asked:
+    what is compared are predictions of states.
     """
     check_recordings(robot, [recording], every_joint=False)
-    robot = with_known_drive_signal(robot, [recording])
+    robot = with_known_drive_signal(robot, [recording]).without_accelerometers()
     robot = robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})
     sigmas = [parameter.sigma for parameter in robot.parameters.values()]
     calibrated = "calibration" in robot.document or any(sigma is not None for sigma in sigmas)

@@ -25,6 +25,7 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Sensor
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -141,11 +142,14 @@ def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[
 def _with(robot: Robot, calibration: Calibration) -> Robot:
     """The robot with the values of a calibration."""
     values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
-    gyros = {
+    sensors: dict[str, Sensor] = {
+        sensor.name: replace(sensor, bias=calibration.biases[sensor.name]) for sensor in robot.accelerometers
+    }
+    sensors |= {
         gyro.name: replace(gyro, R_imu_body=calibration.rotations[gyro.name], bias=calibration.biases[gyro.name])
         for gyro in robot.gyros
     }
-    return robot.with_values(values).with_sensors(gyros)
+    return robot.with_values(values).with_sensors(sensors)
 
 
 def _biases(base: BaseModel, spans: Sequence[Span], found: Sequence[Calibration]) -> tuple[Calibration, ...]:

@@ -27,7 +27,8 @@ class EstimatedState:
         mean: in the robot's layout: q_link, v_link, q_motor, v_motor, memories, shape (d,).
         covariance: shape (d, d).
         age: time since the newest sample that went in [s]; infinite before the first.
-        biases, bias_sigmas: offset of each gyro and its standard deviations, shape (3,) [rad/s].
+        biases, bias_sigmas: offset of each gyro and accelerometer and its standard deviations, shape (3,) [rad/s],
+            [m/s^2].
         parameters: value and standard deviation of each adapted parameter, by full name.
         layout: of the state.
     """
@@ -97,7 +98,7 @@ def unknown_state(robot: Robot, adapted: Sequence[str], time: float, q: Array | 
         covariance=np.diag(np.full(layout.size, np.inf)),
         age=age,
         layout=layout,
-        biases={gyro.name: gyro.bias.copy() for gyro in robot.gyros},
-        bias_sigmas={gyro.name: np.full(3, gyro.bias_prior_sigma) for gyro in robot.gyros},
+        biases={sensor.name: sensor.bias.copy() for sensor in robot.biased},
+        bias_sigmas={sensor.name: np.full(3, sensor.bias_prior_sigma) for sensor in robot.biased},
         parameters={name: (robot.parameters[name].value, s) for name, s in zip(adapted, sigmas, strict=True)},
     )

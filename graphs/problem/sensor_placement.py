@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.accelerated import AcceleratedFactor
+from jointscope.factors.accelerometer import AccelerometerFactor
 from jointscope.factors.distorted import DistortedFactor
 from jointscope.factors.factor import Factor
 from jointscope.factors.gyro import GyroFactor
@@ -23,7 +25,7 @@ from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
@@ -67,7 +69,8 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
         step, fraction = timeline.locate(taken[inside])
         inner = _some(_sensor_factor(robot, recording, name, stream, inside), channels, robot.sensors[name])
         here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
-        factor = InterpolatedFactor(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
+        kind = AcceleratedFactor if isinstance(robot.sensors[name], Accelerometer) else InterpolatedFactor
+        factor = kind(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
         placed.append(Placed(factor, step, stream.times[inside]))
     return placed
 
@@ -78,6 +81,8 @@ def _place_on_time(
     """Channels with right stamps."""
     sensor = robot.sensors[name]
     stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
+    if isinstance(sensor, Accelerometer):
+        return [_place_accelerometer(robot, recording, timeline, name, stream)]
     step, fraction = timeline.locate(stream.times)
     h = timeline.h[step]
     nearest = step + (fraction > 0.5)
@@ -93,6 +98,15 @@ def _place_on_time(
         factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
         placed.append(Placed(factor, step[between], stream.times[between]))
     return placed
+
+
+def _place_accelerometer(robot: Robot, recording: Recording, timeline: Timeline, name: str, stream: Stream) -> Placed:
+    """A sample at a tick belongs to the step before it, whose command has acted until then."""
+    ticks = timeline.ticks
+    step = np.clip(np.searchsorted(ticks, stream.times, side="left") - 1, 0, len(ticks) - 2)
+    h = timeline.h[step]
+    inner = _sensor_factor(robot, recording, name, stream, np.ones(len(stream), bool))
+    return Placed(AcceleratedFactor(inner, (stream.times - ticks[step]) / h, h, robot.layout), step, stream.times)
 
 
 def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:
@@ -117,9 +131,9 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
     if isinstance(sensor, MotorEncoder | LinkEncoder):
         factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)
         return factor if shared is None else RescaledFactor(factor, shared[chosen])
-    assert isinstance(sensor, Gyro)
-    if sensor.form == "full":
+    if isinstance(sensor, Accelerometer) or (isinstance(sensor, Gyro) and sensor.form == "full"):
         return factor_on_state(robot, name, values, times)
+    assert isinstance(sensor, Gyro)
     if sensor.form == "vertical":
         return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)
     reference = robot.sensors[str(sensor.reference)]
@@ -132,6 +146,8 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
 def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Factor:
     """A sensor with all its channels predicted from the state, whatever form its file chooses.
 
+    An accelerometer is predicted from the state with the accelerations of the links behind it.
+
     Args:
         robot: the model.
         name: name of the sensor.
@@ -142,6 +158,10 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     inner: GyroFactor | MotorEncoderFactor
     if isinstance(sensor, LinkEncoder):
         return LinkEncoderFactor(sensor, values, robot.layout)
+    if isinstance(sensor, Accelerometer):
+        body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
+        seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
+        return AccelerometerFactor(sensor, values, *seat, _values(robot))
     assert not isinstance(sensor, TorqueSensor)
     if isinstance(sensor, MotorEncoder):
         inner = MotorEncoderFactor(sensor, values, robot.layout)

@@ -29,7 +29,6 @@ from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.normal_equations import Linearized, accumulate, add_at, linearize_all, whitened
 from jointscope.robots.model.robot import ProcessNoise
-from jointscope.robots.parts.sensors import Gyro
 
 Array = NDArray[np.float64]
 Whitened = tuple[Array, tuple[Array, ...], dict[str, Array]]
@@ -208,7 +207,8 @@ def _sensor_part(
     channels = np.array([sensor.channels.index(row) for row in factor.rows], dtype=np.intp)
     stream = segment.problem.recording.streams[factor.name]
     measured = stream.values[np.searchsorted(stream.times, stamps)][:, channels]
-    offset = segment.calibration.biases[factor.name] if isinstance(sensor, Gyro) else getattr(sensor, "zero", 0.0)
+    biases = segment.calibration.biases
+    offset = biases[factor.name] if factor.name in biases else getattr(sensor, "zero", 0.0)
     motion = sum((J @ rate[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
     reading = linear.residual + measured - np.asarray(offset)[channels]
     return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion))

@@ -58,7 +58,7 @@ class BodyRates:
         # columns: omega, derivatives by q, derivatives by v
         columns = np.zeros((m, 3, 1 + 2 * n))
         for link in links:
-            R = _rotation(link.axis, q[:, link.column]) @ link.R_parent_joint.T
+            R = turned_back(link.axis, q[:, link.column]) @ link.R_parent_joint.T
             columns = R @ columns
             columns[:, :, 1 + link.column] = -np.cross(link.axis, columns[:, :, 0])
             columns[:, :, 1 + n + link.column] = link.axis
@@ -87,7 +87,7 @@ class BodyRates:
             if joint not in self._links:
                 self._links[joint] = self._link(joint)
             link = self._links[joint]
-            R = _rotation(link.axis, q[:, link.column]) @ link.R_parent_joint.T
+            R = turned_back(link.axis, q[:, link.column]) @ link.R_parent_joint.T
             rates[joint] = (R @ rates[parents[joint]][:, :, None])[:, :, 0] + link.axis * v[:, link.column, None]
         return rates
 
@@ -113,7 +113,7 @@ class BodyRates:
         return _Link(model.idx_q, self._model.jointPlacements[joint].rotation.copy(), np.array(axis))
 
 
-def _rotation(axis: Array, angle: Array) -> Array:
+def turned_back(axis: Array, angle: Array) -> Array:
     """Exp(-axis angle), shape (m, 3, 3); identity for a zero axis."""
     x, y, z = axis
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -32,6 +32,7 @@ def check_robot(robot: Robot) -> None:
             raise RobotError(
                 f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
             )
+    _check_accelerometers(robot, place)
     _check_names(robot, place)
     _check_stamps(robot, place)
     _check_positions(robot, place)
@@ -43,6 +44,34 @@ def check_robot(robot: Robot) -> None:
     _check_links(robot, place)
     _check_springs(robot, place)
     _check_parameters(robot, place)
+
+
+def _check_accelerometers(robot: Robot, place: str) -> None:
+    """An accelerometer has the gyro of its IMU and a place on the body; only equations of motion make use of it."""
+    gyros = {gyro.name: gyro for gyro in robot.gyros}
+    for sensor in robot.accelerometers:
+        where = f"{place}: sensors.{sensor.name}"
+        if robot.free_links:
+            raise RobotError(f"{where}: accelerometer needs link_dynamics: model; remove the sensor, or give masses")
+        if sensor.gyro not in gyros:
+            known = ", ".join(gyros) or "there is none"
+            raise RobotError(f"{where}.gyro: expected the gyro of the same IMU ({known}), got {sensor.gyro!r}")
+        if bool(sensor.source.scale) != gyros[sensor.gyro].left_handed:
+            raise RobotError(f"{where}.left_handed: expected the same as of {sensor.gyro}; both are axes of one IMU")
+        if not robot.gravity_at(sensor).any() and sensor.gravity is None:
+            raise RobotError(
+                f"{where}.gravity: the robot's own is zero, as where springs carry the weight, and an accelerometer "
+                "feels it all the same; add gravity: [0.0, 0.0, -9.81] to the sensor"
+            )
+        for name in sensor.lever:
+            if name not in robot.parameters:
+                raise RobotError(
+                    f"{place}: parameters: '{name}' is missing, where {sensor.name} sits on "
+                    f"{gyros[sensor.gyro].body}; write {name}: {{value: 0.0, unit: m, positive: false, "
+                    "prior_sigma: 0.1}"
+                )
+            if robot.parameters[name].positive:
+                raise RobotError(f"{place}: parameters.{name}.positive: expected false, a place has any sign")
 
 
 def _check_links(robot: Robot, place: str) -> None:
@@ -158,6 +187,7 @@ def _check_parameters(robot: Robot, place: str) -> None:
         here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_at(robot, here.owner)
     }
     units |= of_effects
+    units |= {name: "m" for sensor in robot.accelerometers for name in sensor.lever}
     for name, parameter in robot.parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")

@@ -43,6 +43,11 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
             _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)
+    for sensor in robot.accelerometers:
+        bias = document["sensors"][sensor.name].setdefault("bias", _flow({}))
+        bias["value"] = _row(sensor.bias)
+        if sensor.bias_sigma is not None:
+            bias["sigma"] = _row(sensor.bias_sigma, 3)
     for gyro in robot.gyros:
         entry = document["sensors"][gyro.name]
         bias = entry.setdefault("bias", _flow({}))

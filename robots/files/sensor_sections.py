@@ -13,6 +13,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.parts.sensors import (
     BY_MESSAGE,
     RIGHT_FROM_LEFT,
+    Accelerometer,
     Gyro,
     LinkEncoder,
     MotorEncoder,
@@ -26,7 +27,7 @@ from jointscope.robots.yaml_section import Section
 Array = NDArray[np.float64]
 
 GYRO_FORMS = ("full", "vertical", "relative")
-KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro")
+KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro", "accelerometer")
 UNKNOWN = "unknown"
 
 
@@ -89,6 +90,8 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
         kind = section.text("kind", choices=KINDS)
         if kind == "gyro":
             return _gyro(name, section)
+        if kind == "accelerometer":
+            return _accelerometer(name, section)
         if kind == "joint_torque":
             return _torque_sensor(name, section, joints)
         return (_motor_encoder if kind == "motor_encoder" else _link_encoder)(name, section, joints)
@@ -160,6 +163,27 @@ def _gyro(name: str, section: Section) -> Gyro:
     bias.finish()
     rotation.finish()
     return gyro
+
+
+def _accelerometer(name: str, section: Section) -> Accelerometer:
+    source = topic(section)
+    if si_unit(source.unit) != "m/s^2":
+        raise RobotError(f"{section.place}.unit: an accelerometer gives m/s^2 or g, got {source.unit!r}")
+    if section.flag("left_handed", False):
+        source = replace(source, scale=RIGHT_FROM_LEFT)
+    bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
+    found = Accelerometer(
+        name=name,
+        source=source,
+        gyro=section.text("gyro"),
+        sigma=section.number("sigma", positive=True),
+        bias=bias.array("value", (3,)),
+        bias_prior_sigma=bias.number("prior_sigma", 0.5, positive=True),
+        bias_sigma=bias.array("sigma", (3,), None),
+        gravity=section.array("gravity", (3,), None),
+    )
+    bias.finish()
+    return found
 
 
 def _rotation(R: Array, place: str) -> Array:

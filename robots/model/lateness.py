@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import MotorEncoder
+from jointscope.robots.parts.sensors import Accelerometer, MotorEncoder
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,10 @@ def shifts(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
     """Whether an effect makes a channel late."""
     if not isinstance(here.effect, TimeShift):
         return False
-    encoder = isinstance(robot.sensors[name], MotorEncoder)
+    sensor = robot.sensors[name]
+    encoder = isinstance(sensor, MotorEncoder)
+    if isinstance(sensor, Accelerometer) and here.effect.sensors == "all" and here.owner == sensor.gyro:
+        return sensor.source.topic == robot.sensors[sensor.gyro].source.topic  # one message, one stamp
     if here.owner == "robot":
         return here.effect.sensors == "all" or (here.effect.sensors == "encoder") == encoder
     return (encoder and robot.joints[channel] == here.owner) or here.owner == name

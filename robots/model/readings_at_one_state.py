@@ -3,6 +3,7 @@
 
     encoder  q_motor + zero + errors of effects, or q_link + zero
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
+    accelerometer  R_imu_body f_body(q_link, v_link, a_link), to which a bias is added
 
 A test holds it against the factors.
 """
@@ -10,6 +11,7 @@ A test holds it against the factors.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Gyro, MotorEncoder, Sensor
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 STEP = 1e-30  # [unit of the signal] of complex derivatives
@@ -35,6 +37,8 @@ class ReadingsAtOneState:
         self._model, self._data = tree.model, tree.model.createData()
         self._zeros, self._coupling = np.zeros(tree.model.nv), tree.coupling
         self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
+        self._accelerometers = {sensor.name: _Seat.of(robot, sensor) for sensor in robot.accelerometers}
+        self._moving = tree.model.createData()  # with accelerations
         encoder = robot.motor_encoder
         self._encoder = np.zeros((robot.n, robot.layout.size))
         self._encoder[np.arange(robot.n), robot.layout.motor_q] = 1.0
@@ -46,17 +50,23 @@ class ReadingsAtOneState:
         self._errors = {name: _errors_of(robot, sensor, values) for name, sensor in robot.sensors.items()}
         self._at: Array | None = None
 
+    def feels_acceleration(self, name: str) -> bool:
+        """Whether a sensor's reading needs the accelerations of the links behind the state."""
+        return name in self._accelerometers
+
     def read(self, name: str, x: Array, time: float) -> tuple[Array, Array]:
         """Reading of a sensor without its bias, and its derivative by the state.
 
         Args:
             name: of the sensor.
-            x: state, shape (d,).
+            x: state, shape (d,); for an accelerometer with the link accelerations behind it, (d + n_link,).
             time: stamp of the sample [s].
 
         Returns:
-            Shapes (c,) and (c, d).
+            Shapes (c,) and (c, d), or (c, d + n_link).
         """
+        if name in self._accelerometers:
+            return self._force(self._accelerometers[name], x)
         if name in self._gyros:
             reading, J = self._rate(name, x)
             offset: Array | float = 0.0
@@ -67,6 +77,30 @@ class ReadingsAtOneState:
         for here, channels, p in self._errors[name]:
             reading, J = _disturbed(here, channels, p, reading, J, time)
         return reading + offset, J
+
+    def _force(self, seat: _Seat, x: Array) -> tuple[Array, Array]:
+        """As `specific_force` of many, by pinocchio's frame accelerations, which are faster for one state."""
+        layout, coupling, local = self._layout, self._coupling, pin.ReferenceFrame.LOCAL
+        q, v, a = x[layout.q_link], x[layout.v_link], x[layout.size :]
+        if coupling is not None:
+            q, v, a = coupling.positions(q), coupling.rates(v), coupling.rates(a)
+        model, data, frame, p = self._model, self._moving, seat.frame, seat.lever
+        pin.computeForwardKinematicsDerivatives(model, data, q, v, a)
+        g = pin.updateFramePlacement(model, data, frame).rotation.T @ seat.gravity
+        rate = pin.getFrameVelocity(model, data, frame, local)
+        moved = pin.getFrameAcceleration(model, data, frame, local)
+        rate_by_q, by_q, by_v, by_a = pin.getFrameAccelerationDerivatives(model, data, frame, local)
+        W, P, V = pin.skew(rate.angular), pin.skew(p), pin.skew(rate.linear)
+        f = moved.linear + W @ rate.linear + pin.skew(moved.angular) @ p + W @ W @ p - g
+        by_rate = -V - W @ P - pin.skew(W @ p)  # of the terms with omega
+        f_by_q = by_q[:3] - P @ by_q[3:] + by_rate @ rate_by_q[3:] + W @ rate_by_q[:3] - pin.skew(g) @ by_a[3:]
+        f_by_v = by_v[:3] - P @ by_v[3:] + by_rate @ by_a[3:] + W @ by_a[:3]
+        parts = [seat.R_imu_body @ part for part in (f_by_q, f_by_v, by_a[:3] - P @ by_a[3:])]
+        if coupling is not None:
+            parts = [part @ coupling.G for part in parts]
+        J = np.zeros((3, len(x)))
+        J[:, layout.q_link], J[:, layout.v_link], J[:, layout.size :] = parts
+        return seat.R_imu_body @ f, J
 
     def _rate(self, name: str, x: Array) -> tuple[Array, Array]:
         layout, coupling = self._layout, self._coupling
@@ -86,6 +120,22 @@ class ReadingsAtOneState:
             by_q, by_v = by_q @ coupling.G, by_v @ coupling.G
         J[:, layout.q_link], J[:, layout.v_link] = by_q, by_v
         return R @ omega_body, J
+
+
+@dataclass(frozen=True)
+class _Seat:
+    """Where an accelerometer sits, how it is turned, and the gravity that it feels."""
+
+    frame: int
+    lever: Array
+    R_imu_body: Array
+    gravity: Array
+
+    @staticmethod
+    def of(robot: Robot, sensor: Accelerometer) -> _Seat:
+        gyro = next(gyro for gyro in robot.gyros if gyro.name == sensor.gyro)
+        place = sensor.place(robot.parameters), gyro.R_imu_body
+        return _Seat(robot.kinematic_tree.frame_id(gyro.body), *place, robot.gravity_at(sensor))
 
 
 def _errors_of(

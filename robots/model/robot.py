@@ -25,7 +25,7 @@ from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_controller import PositionController
-from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.units import joined, of_slide
 
@@ -143,6 +143,30 @@ class Robot:
     def gyros(self) -> tuple[Gyro, ...]:
         """All gyroscopes."""
         return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, Gyro))
+
+    @property
+    def accelerometers(self) -> tuple[Accelerometer, ...]:
+        """All accelerometers."""
+        return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, Accelerometer))
+
+    @property
+    def biased(self) -> tuple[Gyro | Accelerometer, ...]:
+        """The sensors whose offset is another one in each recording: gyros first."""
+        return (*self.gyros, *self.accelerometers)
+
+    def without_accelerometers(self) -> Robot:
+        """The robot for what does not ask its accelerometers; their places stay as they are."""
+        if not self.accelerometers:
+            return self
+        gone = {sensor.name for sensor in self.accelerometers}
+        places = {name for sensor in self.accelerometers for name in sensor.lever}
+        parameters = {n: replace(p, fixed=True) if n in places else p for n, p in self.parameters.items()}
+        sensors = {name: sensor for name, sensor in self.sensors.items() if name not in gone}
+        return replace(self, sensors=sensors, parameters=parameters)
+
+    def gravity_at(self, accelerometer: Accelerometer) -> Array:
+        """Gravity as an accelerometer feels it, in the base frame, shape (3,) [m/s^2]."""
+        return self.tree.gravity if accelerometer.gravity is None else accelerometer.gravity
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.units import si_factor, si_unit
 
 AXES = ("x", "y", "z")
@@ -212,4 +214,57 @@ class Gyro:
         return np.full(3, self.sigma)
 
 
-Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro
+@dataclass(frozen=True)
+class Accelerometer:
+    """The accelerometer of an IMU: f_imu = R_imu_body (a_point - g)_body + bias + noise.
+
+    Body and rotation are those of the IMU's gyro; the point where it sits, p_body, is three parameters of the robot,
+    NAME.lever_x, lever_y and lever_z [m].
+
+    Attributes:
+        name: key in the robot file ("accelerometer1").
+        source: topic.
+        gyro: name of the gyro of the same IMU, whose body and rotation it shares.
+        sigma: standard deviation of the noise of each component [m/s^2].
+        bias: offset in the sensor frame, shape (3,) [m/s^2].
+        bias_prior_sigma: standard deviation of the prior of the bias [m/s^2].
+        bias_sigma: standard deviation after calibration, shape (3,) [m/s^2]; None before.
+        gravity: acceleration of gravity in the base frame, shape (3,) [m/s^2], where the joints do not feel it because
+            springs carry the weight; None for that of the robot.
+    """
+
+    name: str
+    source: Topic
+    gyro: str
+    sigma: float
+    bias: NDArray[np.float64]
+    bias_prior_sigma: float
+    bias_sigma: NDArray[np.float64] | None = None
+    gravity: NDArray[np.float64] | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channel names, one per axis."""
+        return tuple(f"{self.name}.{axis}" for axis in AXES)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each channel."""
+        return ("m/s^2",) * 3
+
+    @property
+    def sigmas(self) -> NDArray[np.float64]:
+        """Standard deviation of the noise of each channel, shape (3,) [m/s^2]."""
+        return np.full(3, self.sigma)
+
+    @property
+    def lever(self) -> tuple[str, ...]:
+        """Names of the parameters with its place on the body."""
+        return tuple(f"{self.name}.lever_{axis}" for axis in AXES)
+
+    def place(self, parameters: Mapping[str, Parameter]) -> NDArray[np.float64]:
+        """Where it sits on its body, p_body, shape (3,) [m]."""
+        return np.array([parameters[name].value for name in self.lever])
+
+
+Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro | Accelerometer

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.accelerometer_plausibility import check_accelerometers
 from jointscope.robots.recordings.encoder_gyro_scale import check_scales
 from jointscope.robots.recordings.gyro_plausibility import check_gyros
 from jointscope.robots.recordings.held_joints import about_bodies
@@ -63,10 +64,11 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     robot = robot.in_posture(recording.posture)
     _check_command(recording.command, robot)
     motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
+    notices += check_accelerometers(recording, robot)
     for name in robot.sensors:
         _check_changes(recording, recording.streams[name], robot)
-    for gyro in robot.gyros:
-        _check_frozen(recording.streams[gyro.name])
+    for biased in robot.biased:
+        _check_frozen(recording.streams[biased.name])
     notices += _check_limits(motion, robot)
     notices += _check_motion(recording, robot, every_joint)
     odd = check_gyros(recording, robot, motion)
@@ -90,7 +92,7 @@ def _check_samples(stream: Stream) -> None:
 
 
 def _check_frozen(stream: Stream) -> None:
-    """A gyro whose noise stops repeats its last sample: the sensor or its driver has died."""
+    """A gyro or accelerometer whose noise stops repeats its last sample: the sensor or its driver has died."""
     same = np.all(stream.values[1:] == stream.values[:-1], axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     starts, stops = edges[::2], edges[1::2]

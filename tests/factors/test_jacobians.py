@@ -7,6 +7,7 @@ import gtsam
 import numpy as np
 import pytest
 
+from jointscope.factors.accelerated import AcceleratedFactor
 from jointscope.factors.bias_at_rest import BiasAtRestFactor
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.euler_dynamics import EulerDynamics
@@ -32,7 +33,8 @@ from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.lateness import Lateness, late_channels
-from jointscope.robots.parts.sensors import LinkEncoder
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.sensors import Accelerometer, LinkEncoder
 
 ROBOT = load_robot("doggy")
 PAPER = load_robot("doggy_paper")
@@ -112,8 +114,30 @@ def _factors_with_effects():
                 yield f"late {name} with {label}", moved, robot
 
 
+def _accelerometers():
+    """Doggy with an accelerometer on its last IMU, as it is and with what acts on it: late stamps, a soft bearing."""
+    source = replace(ROBOT.sensors["imu2"].source, field="linear_acceleration", unit="m/s^2")
+    down = np.array([0.0, 0.0, -9.81])
+    accelerometer = Accelerometer("acc", source, "imu2", 0.02, np.zeros(3), 0.5, gravity=down)
+    places = [Parameter(name, 0.1, "m", 0.1, 0.1, positive=False) for name in accelerometer.lever]
+    parameters = {**ROBOT.parameters, **{p.name: p for p in places}}
+    plain = replace(ROBOT, sensors={**ROBOT.sensors, "acc": accelerometer}, parameters=parameters)
+    for label in ("", "clock_offset@robot", "clock_offset@imu2", "bearing_flexibility@joint1"):
+        effect = {} if not label else dict(catalogue()[label.split("@")[0]].example)
+        robot = add_effect(plain, label, effect) if label else plain
+        (sensor,) = robot.accelerometers
+        rng = np.random.default_rng(7)
+        times, fraction, h = rng.uniform(1.0, 2.0, M), rng.uniform(size=M), rng.uniform(0.1, 0.2, size=M)
+        ((_, late),) = late_channels(robot, sensor.name)
+        lateness = Lateness.of(robot, late, times) if late else None
+        inner = factor_on_state(robot, sensor.name, rng.normal(size=(M, 3)), times)
+        values = {n: p.value for n, p in robot.parameters.items()}
+        yield f"accelerometer {label}", AcceleratedFactor(inner, fraction, h, robot.layout, lateness, values), robot
+
+
 FACTORS = {name: (factor, ROBOT) for name, factor in _factors()}
 FACTORS |= {name: (factor, robot) for name, factor, robot in _factors_with_effects()}
+FACTORS |= {name: (factor, robot) for name, factor, robot in _accelerometers()}
 
 
 def _point(factor, robot):

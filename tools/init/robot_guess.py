@@ -38,12 +38,13 @@ ENOUGH = 3000  # instants for the mounting of a gyroscope
 
 @dataclass(frozen=True)
 class GuessedGyro:
-    """A gyroscope, where it seems to sit, and its noise."""
+    """A gyroscope, where it seems to sit, its noise, and what the same messages say about accelerations."""
 
     name: str
     signal: Signal
     mount: Mount
     noise: NoiseGuess
+    acceleration: Signal | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,8 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         zero = motor_zero(turned, seen, _in_si(robot, noises))
         turned = replace(turned, values=turned.values - zero)
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
+    felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
+    gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
     elastic = _seen(tree, gyros) if masses else ()
     drive = drives(turned, elastic)
     left_out += _unused(signals, roles, masses)

@@ -74,7 +74,7 @@ def is_held(parameter: ParameterEstimate) -> bool:
 
 def is_mounting_or_bias(parameter: ParameterEstimate) -> bool:
     """Whether it describes how a sensor sits, not how the robot moves."""
-    return ".R_imu_body" in parameter.name or ".bias" in parameter.name
+    return any(part in parameter.name for part in (".R_imu_body", ".bias", ".lever_"))
 
 
 def channel_whiteness(fit: BagFit) -> dict[str, float]:

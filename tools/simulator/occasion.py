@@ -21,8 +21,13 @@ from jointscope.robots.units import si_unit
 from jointscope.tools.simulator.effects import make_effects
 from jointscope.tools.simulator.loop.motion import MIN_REST, start_position
 from jointscope.tools.simulator.loop.online_encoder import OnlineEncoder
-from jointscope.tools.simulator.loop.sampled_sensor import SampledEncoder, SampledGyro, SampledSensor
-from jointscope.tools.simulator.loop.sensing import MountedGyro, Sampling
+from jointscope.tools.simulator.loop.sampled_sensor import (
+    SampledAccelerometer,
+    SampledEncoder,
+    SampledGyro,
+    SampledSensor,
+)
+from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling
 from jointscope.tools.simulator.truth import effect_records, true_parameters, true_robot
 from jointscope.tools.simulator.world.disturbance import Disturbance
 from jointscope.tools.simulator.world.engine import STEPS_PER_TICK, TICK, Controller, Engine
@@ -72,7 +77,7 @@ class Occasion:
         times: of the ticks, shape (n,) [s].
         start: joint angles, shape (n_joints,) [rad].
         engine: compiled, not yet moved.
-        gyros: as they are mounted.
+        gyros, accelerometers: as they are mounted.
 
     Raises:
         SimulationError: MuJoCo is missing, or an option is impossible.
@@ -92,6 +97,11 @@ class Occasion:
         self.gyros = [
             MountedGyro.draw(g, self.random("bias", g.name), random_stream(hardware_seed, "mounting", g.name))
             for g in robot.gyros
+        ]
+        mounted = {gyro.sensor.name: gyro.R_imu_body for gyro in self.gyros}
+        self.accelerometers = [
+            MountedAccelerometer.draw(s, self.random("bias", s.name), mounted[s.gyro], robot.gravity_at(s))
+            for s in robot.accelerometers
         ]
         self.start = start_position(robot, self.random("start"))
         self._robot, self._conditions = robot, conditions
@@ -131,6 +141,11 @@ class Occasion:
         for gyro in self.gyros:
             times = stamps(gyro.sensor.name, sampling.gyro_rate)
             found[gyro.sensor.name] = SampledGyro(gyro, self.engine, sampling, times, seed)
+        for accelerometer in self.accelerometers:
+            sensor = accelerometer.sensor
+            # one message of an IMU holds both of its sensors
+            times = found[sensor.gyro].stamps
+            found[sensor.name] = SampledAccelerometer(accelerometer, self.engine, sampling, times, seed)
         return [found[name] for name in self._robot.sensors]
 
     def run(self, controller: Controller, progress: Callable[[float], None] | None = None) -> Trajectory:
@@ -163,7 +178,7 @@ class Occasion:
         """What is true, fit for JSON."""
         effects, conditions = self.engine.effects, self._conditions
         return {
-            "parameters": true_parameters(self.truth, self.gyros, effects),
+            "parameters": true_parameters(self.truth, self.gyros, self.accelerometers, effects),
             "effects": effect_records(effects),
             **self._told,
             "friction": conditions.friction,

@@ -11,7 +11,7 @@ import numpy as np
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.files.effects_at_once import without_effects
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.simulator.loop.sensing import MountedGyro
+from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 
 TINY = 1e-12  # in the unit of the parameter; inertia and stiffness must be above
@@ -33,21 +33,28 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
     robot = without_effects(robot)
     published = {p.name: p.published for p in robot.parameters.values() if p.published is not None}
     truth = robot.with_values({**published, **overrides})
+    places = {name for sensor in robot.accelerometers for name in sensor.lever}
     for parameter in truth.parameters.values():
         friction_or_damping = parameter.name.endswith((".coulomb_torque", ".damping", ".k_mi"))
-        if not np.isfinite(parameter.value) or parameter.value < (0.0 if friction_or_damping else TINY):
+        least = -np.inf if parameter.name in places else 0.0 if friction_or_damping else TINY
+        if not np.isfinite(parameter.value) or parameter.value < least:
             raise SimulationError(f"{parameter.name}: cannot be simulated with {parameter.value:g} {parameter.unit}")
     return truth
 
 
 def true_parameters(
-    robot: Robot, gyros: Sequence[MountedGyro], effects: Sequence[SimulatedEffect]
+    robot: Robot,
+    gyros: Sequence[MountedGyro],
+    accelerometers: Sequence[MountedAccelerometer],
+    effects: Sequence[SimulatedEffect],
 ) -> dict[str, float | list[float] | list[list[float]]]:
     """All true values by full name: OWNER.PARAMETER, OWNER.EFFECT.PARAMETER, IMU.bias and IMU.R_imu_body."""
     values: dict[str, Any] = {parameter.name: parameter.value for parameter in robot.parameters.values()}
     for gyro in gyros:
         values[f"{gyro.sensor.name}.bias"] = gyro.bias.tolist()
         values[f"{gyro.sensor.name}.R_imu_body"] = gyro.R_imu_body.tolist()
+    for accelerometer in accelerometers:
+        values[f"{accelerometer.sensor.name}.bias"] = accelerometer.bias.tolist()
     for effect in effects:
         for name, value in effect.parameters.items():
             values[f"{effect.owner}.{effect.id}.{name}"] = value

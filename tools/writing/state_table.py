@@ -74,9 +74,9 @@ class StateTable:
         import pyarrow.csv
         import pyarrow.parquet
 
-        self._gyros = tuple(gyro.name for gyro in robot.gyros)
+        self._biased = tuple(sensor.name for sensor in robot.biased)
         self._adapted = adapted
-        one = _columns(robot, self._gyros, adapted)
+        one = _columns(robot, self._biased, adapted)
         self.columns = ("time", "age", *one, "lagged.time", *(f"lagged.{name}" for name in one))
         self._half = len(one)
         self._rows = np.empty((ROWS, len(self.columns)))
@@ -126,7 +126,7 @@ class StateTable:
         d = len(state.mean)
         part[:d], part[d : 2 * d] = state.mean, state.sigma
         at = 2 * d
-        for name in self._gyros:
+        for name in self._biased:
             part[at : at + 3] = state.biases.get(name, np.nan)
             part[at + 3 : at + 6] = state.bias_sigmas.get(name, np.nan)
             at += 6
@@ -135,12 +135,12 @@ class StateTable:
             at += 2
 
 
-def _columns(robot: Robot, gyros: tuple[str, ...], adapted: tuple[str, ...]) -> list[str]:
+def _columns(robot: Robot, biased: tuple[str, ...], adapted: tuple[str, ...]) -> list[str]:
     """Names of what is told about one state."""
     names = state_names(robot.layout)
     columns = [*names, *(f"{name}.sigma" for name in names)]
-    for gyro in gyros:
-        columns += [f"{gyro}.bias.{axis}" for axis in AXES] + [f"{gyro}.bias.{axis}.sigma" for axis in AXES]
+    for sensor in biased:
+        columns += [f"{sensor}.bias.{axis}" for axis in AXES] + [f"{sensor}.bias.{axis}.sigma" for axis in AXES]
     for name in adapted:
         columns += [name, f"{name}.sigma"]
     return columns

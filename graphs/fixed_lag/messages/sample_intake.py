@@ -18,7 +18,7 @@ from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.lateness import late_channels
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Gyro
+from jointscope.robots.parts.sensors import Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class SampleIntake:
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
         for name, sensor in robot.sensors.items():
-            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro))
+            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro | Accelerometer))
 
     def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one."""
@@ -71,7 +71,7 @@ class SampleIntake:
         if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
         sigma = self._sigmas[name]
-        shared = None if isinstance(sensor, Gyro) or bad else checks.shared_error(t, numbers)
+        shared = None if isinstance(sensor, Gyro | Accelerometer) or bad else checks.shared_error(t, numbers)
         if shared is not None:
             sigma = sigma * np.array(shared)
         result = []

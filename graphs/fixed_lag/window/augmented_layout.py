@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The estimator's own state: that of the robot, the biases of its gyros, and the parameters that it adapts.
+"""The estimator's own state: that of the robot, biases of gyros and accelerometers, and the parameters that it adapts.
 
 Biases and adapted parameters walk at random, so none of them is shared by all ticks: a hub would have to be eliminated
 anew at every update.
@@ -20,6 +20,7 @@ from jointscope.robots.parts.state_layout import StateLayout
 Array = NDArray[np.float64]
 
 POSITION, VELOCITY, BIAS = 1e-4, 1e-2, 1e-3  # [rad], [rad/s], [rad/s] units in which deviations are of size one
+ACCELERATION_BIAS = 1e-2  # [m/s^2]
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,12 @@ class AugmentedLayout:
 
     Attributes:
         robot: layout of the robot's own state, which comes first.
-        gyros: names, in the order of their biases.
+        biased: names of gyros and accelerometers, in the order of their biases.
         parameters: full names of the adapted parameters.
     """
 
     robot: StateLayout
-    gyros: tuple[str, ...]
+    biased: tuple[str, ...]
     parameters: tuple[str, ...]
 
     @cached_property
@@ -44,17 +45,17 @@ class AugmentedLayout:
     @cached_property
     def size(self) -> int:
         """Size D of the whole."""
-        return self.d + 3 * len(self.gyros) + len(self.parameters)
+        return self.d + 3 * len(self.biased) + len(self.parameters)
 
     @cached_property
     def biases(self) -> Mapping[str, slice]:
-        """Columns of each gyro's bias."""
-        return {name: slice(self.d + 3 * i, self.d + 3 * i + 3) for i, name in enumerate(self.gyros)}
+        """Columns of the bias of each sensor that has one."""
+        return {name: slice(self.d + 3 * i, self.d + 3 * i + 3) for i, name in enumerate(self.biased)}
 
     @cached_property
     def adapted(self) -> slice:
         """Columns of the adapted parameters."""
-        return slice(self.d + 3 * len(self.gyros), self.size)
+        return slice(self.d + 3 * len(self.biased), self.size)
 
     @cached_property
     def walking(self) -> slice:
@@ -65,7 +66,8 @@ class AugmentedLayout:
         """Units in which deviations of the components are of size one, shape (D,)."""
         scale = np.ones(self.size)
         scale[self.robot.positions], scale[self.robot.velocities] = POSITION, VELOCITY
-        for name in self.gyros:
-            scale[self.biases[name]] = BIAS
+        accelerometers = {sensor.name for sensor in robot.accelerometers}
+        for name in self.biased:
+            scale[self.biases[name]] = ACCELERATION_BIAS if name in accelerometers else BIAS
         scale[self.adapted] = [0.01 * max(abs(robot.parameters[name].value), 1e-3) for name in self.parameters]
         return scale

@@ -107,8 +107,9 @@ def first_state(
         covariance = np.diag(variance)
         covariance[layout.walking, layout.walking] = walking.covariance[layout.walking, layout.walking]
         return now, NewestState(mean, covariance)
-    for gyro in robot.gyros:
-        mean[layout.biases[gyro.name]], variance[layout.biases[gyro.name]] = gyro.bias, gyro.bias_prior_sigma**2
+    for sensor in robot.biased:
+        columns = layout.biases[sensor.name]
+        mean[columns], variance[columns] = sensor.bias, sensor.bias_prior_sigma**2
     mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
     variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
     return now, NewestState(mean, np.diag(variance))

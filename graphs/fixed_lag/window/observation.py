@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.accelerated import acceleration_weights
 from jointscope.factors.interpolated import interpolate, weights_between
 from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
 from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
@@ -79,7 +80,8 @@ def observed_rows(
         readings: predicts them.
         layout: of the states.
         observations: taken in [t0, t1].
-        x0: state at the beginning, shape (D,); None where all samples were taken at the end.
+        x0: state at the beginning, shape (D,); None where all samples were taken at the end, and none of them is an
+            acceleration.
         x1: state at the end, shape (D,).
         t0: beginning of the step [s].
         t1: end of the step [s].
@@ -94,12 +96,15 @@ def observed_rows(
         row = part.stop
         parts.append(part)
         sigma[part] = o.sigma
-        if x0 is None or o.taken >= t1 - AT_TICK:
+        feels = readings.feels_acceleration(o.sensor)
+        if x0 is None or (o.taken >= t1 - AT_TICK and not feels):
             reading, J = readings.read(o.sensor, own, o.stamp)
             by_end[part, :d] = J if len(J) == len(o.channels) else J[o.channels]
         else:
             h, s = t1 - t0, (o.taken - t0) / (t1 - t0)
             at = interpolate(layout.robot, x0[None, :d], x1[None, :d], np.array([s]), np.array([h]))[0]
+            if feels:
+                at = np.concatenate([at, _acceleration(layout, x0, x1, s, h)])
             reading, J = readings.read(o.sensor, at, o.stamp)
             if by_start is None:
                 by_start = np.zeros((total, layout.size))
@@ -114,16 +119,31 @@ def observed_rows(
     return ObservedRows(residual, by_start, by_end, sigma, tuple(parts))
 
 
+def _acceleration(layout: AugmentedLayout, x0: Array, x1: Array, s: float, h: float) -> Array:
+    """Accelerations of the links in a step, shape (n_link,) [rad/s^2]; see `AcceleratedFactor`."""
+    q, v = layout.robot.q_link, layout.robot.v_link
+    w = [weight[0] for weight in acceleration_weights(np.array([s]), np.array([h]))]
+    return np.asarray(w[0] * x0[q] + w[1] * x0[v] + w[2] * x1[q] + w[3] * x1[v], dtype=np.float64)
+
+
 def _split(layout: AugmentedLayout, J: Array, s: float, h: float) -> tuple[Array, Array]:
-    """Derivatives by both ends of a step of something that depends on the state in between, shape (c, d) each."""
+    """Derivatives by both ends of a step of something that depends on the state in between, shape (c, d) each.
+
+    J has shape (c, d), or (c, d + n_link) where accelerations stand behind the state.
+    """
     own = layout.robot
     q, v, z = own.positions, own.velocities, own.memory
     position, velocity = weights_between(np.array([s]), np.array([h]))
     J_q, J_v, parts = J[:, q], J[:, v], []
+    by_a = J[:, layout.d :]
     for i in (0, 2):
-        part = np.zeros_like(J)
+        part = np.zeros((len(J), layout.d))
         part[:, q] = position[i] * J_q + velocity[i] * J_v
         part[:, v] = position[i + 1] * J_q + velocity[i + 1] * J_v
         part[:, z] = (1.0 - s if i == 0 else s) * J[:, z]
+        if by_a.shape[1]:
+            weights = acceleration_weights(np.array([s]), np.array([h]))
+            part[:, own.q_link] += weights[i] * by_a
+            part[:, own.v_link] += weights[i + 1] * by_a
         parts.append(part)
     return parts[0], parts[1]

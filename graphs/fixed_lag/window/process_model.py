@@ -18,6 +18,8 @@ from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 
+ACCELERATION_WALK = 1e-4  # [m/s^2/sqrt(s)] the bias of an accelerometer moves by 1e-3 m/s^2 in 100 s
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -52,7 +54,8 @@ class ProcessModel:
         self.layout, self._rule = layout, robot.choices.integrator
         self._adaptation = Adaptation(robot, tuple(adapt))
         self._noise = StepNoise(robot)
-        walk = [bias_walk] * (3 * len(layout.gyros)) + list(adapt.values())
+        walk = [bias_walk] * (3 * len(robot.gyros)) + [ACCELERATION_WALK] * (3 * len(robot.accelerometers))
+        walk += list(adapt.values())
         self._walk, self._ones = np.array(walk), np.ones(robot.n)
         self._walk_kept: tuple[float, tuple[Array, Array, Array, Array]] | None = None
         self._near: RatesAt | None = None

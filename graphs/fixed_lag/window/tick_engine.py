@@ -48,11 +48,11 @@ class TickEngine:
     """
 
     def __init__(self, robot: Robot, lag: float, adapt: Mapping[str, float], bias_walk: float):
-        self.layout = AugmentedLayout(robot.layout, tuple(g.name for g in robot.gyros), tuple(adapt))
+        self.layout = AugmentedLayout(robot.layout, tuple(s.name for s in robot.biased), tuple(adapt))
         self._lag, self._scale = lag, self.layout.scale(robot)
         self._bias_prior = (
-            np.concatenate([np.zeros(0), *(g.bias for g in robot.gyros)]),
-            np.repeat([g.bias_prior_sigma for g in robot.gyros], 3),
+            np.concatenate([np.zeros(0), *(s.bias for s in robot.biased)]),
+            np.repeat([s.bias_prior_sigma for s in robot.biased], 3),
         )
         self._process = ProcessModel(robot, self.layout, adapt, bias_walk)
         self._readings = ReadingsAtOneState(robot)
@@ -127,7 +127,10 @@ class TickEngine:
         for o in observations:
             i = int(np.searchsorted(times, o.taken - AT_TICK))
             first, last = ticks[max(i - 1, 0)], ticks[min(i, len(ticks) - 1)]
-            at_tick = abs(last.time - o.taken) <= AT_TICK
+            feels = self._readings.feels_acceleration(o.sensor)
+            if feels and first is last:
+                continue  # the step before it is gone
+            at_tick = abs(last.time - o.taken) <= AT_TICK and not feels
             x1 = self._estimate(last)
             x0 = None if at_tick or first is last else self._estimate(first)
             seen = observed_rows(self._readings, self.layout, [o], x0, x1, first.time, last.time)
@@ -220,7 +223,9 @@ class TickEngine:
     def _take_in(self, x0: NewestState, found: Prediction, before: PastTick, here: PastTick) -> list[Innovation]:
         """Updates a prediction with samples of its step."""
         x1, time, observations = found.state, here.time, here.observations
-        start = None if all(o.taken >= time - AT_TICK for o in observations) else x0.mean
+        feels = self._readings.feels_acceleration
+        at_end = all(o.taken >= time - AT_TICK and not feels(o.sensor) for o in observations)
+        start = None if at_end else x0.mean
         seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, before.time, time)
         with_state = seen.by_end @ x1.covariance
         S = with_state @ seen.by_end.T

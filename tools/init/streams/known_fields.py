@@ -30,7 +30,7 @@ DEEPEST = 4  # fields inside fields
 
 @dataclass(frozen=True)
 class KnownField:
-    """A field, and what it could be: "position", "effort", "rate" or "numbers"."""
+    """A field, and what it could be: "position", "effort", "rate", "acceleration" or "numbers"."""
 
     path: str
     quantity: str
@@ -44,7 +44,7 @@ def known_fields(kind: MessageType, first: bytes | None) -> list[KnownField]:
         first: one message, which says what interfaces are called; None to leave those out.
     """
     if kind.name == IMU:
-        return [KnownField("angular_velocity", "rate")]
+        return [KnownField("angular_velocity", "rate"), KnownField("linear_acceleration", "acceleration")]
     if ARRAYS.fullmatch(kind.name):
         return [KnownField("data", "numbers")]
     found = [KnownField(path, QUANTITIES[word]) for path in _floats(kind, kind.name, "") if (word := _word(path))]

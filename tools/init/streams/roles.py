@@ -97,7 +97,7 @@ def assign_roles(
         command=drive.chosen(joints, reason, sure),
         link_encoder=link,
         joint_torque=_torque(signals, link_side, urdf_joints, wish, joints),
-        imus=tuple(s for s in signals if s.msgtype == IMU),
+        imus=tuple(s for s in signals if s.msgtype == IMU and s.quantity == "rate"),
         stances=stance,
         driven=tuple(joint for joint in urdf_joints if drive.varies(joint)),
     )

@@ -12,6 +12,7 @@ from jointscope.tools.init.estimates.joint_signs import SignGuess
 from jointscope.tools.init.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.init.streams.named_signal import Chosen
 from jointscope.tools.init.streams.sensor_noise import NoiseGuess
+from jointscope.tools.init.text.accelerometer_text import accelerometer_lines
 from jointscope.tools.init.text.drive_text import effect_lines, parameter_lines
 from jointscope.tools.init.text.gyro_text import gyro_lines
 from jointscope.tools.init.text.held_text import held_lines
@@ -56,6 +57,7 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *_link_encoder(guess),
         *(_torque(guess) if free else ()),
         *(line for gyro in guess.gyros for line in gyro_lines(gyro, guess.encoder_signs)),
+        *(line for gyro in guess.gyros if not free for line in accelerometer_lines(gyro, guess.gravity)),
         *(f"  # not used: {text}" for text in guess.left_out),
         "",
         *effect_lines(guess),

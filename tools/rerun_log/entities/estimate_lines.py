@@ -120,12 +120,14 @@ def sigma_views(robot: Robot, states: StateSeries | None = None) -> rrb.Vertical
 
 
 def bias_views(robot: Robot, adapted: tuple[str, ...]) -> rrb.Vertical:
-    """One plot per gyro and adapted parameter."""
+    """One plot per gyro, accelerometer and adapted parameter."""
     import rerun.blueprint as rrb
 
     views = [
-        rrb.TimeSeriesView(origin="/" + entity("bias", gyro.name), name=viewer_text(f"bias of {gyro.name} [rad/s]"))
-        for gyro in robot.gyros
+        rrb.TimeSeriesView(
+            origin="/" + entity("bias", sensor.name), name=viewer_text(f"bias of {sensor.name} [{sensor.units[0]}]")
+        )
+        for sensor in robot.biased
     ]
     views += [
         rrb.TimeSeriesView(

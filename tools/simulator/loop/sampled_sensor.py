@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import joined
-from jointscope.tools.simulator.loop.sensing import MountedGyro, Sampling, read_encoder
+from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling, read_encoder
 from jointscope.tools.simulator.world.engine import Engine
 from jointscope.tools.simulator.world.hooks import age, distort, logged, taken_at
 from jointscope.tools.simulator.world.random_streams import random_stream
@@ -107,3 +107,23 @@ class SampledGyro(SampledSensor):
         rates = self._engine.body_rates(sensor.name, q, v) @ gyro.R_imu_body.T
         rates = distort(self._effects, sensor, self.stamps[rows], rates)
         return rates + gyro.bias + sensor.sigma * self._noise[rows]
+
+
+class SampledAccelerometer(SampledSensor):
+    """One accelerometer as it is mounted."""
+
+    def __init__(
+        self, accelerometer: MountedAccelerometer, engine: Engine, sampling: Sampling, stamps: Array, seed: int
+    ):
+        super().__init__(accelerometer.sensor, engine, sampling, stamps, seed)
+        self._mounted, self._engine, self._gravity = accelerometer, engine, accelerometer.gravity
+        self._noise = random_stream(seed, "noise", accelerometer.sensor.name).standard_normal((len(stamps), 3))
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Specific forces, shape (k, 3) [m/s^2]."""
+        mounted, sensor = self._mounted, self._mounted.sensor
+        times = self.taken[rows] - self._age[0]
+        motion = *trajectory.at(times), trajectory.acceleration(times)
+        forces = self._engine.specific_forces(sensor.name, self._gravity, *motion)
+        forces = distort(self._effects, sensor, self.stamps[rows], forces @ mounted.R_imu_body.T)
+        return forces + mounted.bias + sensor.sigma * self._noise[rows]

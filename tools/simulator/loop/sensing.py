@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.parts.sensors import Gyro, LinkEncoder, MotorEncoder
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder
 from jointscope.tools.simulator.world.engine import TICK
 
 Array = NDArray[np.float64]
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 ANALOG_SHARE = 0.3  # noise before quantization, share of the encoder's sigma
 MOUNTING_SIGMA = np.deg2rad(2.0)  # [rad] about each axis
 BIAS_SIGMA = 2e-3  # [rad/s] of the true bias about that of the robot file
+ACCELERATION_BIAS_SIGMA = 0.05  # [m/s^2] the same of an accelerometer
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,29 @@ class MountedGyro:
         bias = sensor.bias + BIAS_SIGMA * bias_rng.standard_normal(3)
         error = Rotation.from_rotvec(MOUNTING_SIGMA * mounting_rng.standard_normal(3)).as_matrix()
         return cls(sensor, bias, sensor.R_imu_body @ error)
+
+
+@dataclass(frozen=True)
+class MountedAccelerometer:
+    """An accelerometer as it really is, in the housing of its gyro.
+
+    Attributes:
+        sensor: as in the robot file.
+        bias: true bias, shape (3,) [m/s^2].
+        R_imu_body: true mounting of the IMU, shape (3, 3).
+        gravity: that it feels, in the base frame, shape (3,) [m/s^2].
+    """
+
+    sensor: Accelerometer
+    bias: Array
+    R_imu_body: Array
+    gravity: Array
+
+    @classmethod
+    def draw(cls, sensor: Accelerometer, rng: np.random.Generator, R: Array, gravity: Array) -> MountedAccelerometer:
+        """A bias about that of the robot file; R is the rotation of its gyro."""
+        bias = sensor.bias + ACCELERATION_BIAS_SIGMA * rng.standard_normal(3)
+        return cls(sensor, bias, R, gravity)
 
 
 def read_encoder(encoder: MotorEncoder | LinkEncoder, q_motor: Array, noise: Array, quantized: bool) -> Array:

@@ -191,6 +191,34 @@ class Engine:
             omega[k] = six[:3]
         return omega
 
+    def specific_forces(self, site: str, gravity: Array, q: Array, v: Array, a: Array) -> Array:
+        """What an accelerometer at a site feels, in the axes of the site: the reading of the engine's own sensor.
+
+        Args:
+            site: name of the accelerometer whose site it is.
+            gravity: that it feels, shape (3,) [m/s^2]; the joints may be relieved of theirs.
+            q: positions of all coordinates, shape (m, nq) [rad].
+            v: velocities, shape (m, nq) [rad/s].
+            a: accelerations, shape (m, nq) [rad/s^2].
+
+        Returns:
+            f_body, shape (m, 3) [m/s^2].
+        """
+        mujoco, model, data = self._mujoco, self.model, self._seen
+        place = model.sensor(site).adr[0]
+        forces, before = np.empty((len(q), 3)), model.opt.gravity.copy()
+        for k in range(len(q)):
+            data.qpos[:], data.qvel[:] = q[k], v[k]
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_fwdVelocity(model, data)
+            data.qacc[:] = a[k]
+            model.opt.gravity[:] = gravity
+            mujoco.mj_rnePostConstraint(model, data)  # not a second time by itself
+            mujoco.mj_sensorAcc(model, data)
+            model.opt.gravity[:] = before
+            forces[k] = data.sensordata[place : place + 3]
+        return forces
+
     def points(self, joint: str, p_link: Array, q: Array) -> Array:
         """Where a point of the body that a joint moves is, as the engine computes it.
 

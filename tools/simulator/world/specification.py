@@ -63,6 +63,15 @@ def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
         _add_motor(mujoco, spec, robot, joint)
     for gyro in robot.gyros:
         _add_site(spec, robot, gyro.name, gyro.body)
+    bodies = {gyro.name: gyro.body for gyro in robot.gyros}
+    for sensor in robot.accelerometers:
+        _add_site(spec, robot, sensor.name, bodies[sensor.gyro], sensor.place(robot.parameters))
+        spec.add_sensor(
+            name=sensor.name,
+            type=mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            objname=sensor.name,
+        )
     return spec
 
 
@@ -143,12 +152,13 @@ def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
     motor.biasprm[2] = -back_emf
 
 
-def _add_site(spec: Any, robot: Robot, name: str, body: str) -> None:
+def _add_site(spec: Any, robot: Robot, name: str, body: str, p_body: Array | None = None) -> None:
     frame = robot.tree.model.frames[robot.tree.frame_id(body)]
     joint = robot.tree.model.names[frame.parentJoint]
     parent = spec.body(link_body(joint)) if frame.parentJoint else spec.worldbody
     placement = frame.placement
-    parent.add_site(name=name, pos=placement.translation, quat=_quaternion_wxyz(placement.rotation))
+    place = placement.translation if p_body is None else placement.act(p_body)
+    parent.add_site(name=name, pos=place, quat=_quaternion_wxyz(placement.rotation))
 
 
 def set_linear(element: Any, name: str, value: float) -> None:

@@ -56,3 +56,17 @@ class Trajectory:
         on_grid = place == nearest
         q[on_grid], v[on_grid] = self.q[place[on_grid].astype(int)], self.v[place[on_grid].astype(int)]
         return q, v
+
+    def acceleration(self, times: Array) -> Array:
+        """Accelerations of all coordinates, shape (k, nq) [rad/s^2]: differences of velocities, linear in between.
+
+        A time on or after the last point gets the difference of the last two: what comes is not known yet.
+        """
+        if len(self.v) < 2:
+            return np.zeros((len(times), self.v.shape[1]))
+        place = np.clip(np.asarray(times) / self.step, 0.0, len(self.q) - 1.0)
+        slope = (self.v[1:] - self.v[:-1]) / self.step  # at the middles between the points
+        left = np.clip(np.floor(place - 0.5 + 1e-9).astype(int), 0, len(slope) - 1)
+        right = np.minimum(left + 1, len(slope) - 1)
+        s = np.clip(place - 0.5 - left, 0.0, 1.0)[:, None]
+        return (1.0 - s) * slope[left] + s * slope[right]

@@ -38,7 +38,7 @@ def replay_states(result: ReplayResult) -> Section:
         + figure(_corrections(result, closer), band, group="replay closer")
         + "<h3>Sigma over the whole recording</h3>"
         + figure(_sigmas(result, layout, whole), keys, group="replay")
-        + "<h3>Gyro biases</h3>"
+        + "<h3>Biases</h3>"
         + figure(_biases(result, whole), [Key(a, COLOURS[i]) for i, a in enumerate("xyz")], group="replay")
     )
     if result.states.parameters:
@@ -124,7 +124,8 @@ def _biases(result: ReplayResult, limits: Limits) -> list[str]:
         away = bias - bias[-1:]
         settled = np.abs(away[len(away) // 10 :])
         reach = 1.3 * max(float(np.max(settled, initial=0.0)), 3.0 * float(np.median(sigma)), 1e-9)
-        factor, unit = prefixed(reach, "rad/s")
+        own = result.robot.sensors[gyro].units[0]
+        factor, unit = prefixed(reach, own)
         marks: list[Mark] = []
         for i, axis in enumerate("xyz"):
             y, s = factor * away[:, i], 3.0 * factor * sigma[:, i]
@@ -132,7 +133,7 @@ def _biases(result: ReplayResult, limits: Limits) -> list[str]:
             marks.append(Curve(axis, states.times, y, COLOURS[i], points=600))
         values = ", ".join(with_sigma(1e3 * b, 1e3 * s)[0] for b, s in zip(bias[-1], sigma[-1], strict=True))
         last = k == len(states.biases) - 1
-        title = f"bias of {gyro} minus its last value [{unit}]; the last is ({values}) mrad/s"
+        title = f"bias of {gyro} minus its last value [{unit}]; the last is ({values}) 1e-3 {own}"
         height, limits_y = 150 + 28 * last, (-factor * reach, factor * reach)
         axes = Axes(title, "time [s]" if last else "", height=height, x_range=limits, y_range=limits_y)
         panels.append(plot(axes, marks))
