@@ -14,7 +14,7 @@ from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.step import Steps, row_names
 from jointscope.robots.dynamics.accelerations import Accelerations
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 

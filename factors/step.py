@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
 from jointscope.robots.dynamics.command_path import CommandPath
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.state_layout import StateLayout
 
 Array = NDArray[np.float64]

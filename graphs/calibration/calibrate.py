@@ -35,7 +35,8 @@ from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynam
 from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.resting_joints import must_move
 from jointscope.robots.recordings.screening import screen

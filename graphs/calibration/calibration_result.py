@@ -14,7 +14,8 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.starts.drive_regression import Value
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]

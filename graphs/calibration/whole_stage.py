@@ -29,7 +29,8 @@ from jointscope.graphs.starts.memory_start import with_filled_memories
 from jointscope.graphs.starts.time_shift_start import placed
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_kinds.effect import Card
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, Memory
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 

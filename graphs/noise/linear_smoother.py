@@ -16,7 +16,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.normal_equations import Linearized, accumulate, linearize_all
 from jointscope.graphs.solving.posterior import StatePosterior, residual_parts
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from jointscope.graphs.noise.linear_smoother import LinearSmoother, Smoothed
 from jointscope.graphs.noise.noise_estimation import FixedPoint, NoiseEvidence, settled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.windows import windows_of
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 

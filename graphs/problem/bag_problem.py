@@ -27,7 +27,8 @@ from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ from jointscope.graphs.scoring.columns.column import Column, SensorPart
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.normal_equations import Linearized, accumulate, add_at, linearize_all, whitened
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 Whitened = tuple[Array, tuple[Array, ...], dict[str, Array]]

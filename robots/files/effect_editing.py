@@ -17,8 +17,9 @@ from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
 from jointscope.robots.files.noise_section import HINGE_DENSITY, smallest_densities
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 BEST_INTEGRATOR = "simpson"
 

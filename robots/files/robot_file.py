@@ -23,10 +23,11 @@ from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.noise_section import process_noise
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
-from jointscope.robots.model.robot import ProcessNoise, Robot
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_controller import PositionController, position_controller
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.yaml_section import Section, did_you_mean
 

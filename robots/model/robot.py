@@ -7,7 +7,7 @@ A Robot is immutable; a calibration returns a new one. It is read from and writt
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_controller import PositionController
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.units import joined, of_slide
@@ -32,31 +33,6 @@ from jointscope.robots.units import joined, of_slide
 SHARPNESS = "friction_sharpness"  # of a joint whose dry friction turns over as its own parameter says
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ProcessNoise:
-    """Random torques, as the random walk of the velocities that they cause.
-
-    Attributes:
-        estimate: whether a calibration estimates the densities.
-        model: "integrated" (the positions follow from the velocities) or "independent" (eq. 36).
-        link_velocity: density of the torque on each link coordinate over its inertia at zero angles, shape (n_link,)
-            [rad/s/sqrt(s)].
-        motor_velocity: density of each motor equation, shape (n_motor,) [rad/s/sqrt(s)].
-        memory: density of each memory of the state, shape (n_memory,).
-        position: density of the positions for model "independent" [rad/sqrt(s)].
-        smallest: of link and motor velocities, below which rounding in the Hessian and the integration error take over,
-            shape (n_link + n_motor,).
-    """
-
-    estimate: bool
-    model: str
-    link_velocity: Array
-    motor_velocity: Array
-    position: float = 0.0
-    memory: Array = field(default_factory=lambda: np.zeros(0))
-    smallest: Array = field(default_factory=lambda: np.array(1e-3))
 
 
 @dataclass(frozen=True)

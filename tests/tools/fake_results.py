@@ -26,7 +26,7 @@ from jointscope.graphs.comparison.comparison_result import (
 )
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 
 HORIZONS = ("0.01", "0.1", "1.0", "open_loop")

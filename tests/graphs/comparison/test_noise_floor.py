@@ -10,7 +10,7 @@ from jointscope.graphs.comparison.compare import compare_model, smooth
 from jointscope.graphs.noise.linear_smoother import LinearSmoother
 from jointscope.graphs.noise.noise_estimation import densities, scaled
 from jointscope.graphs.noise.white_noise import separate_noise
-from jointscope.robots.model.robot import ProcessNoise
+from jointscope.robots.parts.process_noise import ProcessNoise
 
 
 def recorded(doggy, seconds=3.0, **choices):
