@@ -30,12 +30,14 @@ class InitialStateFactor:
         deflection_sigma: tolerance of q_link - q_motor, and of the tilt of a bearing [rad].
         velocity_sigma: tolerance of the velocities [rad/s].
         memory_sigmas: tolerance of each memory, shape (n_memory,).
+        A: link angles as the motors see them, shape (n, n); None for the links' own.
     """
 
     layout: StateLayout
     deflection_sigma: float
     velocity_sigma: float
     memory_sigmas: tuple[float, ...] = ()
+    A: Array | None = None
 
     name = "initial_state"
     states = 1
@@ -69,7 +71,8 @@ class InitialStateFactor:
         layout, eye = self.layout, np.eye(self.layout.size)
         elastic = [layout.joints.index(joint) for joint in layout.motors]
         hinges = [layout.links.index(name) for name in self._hinges]
-        deflections = eye[layout.joint_q[elastic]] - eye[layout.motor_q[elastic]]
+        links = eye[layout.joint_q] if self.A is None else self.A @ eye[layout.joint_q]
+        deflections = links[elastic] - eye[layout.motor_q[elastic]]
         return np.vstack([deflections, eye[hinges], eye[layout.rates]])
 
     def select(self, samples: Samples) -> InitialStateFactor:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.problem.joint_states import JointStates
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -73,7 +74,7 @@ def motion_regimes(robot: Robot, motion: JointStates) -> MotionRegimes:
         "reversal": np.column_stack([_reversals(motion.times, v, s) for v, s in zip(motion.v.T, still, strict=True)]),
         "fast": speed >= fast,
         "loaded": np.abs(load) >= loaded,
-        "near limits": _near_limits(motion.q, robot.tree.limits),
+        "near limits": _near_limits(joint_angles(robot, motion.q), robot.tree.limits),
     }
     masks["other"] = ~np.any(np.hstack(list(masks.values())), axis=1, keepdims=True)
     return MotionRegimes(motion.times, masks, {"fast": fast, "loaded": loaded}, still, load_unit)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta
 from jointscope.robots.dynamics.state_rates import StateRates
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
@@ -84,7 +85,8 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     on, off = _Stepper(robot), _Stepper(_without_back_emf(robot))
     layout = robot.layout
     at_rest = np.zeros((1, len(robot.joints)))
-    joints = np.hstack([encoder.values[:1] - zero, at_rest, encoder.values[:1] - zero, at_rest])
+    first = encoder.values[:1] - zero
+    joints = np.hstack([joint_angles(robot, first), at_rest, first, at_rest])
     x = layout.from_joints(joints)[0]
     times = np.arange(encoder.times[0], encoder.times[-1] + STEP, STEP)
     wanted = _held(goal, times)
@@ -93,7 +95,7 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     restarts = {int(np.searchsorted(times, t1, side="right")) for t1 in known}
     for k in range(len(times)):
         if k in restarts:  # what happened in a stretch that is left out is not the model's
-            x = layout.from_joints(_measured(encoder, float(times[k]), zero))[0]
+            x = layout.from_joints(_measured(robot, encoder, float(times[k])))[0]
         positions[k] = x[layout.motor_q] + zero
         command = controller.command(wanted[k], positions[k])
         # one bridge for all joints that are off: their back-EMF goes together
@@ -104,12 +106,12 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     return FreeRun(encoder.channels, stamps, simulated, measured)
 
 
-def _measured(encoder: Stream, time: float, zero: Array) -> Array:
+def _measured(robot: Robot, encoder: Stream, time: float) -> Array:
     """(q_link, v_link, q_motor, v_motor) as the samples after a moment tell them, springs relaxed, shape (1, 4n)."""
     first = int(np.searchsorted(encoder.times, time))
     last = max(int(np.searchsorted(encoder.times, time + SEEN)), first + FEWEST)
-    _, v, q = np.polyfit(encoder.times[first:last] - time, encoder.values[first:last] - zero, 2)
-    return np.hstack([q, v, q, v])[None]
+    _, v, q = np.polyfit(encoder.times[first:last] - time, encoder.values[first:last] - robot.motor_encoder.zero, 2)
+    return np.hstack([joint_angles(robot, q), joint_angles(robot, v), q, v])[None]
 
 
 def loop_error(run: FreeRun, robot: Robot) -> float:

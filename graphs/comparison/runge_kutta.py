@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.dynamics.state_rates import StateRates
+from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -84,7 +85,8 @@ def _fastest_rates(robot: Robot, rates: StateRates) -> tuple[float, float]:
     for _ in range(POSTURES):
         q = rng.uniform(limits[:, 0], limits[:, 1])
         v = FAST * rng.choice([-1.0, 1.0], robot.n)
-        at = [layout.from_joints(np.hstack([q, speed, q, speed])[None])[0] for speed in (v, 0.0 * v)]
+        q_motor = motor_angles(robot, q)
+        at = [layout.from_joints(np.hstack([q, w, q_motor, motor_angles(robot, w)])[None])[0] for w in (v, 0.0 * v)]
         found.append([_spectral_radius(rates.with_jacobian(x, torque)[1]) for x in at])
     flat, steep = np.max(found, axis=0)
     return float(flat), float(steep)

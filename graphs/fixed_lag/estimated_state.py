@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.fixed_lag.window.adaptation import prior_sigmas
 from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.window.newest_state import NewestState
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 
@@ -90,7 +91,8 @@ def unknown_state(robot: Robot, adapted: Sequence[str], time: float, q: Array | 
     layout = robot.layout
     mean = np.zeros(layout.size)
     if q is not None:
-        mean[layout.motor_q] = mean[layout.joint_q] = q
+        mean[layout.motor_q] = q
+        mean[layout.joint_q] = joint_angles(robot, q)
     sigmas = prior_sigmas(robot, adapted).tolist()
     return EstimatedState(
         time=time,

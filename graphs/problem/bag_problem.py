@@ -80,7 +80,11 @@ class BagProblem:
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory.spread for memory in robot.memories.values())
-        initial = InitialStateFactor(robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads)
+        # what only weighs takes the file's matrix: it must not move with its elements while they are estimated
+        seen = None if robot.transmission is None else np.asarray(np.linalg.inv(robot.transmission), dtype=np.float64)
+        initial = InitialStateFactor(
+            robot.layout, DEFLECTION_SIGMA, REST_SIGMA if rests else MOVING_SIGMA, spreads, seen
+        )
         placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
         for name in robot.sensors:
             placed += place_sensor(robot, recording, timeline, name)
@@ -115,7 +119,8 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     angles = [np.interp(middle, encoder.times, column) for column in encoder.values.T]
     layout, tree = robot.layout, robot.kinematic_tree
     q = np.zeros((len(middle), layout.n_link))
-    q[:, layout.joint_link] = np.column_stack(angles) - robot.motor_encoder.zero
+    q_motor = np.column_stack(angles) - robot.motor_encoder.zero
+    q[:, layout.joint_link] = q_motor if robot.transmission is None else q_motor @ robot.transmission.T
     return tree.weighing_inertia(q) / tree.free_inertias()[:, None]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.robot import Robot
 
@@ -26,7 +27,7 @@ class JointStates:
         times: strictly increasing, shape (m,) [s].
         q: motor positions in link units, shape (m, n) [rad]; the link's position swings about them.
         v: motor velocities in link units, shape (m, n) [rad/s].
-        deflection: q_link - q_motor, shape (m, n) [rad]; NaN where it is not known.
+        deflection: q_link - q_motor, with q_link as the motor sees it, shape (m, n) [rad]; NaN where it is not known.
         load: torque in the spring, K deflection + D rate, shape (m, n) [N m]; NaN where it is not known.
     """
 
@@ -46,6 +47,7 @@ class JointStates:
             x: states, shape (m, d).
         """
         q_link, v_link, q_motor, v_motor = np.split(_by_joint(robot, x), 4, axis=1)
+        q_link, v_link = motor_angles(robot, q_link), motor_angles(robot, v_link)
         stiffness, damping = _springs(robot)
         load = stiffness * (q_link - q_motor) + damping * (v_link - v_motor)
         return JointStates(times, q_motor, v_motor, q_link - q_motor, load)

@@ -20,6 +20,7 @@ from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
 from jointscope.graphs.scoring.columns.reading import late_column, reading_column
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.graphs.scoring.columns.transmission import transmission_columns
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
@@ -27,6 +28,7 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.effect_kinds.transmission_elements import TransmissionElements
 
 
 def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
@@ -36,6 +38,8 @@ def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
         return joint_torque_columns(hypothesis, s)
     if isinstance(effect, RobotTorque):
         return robot_torque_columns(hypothesis, s)
+    if isinstance(effect, TransmissionElements):
+        return transmission_columns(hypothesis, s)
     if isinstance(effect, CommandEffect):
         return command_columns(hypothesis, s)
     if isinstance(effect, InertiaEffect):

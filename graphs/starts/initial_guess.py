@@ -24,6 +24,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.starts.drive_starts import with_drive_starts
 from jointscope.graphs.starts.encoder_motion import encoder_motion
+from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.robot import Robot
@@ -54,11 +55,12 @@ def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:
     links = robot.link_encoder
     if links is not None:
         return np.hstack([*encoder_motion(problem.recording.streams[links.name], links, ticks), q_motor, v_motor])
-    v_link = _link_rates(problem, calibration, q_motor, v_motor)
+    q_relaxed, v_relaxed = joint_angles(robot, q_motor), joint_angles(robot, v_motor)
+    v_link = _link_rates(problem, calibration, q_relaxed, v_relaxed)
     h = np.diff(ticks, prepend=ticks[0])
     keep = float(np.exp(-np.median(h) / LEAK))
-    deflection = lfilter([1.0], [1.0, -keep], (v_link - v_motor) * h[:, None], axis=0)
-    return np.hstack([q_motor + deflection, v_link, q_motor, v_motor])
+    deflection = lfilter([1.0], [1.0, -keep], (v_link - v_relaxed) * h[:, None], axis=0)
+    return np.hstack([q_relaxed + deflection, v_link, q_motor, v_motor])
 
 
 def initial_biases(problem: BagProblem, calibration: Calibration) -> Calibration:
@@ -109,10 +111,12 @@ def _regression_signals(problem: BagProblem, x: Array) -> dict[str, Array]:
     a_smooth = sosfiltfilt(low, a_link, axis=0)
     # inverse dynamics: what the rigid bodies ask of the springs
     load = robot.tree.torque(q_link, v_link if robot.tree.coriolis else 0.0 * v_link, a_smooth)
+    load = load @ joint_angles(robot, np.eye(robot.n)).T  # T^T load, by virtual work
+    v_seen = motor_angles(robot, v_link)
     v_friction = v_link if robot.choices.friction_velocity == "link" else v_motor
     signals = {
         "load": -load,
-        "deflection_rate": v_link - v_motor,
+        "deflection_rate": v_seen - v_motor,
         "drive": robot.command_volts * u,
         "minus_v_motor": -v_motor,
         "minus_sign": -np.tanh(robot.friction_sharpness() * v_friction),

@@ -4,6 +4,7 @@
     link side   M(q) a + c(q, v) + g(q) + tau_c = tau_link effects                      (eq. 1, 5)
     motor side  b a_motor = tau_c + tau_motor(u, v_motor) - tau_friction + effects      (eq. 2, 7)
     coupling    tau_c = K (q_link - q_motor) + D (v_link - v_motor) + effects           (eq. 6)
+                where motors and joints are coupled: with A q_link for q_link, and A^T tau_c on the links
     motor       tau_motor = k_pwm U u - k_mi v_motor                                    (eq. 11)
     friction    tau_friction = mu tanh(k v)                                             (eq. 12)
     bearing     tau = -q / compliance - damping v   on each hinge of a soft bearing
@@ -26,6 +27,7 @@ from jointscope.robots.dynamics.effect_torques import EffectTorques
 from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
 from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
+from jointscope.robots.dynamics.transmission import Transmission, parted
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import StructuredTree
@@ -52,8 +54,12 @@ class ElasticJoints:
         self.names = parameters.names
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
         self._bearings = BearingSprings(robot.effects, layout, self.names)
+        self._transmission = Transmission.of(robot, self.names)
         weight = CarriedWeight(robot)
-        self._effects = EffectTorques(robot.effects, robot.joints, layout, self.names, robot.friction_sharpness, weight)
+        self._behind, self._effects = (
+            EffectTorques(some, robot.joints, layout, self.names, robot.friction_sharpness, weight)
+            for some in parted(robot, self._transmission)
+        )
         self._elastic = list(layout.elastic_joints)
         self._own_motor = layout.motor_row[self._elastic].tolist()
 
@@ -145,7 +151,11 @@ class ElasticJoints:
 
     def springs(self, x: Array, values: Mapping[str, float]) -> Springs:
         """Springs of all joints at states of shape (m, d)."""
-        return self._springs.at(x, values)
+        return self._springs.at(self.seen(x, values), values)
+
+    def seen(self, x: Array, values: Mapping[str, float]) -> Array:
+        """States as springs and motors see them, through the transmission, shape (m, d)."""
+        return x if self._transmission is None else self._transmission.seen(x, values)
 
     def named(self, parameters: Array) -> dict[str, float]:
         """All parameters by name: the free ones as given, shape (p,), the fixed ones of the robot."""
@@ -221,8 +231,12 @@ class ElasticJoints:
     def _terms(self, x: Array, values: Mapping[str, float], derivatives: bool) -> TorqueTerms:
         """All torques but the command's."""
         terms = TorqueTerms.zeros(len(x), self.layout, len(self.names), derivatives)
-        springs = self.springs(x, values)
+        y = self.seen(x, values)
+        springs = self._springs.at(y, values)
         self._springs.add(terms, springs)
+        if self._transmission is not None:
+            self._behind.add(terms, y, springs, values)
+            self._transmission.carry(terms, x, values)
         self._motors.add(terms, x, values)
         self._bearings.add(terms, x, values)
         self._effects.add(terms, x, springs, values)

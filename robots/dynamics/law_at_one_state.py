@@ -102,6 +102,27 @@ class JointLawAtOneState:
                     by_state[row, self._q_link] += sign * slopes[-1] * self._weight.slopes(x[None])[0, self._joint]
 
 
+class LawBehindTransmission:
+    """A law that sees the links as the motors do.
+
+    Args:
+        law: the law.
+        S, R: of `Transmission.maps`.
+    """
+
+    def __init__(self, law: LawAtOneState, S: Array, R: Array):
+        self._law, self._S, self._R = law, S, R
+
+    def add(self, x: Array, tau: Array, by_state: Array | None) -> None:
+        """Adds the torques; see `LawAtOneState`."""
+        own = np.zeros_like(tau)
+        by_own = None if by_state is None else np.zeros_like(by_state)
+        self._law.add(self._S @ x, own, by_own)
+        tau += self._R @ own
+        if by_state is not None and by_own is not None:
+            by_state += self._R @ by_own @ self._S
+
+
 class CoupledLawAtOneState:
     """A law of several joints.
 

@@ -17,6 +17,7 @@ from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
 from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.state_rates import linear_torques
+from jointscope.robots.dynamics.transmission import Transmission, is_behind
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotSignals, RobotTorque
@@ -110,6 +111,8 @@ class _LawOfMany:
     ):
         layout, effect = robot.layout, here.effect
         self._layout, self._effect, self._p = layout, effect, here.own(values)
+        transmission = Transmission.of(robot) if is_behind(here, robot) else None
+        self._maps = None if transmission is None else transmission.maps(values)
         self._joint = j = robot.joints.index(here.owner) if here.owner in robot.joints else 0
         self._joints, self._springs, self._sharpness = robot.joints, springs, robot.friction_sharpness(values)
         self.needs_weight = False
@@ -130,6 +133,15 @@ class _LawOfMany:
             tau: receives them, shape (m, r).
             load: torque of the weight that rigid joints carry, shape (m, n) [N m]; None where no law needs it.
         """
+        if self._maps is None:
+            self._add(x, tau, load)
+            return
+        S, R = self._maps
+        own = np.zeros_like(tau)
+        self._add(x @ S.T, own, load)
+        tau += own @ R.T
+
+    def _add(self, x: Array, tau: Array, load: Array | None) -> None:
         effect, layout = self._effect, self._layout
         if isinstance(effect, RobotTorque):
             found = effect.law(self._of_robot(x), self._p)

@@ -14,9 +14,15 @@ from numpy.typing import NDArray
 
 from jointscope.robots.dynamics.bearing_springs import BearingSprings
 from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
-from jointscope.robots.dynamics.law_at_one_state import CoupledLawAtOneState, JointLawAtOneState, LawAtOneState
+from jointscope.robots.dynamics.law_at_one_state import (
+    CoupledLawAtOneState,
+    JointLawAtOneState,
+    LawAtOneState,
+    LawBehindTransmission,
+)
 from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
+from jointscope.robots.dynamics.transmission import Transmission, is_behind
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.model.joint_parameters import JointParameters
@@ -167,6 +173,9 @@ def linear_torques(
     without_friction = {name: 0.0 if name.endswith(".coulomb_torque") else value for name, value in values.items()}
     terms = TorqueTerms.zeros(1, robot.layout, len(parameters.names), derivatives=True)
     springs.add(terms, springs.at(x, values))
+    transmission = Transmission.of(robot)
+    if transmission is not None:
+        transmission.carry(terms, x, values)
     motors.add(terms, x, without_friction)
     BearingSprings(robot.effects, robot.layout, parameters.names).add(terms, x, values)
     assert terms.by_state is not None
@@ -176,9 +185,15 @@ def linear_torques(
 def _laws(robot: Robot, springs: Springs, values: Mapping[str, float]) -> list[LawAtOneState]:
     """All torque laws among the robot's effects."""
     laws: list[LawAtOneState] = []
+    transmission = Transmission.of(robot)
+    maps = None if transmission is None else transmission.maps(values)
     for here in robot.effects:
+        law: LawAtOneState
         if isinstance(here.effect, JointTorque):
-            laws.append(JointLawAtOneState(here, robot, springs, values))
+            law = JointLawAtOneState(here, robot, springs, values)
         elif isinstance(here.effect, RobotTorque):
-            laws.append(CoupledLawAtOneState(here, robot, springs, values))
+            law = CoupledLawAtOneState(here, robot, springs, values)
+        else:
+            continue
+        laws.append(law if maps is None or not is_behind(here, robot) else LawBehindTransmission(law, *maps))
     return laws

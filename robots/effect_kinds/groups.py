@@ -9,6 +9,7 @@ from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.effect_kinds.transmission_elements import TransmissionElements
 
 GROUPS = ("motor side", "transmission", "link", "structure", "sensors", "numerics")
 SIDES = {"motor": "motor side", "spring": "transmission", "link": "link"}
@@ -22,7 +23,7 @@ def group_of(effect: Effect) -> str:
         return SIDES[effect.side]
     if isinstance(effect, CommandEffect):
         return "motor side"
-    if isinstance(effect, RobotTorque):
+    if isinstance(effect, RobotTorque | TransmissionElements):
         return "transmission"
     if isinstance(effect, InertiaEffect):
         return "link"

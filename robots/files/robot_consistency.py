@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.needed_spring import needed_spring
+from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
@@ -43,6 +44,7 @@ def check_robot(robot: Robot) -> None:
         raise RobotError(f"{place}: constants: 'motor.supply_voltage' is missing; a duty cycle needs it")
     _check_links(robot, place)
     _check_springs(robot, place)
+    check_transmission(robot, place)
     _check_parameters(robot, place)
 
 
@@ -186,7 +188,7 @@ def _check_parameters(robot: Robot, place: str) -> None:
     of_effects = {
         here.parameter(p.name): p.unit for here in robot.effects for p in here.effect.parameters_at(robot, here.owner)
     }
-    units |= of_effects
+    units |= of_effects | element_units(robot)
     units |= {name: "m" for sensor in robot.accelerometers for name in sensor.lever}
     for name, parameter in robot.parameters.items():
         if name not in units:

@@ -23,6 +23,7 @@ from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.noise_section import process_noise
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
+from jointscope.robots.files.transmission_section import transmission_matrix
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
@@ -81,6 +82,9 @@ def load_robot(name_or_path: str | Path) -> Robot:
     sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
     parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
     controller = top.section("controller").build(lambda s: _controller(s, joints)) if "controller" in top else None
+    matrix = (
+        top.section("transmission").build(lambda s: transmission_matrix(s, joints)) if "transmission" in top else None
+    )
     noise_section = top.section("noise", *([{}] if choices.link_dynamics == "free" else []))
     robot = Robot(
         name=top.text("name"),
@@ -96,6 +100,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         path=path,
         document=document,
         controller=controller,
+        transmission=matrix,
     )
     robot = replace(robot, held_at_mean=_held_at_mean(top, locked))
     robot = with_effects(robot, top.texts("effects", ()))

@@ -12,6 +12,7 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from jointscope.robots.files.robot_file import dump_document, urdf_reference
+from jointscope.robots.files.transmission_section import write_transmission
 from jointscope.robots.model.robot import Robot
 
 
@@ -40,6 +41,7 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
             entry["sigma"] = _rounded(parameter.sigma, 3)
         entry.setdefault("prior", _rounded(parameter.prior))
         entry.setdefault("prior_sigma", _rounded(parameter.prior_sigma))
+    write_transmission(document, robot)
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
             _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)

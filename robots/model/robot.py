@@ -54,6 +54,7 @@ class Robot:
         controller: that of drives which are commanded by a position; None for others, or where it is not known.
         path: the file it was read from.
         document: the file's content with comments, for writing it again.
+        transmission: joint angles per motor angle, q_joint = T q_motor, shape (n, n); None for the identity.
         held_at_mean: joints in `locked` that move in recordings, and are held on the user's word.
         as_filed: the rigid bodies as the file has them, where `tree` is in another posture.
     """
@@ -74,6 +75,7 @@ class Robot:
     controller: PositionController | None = None
     as_filed: RigidTree | None = None
     held_at_mean: tuple[str, ...] = ()
+    transmission: Array | None = None
 
     @property
     def n(self) -> int:

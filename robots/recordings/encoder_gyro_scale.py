@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Gyro
 from jointscope.robots.recordings.joint_motion import window_mean
@@ -78,9 +79,9 @@ def slopes_of(recording: Recording, robot: Robot, gyro: Gyro) -> list[Slope]:
         np.column_stack([np.interp(times + shift, encoder.times, angle) for angle in encoder.values.T])
         for shift in (-STEP / 2, 0.0, STEP / 2)
     )
-    v = (after - before) / STEP
+    v = joint_angles(robot, (after - before) / STEP)
     bend = np.gradient(np.gradient(v, times, axis=0), times, axis=0)
-    J = gyro.R_imu_body @ robot.tree.body_rate(gyro.body, q - robot.motor_encoder.zero, v)[2]
+    J = gyro.R_imu_body @ robot.tree.body_rate(gyro.body, joint_angles(robot, q - robot.motor_encoder.zero), v)[2]
     measured = _slow(window_mean(streams[1], times, STEP))
     turns = [_slow(J[:, :, j] * v[:, [j]]) for j in range(robot.n)]
     seen = [j for j in range(robot.n) if np.sqrt(np.mean(np.sum(turns[j] ** 2, axis=1))) > ENOUGH_RATE]

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.accelerometer_plausibility import check_accelerometers
@@ -63,7 +65,8 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     notices = [*about_bodies(recording, robot), *_check_overlap(recording)]
     robot = robot.in_posture(recording.posture)
     _check_command(recording.command, robot)
-    motion = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
+    turned = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
+    motion = replace(turned, q=joint_angles(robot, turned.q), v=joint_angles(robot, turned.v))
     notices += check_accelerometers(recording, robot)
     for name in robot.sensors:
         _check_changes(recording, recording.streams[name], robot)

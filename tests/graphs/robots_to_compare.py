@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.parameter import Parameter
 
 MIMICKING = Path(__file__).with_name("mimicking_doggy.urdf")
 
@@ -33,6 +35,14 @@ def mimicking(robot, joints):
     """The robot on other bodies: a continuous joint, links that follow, an ear that is held, gravity."""
     tree = RigidTree(MIMICKING, joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7})
     return replace(robot, tree=tree, joints=tuple(joints))
+
+
+def coupled(robot):
+    """The robot behind a full matrix, half of whose elements are parameters, with laws on all sides of it."""
+    T = np.array([[1.1, 0.0, 0.0], [0.2, 0.9, 0.0], [-0.1, 0.3, 1.0]])
+    places = {"joint1.from_joint1": (0, 0), "joint2.from_joint1": (1, 0), "joint3.from_joint2": (2, 1)}
+    elements = {name: Parameter(name, T[at], "rad/rad", T[at], 1.0, positive=False) for name, at in places.items()}
+    return replace(robot, transmission=T, parameters={**robot.parameters, **elements})
 
 
 def _with(effect, robot):
@@ -65,6 +75,11 @@ def _every():
     yield "bearing and a rigid joint", _rigid(_with(bearing, READY), "joint2")
     for name in ("cogging", "hysteresis"):
         yield f"bearing and {name}", _with(catalogue()[name], _with(bearing, READY))
+    yield "coupled joints", coupled(READY)
+    yield "coupled joints and friction on links", coupled(PAPER)
+    laws = ("load_dependent_friction", "spring_cubic", "hysteresis", "link_viscous", "kinematic_coupling")
+    yield "coupled joints and laws", reduce(lambda robot, law: _with(catalogue()[law], robot), laws, coupled(READY))
+    yield "coupled joints and bearing", _with(bearing, coupled(READY))
 
 
 ROBOTS = dict(_every())

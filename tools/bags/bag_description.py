@@ -103,6 +103,7 @@ class BagDescription:
         usable: whether the recording can be used for that robot; None without one.
         problem: why not.
         notices: what was dropped or looked odd, for that robot.
+        transmission: joint angles per motor angle of that robot, row by row; None where each motor moves its own.
     """
 
     path: str
@@ -116,6 +117,7 @@ class BagDescription:
     usable: bool | None = None
     problem: str | None = None
     notices: tuple[str, ...] = field(default_factory=tuple)
+    transmission: tuple[tuple[float, ...], ...] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The description as plain lists, dictionaries, texts and numbers; NaN becomes None."""
@@ -146,6 +148,9 @@ class BagDescription:
                 lines.append(f"{need.stream}: {need.problem}")
                 if need.candidates:
                     lines.append(f"    topics of that type: {', '.join(need.candidates)}")
+        if self.transmission is not None:
+            lines.append("transmission: joint angles = matrix times motor angles")
+            lines += [f"    {row}" for row in _table([tuple(f"{v:.6g}" for v in row) for row in self.transmission])]
         lines += [f"note: {notice}" for notice in self.notices]
         if self.usable:
             lines.append(f"The recording can be used for {self.robot}.")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.resting_joints import must_move
@@ -73,7 +74,14 @@ def describe_bag(path: str | Path, robot: Robot | None = None, progress: Progres
         usable=problem is None if robot else None,
         problem=problem,
         notices=notices,
+        transmission=_transmission(robot) if robot else None,
     )
+
+
+def _transmission(robot: Robot) -> tuple[tuple[float, ...], ...] | None:
+    """Joint angles per motor angle; None where every motor moves its own joint alone."""
+    T = joint_angles(robot, np.eye(robot.n)).T
+    return None if np.array_equal(T, np.eye(robot.n)) else tuple(map(tuple, T.tolist()))
 
 
 def _type_with_floats(bag: Bag, topic: str) -> MessageType | str | None:

@@ -18,6 +18,7 @@ from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.window.newest_state import NewestState
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ def first_state(
     v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * float(np.max(sigma)) / span, 0.5 * ACCELERATION * span)
     mean, variance = np.zeros(layout.size), np.zeros(layout.size)
     mean[own.motor_q], mean[own.motor_v] = q[-1], v
-    mean[own.joint_q], mean[own.joint_v] = q[-1], v
+    mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, q[-1]), joint_angles(robot, v)
     variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, v_sigma**2
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.scoring.columns.column import STEP, Column, null_values
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.dynamics.transmission import is_behind
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 
 Array = NDArray[np.float64]
@@ -22,7 +23,8 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     effect, layout = hypothesis.here.effect, s.model.layout
     assert isinstance(effect, JointTorque)
     j = s.robot.joints.index(hypothesis.here.owner)
-    signals = joint_signals(s, j)
+    x = s.seen if is_behind(hypothesis.here, s.robot) else s.x
+    signals = joint_signals(s, j, x)
     p = null_values(hypothesis)
     if effect.memory is not None:
         signals = signals_with_memory(effect, signals, p, s.ticks)
@@ -35,18 +37,18 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
         tau = np.zeros((len(s.ticks), layout.n_rates))
         for row, sign in rows:
             tau[:, row] = sign * slope
-        found.append(Column(at_ticks=s.accelerations(tau)))
+        found.append(Column(at_ticks=s.accelerations(s.in_equations(tau, hypothesis.here))))
     return found
 
 
-def joint_signals(s: ScoreSignals, j: int) -> JointSignals:
-    """Motion of one joint."""
+def joint_signals(s: ScoreSignals, j: int, x: Array) -> JointSignals:
+    """Motion of one joint, of the states x or of those seen through the transmission, shape (m + 1, d)."""
     layout = s.model.layout
     return JointSignals(
-        q_link=s.x[:, layout.joint_q[j]],
-        v_link=s.x[:, layout.joint_v[j]],
-        q_motor=s.x[:, layout.motor_q[j]],
-        v_motor=s.x[:, layout.motor_v[j]],
+        q_link=x[:, layout.joint_q[j]],
+        v_link=x[:, layout.joint_v[j]],
+        q_motor=x[:, layout.motor_q[j]],
+        v_motor=x[:, layout.motor_v[j]],
         tau_spring=s.tau_spring[:, j],
         stiffness=float(s.stiffness[j]),
         sharpness=s.robot.sharpness_of(s.robot.joints[j]),

@@ -16,10 +16,10 @@ def robot_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     effect, layout, joints = hypothesis.here.effect, s.model.layout, s.robot.joints
     assert isinstance(effect, RobotTorque)
     signals = RobotSignals(
-        q_link=s.x[:, layout.joint_q],
-        v_link=s.x[:, layout.joint_v],
-        q_motor=s.x[:, layout.motor_q],
-        v_motor=s.x[:, layout.motor_v],
+        q_link=s.seen[:, layout.joint_q],
+        v_link=s.seen[:, layout.joint_v],
+        q_motor=s.seen[:, layout.motor_q],
+        v_motor=s.seen[:, layout.motor_v],
         stiffness=s.stiffness,
         damping=s.damping,
         joints=joints,
@@ -33,5 +33,5 @@ def robot_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
         for j in range(len(joints)):
             tau[:, layout.joint_link[j]] += np.imag(link)[:, j] / STEP
             tau[:, layout.motor_row[j]] += np.imag(motor)[:, j] / STEP
-        found.append(Column(at_ticks=s.accelerations(tau)))
+        found.append(Column(at_ticks=s.accelerations(s.in_equations(tau, hypothesis.here))))
     return found

@@ -13,6 +13,8 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.dynamics.transmission import Transmission, is_behind
+from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -29,6 +31,8 @@ class ScoreSignals:
         values: all parameters by full name.
         ticks: shape (m + 1,) [s].
         x: smoothed states, shape (m + 1, d).
+        seen: the same as springs and motors see them, through the transmission, shape (m + 1, d).
+        torque_map: puts torques behind the transmission into the equations of motion, shape (r, r); None for none.
         rate: their time derivative by differences, shape (m + 1, d).
         a_link: link accelerations by the model, shape (m + 1, n_link) [rad/s^2].
         M_inverse: shape (m + 1, n_link, n_link).
@@ -46,6 +50,8 @@ class ScoreSignals:
     values: dict[str, float]
     ticks: Array
     x: Array
+    seen: Array
+    torque_map: Array | None
     rate: Array
     a_link: Array
     M_inverse: Array
@@ -66,7 +72,7 @@ class ScoreSignals:
         u = problem.dynamics.command(parameters)
         both = np.vstack([u, u[-1:]])
         here = model.with_derivatives(x, both, parameters)
-        springs = model.springs(x, values)
+        springs, transmission = model.springs(x, values), Transmission.of(problem.robot)
         return ScoreSignals(
             robot=problem.robot.with_values(values),
             model=model,
@@ -74,6 +80,8 @@ class ScoreSignals:
             values=values,
             ticks=ticks,
             x=x,
+            seen=model.seen(x, values),
+            torque_map=None if transmission is None else transmission.maps(values)[1],
             rate=np.gradient(x, ticks, axis=0, edge_order=2),
             a_link=here.value[:, : layout.n_link],
             M_inverse=here.rigid.by_torque,
@@ -84,6 +92,10 @@ class ScoreSignals:
             tau_spring=springs.torque + CarriedWeight(problem.robot).torque(x),
             inertia=model.motor_inertia(values),
         )
+
+    def in_equations(self, tau: Array, here: EffectAt) -> Array:
+        """Torques of an effect in the equations of motion, shape (m + 1, r) both."""
+        return tau if self.torque_map is None or not is_behind(here, self.robot) else tau @ self.torque_map.T
 
     def accelerations(self, tau: Array) -> Array:
         """What torques on the equations of motion do, shape (m + 1, r) both; rows of memories are zero."""

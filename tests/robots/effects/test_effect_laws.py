@@ -11,7 +11,6 @@ import pytest
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
-from jointscope.robots.effect_kinds.robot_torque import RobotSignals
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_check import null_values
@@ -104,36 +103,6 @@ def test_hysteresis_takes_another_way_back():
         z[k + 1] = z[k] + (t[1] - t[0]) * effect.memory.rate(s, p)
     assert 0.9 < z.max() <= 1.001 and -1.001 <= z.min() < -0.9
     assert np.sum(p["torque"] * z * rate) * (t[1] - t[0]) == pytest.approx(4 * 2 * 2.0 * 0.2, rel=0.1)
-
-
-# torques of several joints
-
-
-def robot_signals(q_link, v_link) -> RobotSignals:
-    rng = np.random.default_rng(3)
-    q_motor, v_motor = rng.normal(size=(2, *q_link.shape))
-    K, D = np.array([200.0, 120.0, 100.0]), np.array([5.0, 4.0, 8.0])
-    return RobotSignals(q_link, v_link, q_motor, v_motor, K, D, DOGGY.joints, 2, 200.0)
-
-
-def test_coupling_is_nothing_at_null():
-    effect = catalogue()["kinematic_coupling"]
-    s = robot_signals(*np.random.default_rng(4).normal(size=(2, 5, 3)))
-    p = null_values(effect.parameters_of(DOGGY, "joint3"))
-    assert set(p) == {"from_joint1", "from_joint2"}
-    assert all(np.all(torque == 0.0) for torque in effect.law(s, p))
-
-
-def test_coupling_follows_from_a_potential_and_a_dissipation():
-    """Torques are minus the gradients of K delta^2 / 2 by the positions and D rate^2 / 2 by the velocities."""
-    effect, c = catalogue()["kinematic_coupling"], np.array([0.1, -0.3, 0.0])
-    s = robot_signals(*np.random.default_rng(4).normal(size=(2, 5, 3)))
-    delta, rate = ((link - motor)[:, 2] - link @ c for link, motor in ((s.q_link, s.q_motor), (s.v_link, s.v_motor)))
-    tau = 100.0 * delta + 8.0 * rate
-    base = 100.0 * (s.q_link - s.q_motor)[:, 2] + 8.0 * (s.v_link - s.v_motor)[:, 2]
-    link, motor = effect.law(s, {"from_joint1": 0.1, "from_joint2": -0.3})
-    np.testing.assert_allclose(link, np.column_stack([0.1 * tau, -0.3 * tau, base - tau]), atol=1e-12)
-    np.testing.assert_allclose(motor, np.column_stack([0 * tau, 0 * tau, tau - base]), atol=1e-12)
 
 
 # inertia

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.closed_loop.planning.plan import Plan
 from jointscope.tools.simulator.loop.controller import full_command, proportional
@@ -22,7 +23,7 @@ class ProportionalControl:
     """
 
     def __init__(self, robot: Robot, plan: Plan):
-        self._targets, self._motors, self._full = plan.q, robot.layout.motor_q, full_command(robot)
+        self._targets, self._motors, self._full = motor_angles(robot, plan.q), robot.layout.motor_q, full_command(robot)
 
     def command(self, tick: int, x: Array) -> Array:
         """The command of a tick, shape (n_joints,)."""

@@ -3,6 +3,7 @@
 
     torque on the links   F = M (a_planned - a_free)       a_free: accelerations with relaxed springs
     springs               K s + D ds/dt = F                s = q_motor - q_link, likewise the hinges of soft bearings
+                                                     (behind a transmission T: A q_link, and T^T F)
     command               u = b (d2q_motor/dt2 - a_motor(x, u = 0)) / (k_pwm U)
 
 All torques come from the robot file's model with all its effects; those of commands (delays, dead bands) are left out.
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import bearing_names
 
@@ -55,8 +57,8 @@ def model_reference(robot: Robot, times: Array, q: Array, v: Array, a: Array) ->
     parameters = parameter_values(model, robot)
     values = model.named(parameters)
     x = np.zeros((len(q), layout.size))
-    for position, velocity in ((layout.motor_q, layout.motor_v), (layout.joint_q, layout.joint_v)):
-        x[:, position], x[:, velocity] = q, v
+    x[:, layout.motor_q], x[:, layout.motor_v] = motor_angles(robot, q), motor_angles(robot, v)
+    x[:, layout.joint_q], x[:, layout.joint_v] = q, v
     no_command = np.zeros((len(q), len(layout.joints)))
     free = model.with_derivatives(x, no_command, parameters)
     wanted = np.zeros((len(q), layout.n_link))
@@ -64,9 +66,9 @@ def model_reference(robot: Robot, times: Array, q: Array, v: Array, a: Array) ->
     missing = (wanted - free.value[:, : layout.n_link])[..., None]
     torque: Array = np.linalg.solve(free.rigid.by_torque, missing)[..., 0].astype(np.float64)
     springs = model.springs(x, values)
+    loads = torque[:, layout.joint_link] @ joint_angles(robot, np.eye(robot.n)).T  # T^T F, by virtual work
     for i in layout.elastic_joints:
-        load = torque[:, layout.joint_link[i]]
-        stretch = _yielding(load, springs.stiffness[i], springs.damping[i], step)
+        stretch = _yielding(loads[:, i], springs.stiffness[i], springs.damping[i], step)
         x[:, layout.motor_q[i]] += stretch
         x[:, layout.motor_v[i]] += np.gradient(stretch, step)
     for link, stiffness, damping in _bearings(robot):

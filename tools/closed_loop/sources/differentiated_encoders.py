@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.closed_loop.planning.reference import Reference
 from jointscope.tools.simulator.loop.online_sensors import Sample
@@ -33,6 +34,7 @@ class DifferentiatedEncoders:
     """
 
     def __init__(self, robot: Robot, reference: Reference, cutoff: float = CUTOFF):
+        self._robot = robot
         self._encoder, self._layout, self._reference = robot.motor_encoder, robot.layout, reference
         self._time_constant = 1.0 / (2.0 * np.pi * cutoff)
         self._stamp: float | None = None
@@ -58,7 +60,7 @@ class DifferentiatedEncoders:
             (self._v, layout.joint_v, layout.motor_v),
         ):
             error = found - planned[motors]
-            x[links] = planned[links] + error
+            x[links] = planned[links] + joint_angles(self._robot, error)
             x[motors] = planned[motors] + error
         return x
 

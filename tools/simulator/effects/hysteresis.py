@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
-from jointscope.tools.simulator.world.specification import add_dry_friction, motor_joint, set_linear
+from jointscope.tools.simulator.world.specification import add_dry_friction, add_tendon, set_linear
 
 Array = NDArray[np.float64]
 
@@ -47,10 +47,8 @@ class Hysteresis(SimulatedEffect):
         slider = spec.worldbody.add_body(name=name, explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
         hinge = slider.add_joint(name=name, type=load_mujoco().mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
         add_dry_friction(hinge, strength)
-        tendon = spec.add_tendon(name=name)
-        for joint, sign in ((self.owner, 1.0), (motor_joint(self.owner), -1.0), (name, -1.0)):
-            tendon.wrap_joint(joint, sign)
-        tendon.springlength = [0.0, 0.0]
+        tendon = add_tendon(spec, name, self.owner, self.shares[self.owner])
+        tendon.wrap_joint(name, -1.0)
         set_linear(tendon, "stiffness", stiffness)
         set_linear(tendon, "damping", 2.0 * SLIDER_DAMPING_RATIO * stiffness / SLIDER_RATE)
 

@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moving one joint moves another one's spring, as with belts over the axes before: more terms in its tendon."""
+"""Moving one joint moves another one's spring, as with belts over the axes before.
+
+The engine makes terms of the springs' tendons of the joint angles per motor angle.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import EffectError
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import spring_tendon
+
+Array = NDArray[np.float64]
 
 NEIGHBOUR = 0.03  # [rad/rad] from the joint before, by default
 
 
 class KinematicCoupling(SimulatedEffect):
-    """The owner's deflection is q_link - q_motor - sum of from_<joint> q_link over the other joints.
+    """With no spring stretched, the owner turns by from_<joint> for every turn of another joint's motor.
 
     The engine makes the reaction on the other links of its own.
     """
@@ -32,9 +38,8 @@ class KinematicCoupling(SimulatedEffect):
         neighbour = joints[own - 1] if own else joints[1]
         return {f"from_{joint}": NEIGHBOUR * (joint == neighbour) for joint in joints if joint != self.owner}
 
-    def edit(self, spec: Any) -> None:
-        """Adds the other links to the spring's tendon."""
-        tendon = spec.tendon(spring_tendon(self.owner))
+    def couple(self, T: Array) -> None:
+        """Lets the other joints' motors move the owner's joint."""
+        joints = self.robot.joints
         for name, ratio in self.parameters.items():
-            if ratio != 0:
-                tendon.wrap_joint(name.removeprefix("from_"), -ratio)
+            T[joints.index(self.owner), joints.index(name.removeprefix("from_"))] += ratio

@@ -10,7 +10,7 @@ import numpy as np
 
 from jointscope.robots.errors import SimulationError
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import motor_joint
+from jointscope.tools.simulator.world.specification import add_tendon
 
 
 class SpringCubic(SimulatedEffect):
@@ -22,10 +22,7 @@ class SpringCubic(SimulatedEffect):
 
     def edit(self, spec: Any) -> None:
         """Adds a tendon between link and rotor whose stiffness is cubic only."""
-        tendon = spec.add_tendon(name=f"{self.owner}.cubic_spring")
-        tendon.wrap_joint(self.owner, 1.0)
-        tendon.wrap_joint(motor_joint(self.owner), -1.0)
-        tendon.springlength = [0.0, 0.0]
+        tendon = add_tendon(spec, f"{self.owner}.cubic_spring", self.owner, self.shares[self.owner])
         if np.size(tendon.stiffness) != 3:
             raise SimulationError("effect spring_cubic needs MuJoCo 4: pip install --upgrade 'jointscope[sim]'")
         tendon.stiffness[:] = [0.0, 0.0, self.parameters["stiffness"]]

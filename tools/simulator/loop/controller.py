@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.loop.motion import Motion
@@ -32,12 +33,13 @@ class PController:
     def __init__(self, robot: Robot, motion: Motion, encoder: OnlineEncoder):
         self.commands = np.zeros_like(motion.targets)
         self._motion, self._encoder = motion, encoder
+        self._targets = motor_angles(robot, motion.targets)
         self._full = full_command(robot)
 
     def __call__(self, tick: int, past: Trajectory) -> Array:
         """The command of a tick, shape (n_joints,), for what has happened until now."""
         motion, measured = self._motion, self._encoder.read(tick, past)
-        self.commands[tick] = self._full * proportional(motion.targets[tick] - measured, motion.limits[tick])
+        self.commands[tick] = self._full * proportional(self._targets[tick] - measured, motion.limits[tick])
         return self.commands[tick]
 
 

@@ -2,10 +2,10 @@
 """The contract of a simulated effect: one subclass per file in `effects/`, registered by being there.
 
 An effect says what it is called, what it acts on and the sizes it has by default, and overrides those hooks that it
-needs. Hooks run in this order: `edit` once, before the engine compiles its model; `bind` once, after; then `command`
-once per fine step, `torque` at every force evaluation (four per fine step), `age` and `reading` of the encoders at
-every tick of the controller; and after the run `taken_at`, `age`, `reading` and `logged` per sensor. Prefer `edit`:
-what the engine has of its own is fast and shares nothing with the estimator.
+needs. Hooks run in this order: `couple` and `edit` once, before the engine compiles its model; `bind` once, after;
+then `command` once per fine step, `torque` at every force evaluation (four per fine step), `age` and `reading` of the
+encoders at every tick of the controller; and after the run `taken_at`, `age`, `reading` and `logged` per sensor.
+Prefer `edit`: what the engine has of its own is fast and shares nothing with the estimator.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ class SimulatedEffect:
         mistake: not physics but a wrong setting.
         loads_at_rest: the engine must settle before the recording begins.
         friction: the engine's Coulomb friction, "dry" or "smooth"; set by the engine before `edit`.
+        shares: of the links in the deflection of each spring, by names of joints; set by the engine before `edit`.
 
     Raises:
         EffectError: wrong owner, unknown parameter, impossible value.
@@ -74,6 +75,7 @@ class SimulatedEffect:
     mistake: ClassVar[bool] = False
     loads_at_rest: ClassVar[bool] = False
     friction: str = "dry"
+    shares: Mapping[str, Mapping[str, float]]
 
     def __init__(self, owner: str, parameters: Mapping[str, float], robot: Robot):
         owners = [name for kind in self.acts_on for name in owners_of(kind, robot)]
@@ -102,6 +104,9 @@ class SimulatedEffect:
     def default_parameters(self) -> Mapping[str, float]:
         """Parameters and their sizes for this owner and robot."""
         return self.defaults
+
+    def couple(self, T: Array) -> None:
+        """Changes the joint angles per motor angle with no spring stretched, shape (n_joints, n_joints), in place."""
 
     def edit(self, spec: Any) -> None:
         """Changes the `mujoco.MjSpec` before it is compiled."""

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs MuJoCo at a fine step below a controller that ticks every millisecond.
 
-The engine integrates with Runge-Kutta of fourth order. What it does not know of its own (the smooth Coulomb law, the
-torques of some effects) enters through its passive-force callback, at each of the four stages, so that the order of
-the integration is kept.
+The engine integrates with Runge-Kutta of fourth order. What it does not know of its own (smooth Coulomb law, torques
+of some effects) enters through its passive-force callback, at each of the four stages: the order is kept.
 """
 
 from __future__ import annotations
@@ -22,7 +21,14 @@ from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
 from jointscope.tools.simulator.world.hooks import acting
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.rotor_friction import RotorFriction
-from jointscope.tools.simulator.world.specification import build_specification, drive, link_body, motor_joint
+from jointscope.tools.simulator.world.specification import (
+    build_specification,
+    deflection_shares,
+    drive,
+    link_body,
+    motor_joint,
+    transmission,
+)
 from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -63,9 +69,13 @@ class Engine:
         self._mujoco = load_mujoco()
         self._steps = steps_per_tick
         self.effects = tuple(effects)
-        spec = build_specification(robot, friction, TICK / steps_per_tick)
+        self._T = transmission(robot)
         for effect in self.effects:
-            effect.friction = friction
+            effect.couple(self._T)
+        shares = deflection_shares(robot, self._T)
+        spec = build_specification(robot, friction, TICK / steps_per_tick, shares)
+        for effect in self.effects:
+            effect.friction, effect.shares = friction, shares
             effect.edit(spec)
         try:
             self.model = spec.compile()
@@ -102,9 +112,9 @@ class Engine:
         return tuple(self.model.joint(i).name for i in range(self.model.njnt))
 
     def place(self, position: Array) -> None:
-        """Puts links and rotors at a position, shape (n_joints,) [rad], at rest with relaxed springs."""
+        """Puts links at a position, shape (n_joints,) [rad], and rotors where springs are relaxed, at rest."""
         self._mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[self._link] = self.data.qpos[self._motor] = position
+        self.data.qpos[self._link], self.data.qpos[self._motor] = position, np.linalg.solve(self._T, position)
         for place, follower in self._followers:
             self.data.qpos[place] = follower.position(self.data.joint(follower.leader).qpos[0])
 

@@ -2,13 +2,15 @@
 """The MuJoCo model of a robot with elastic joints, built from parts that the engine already has.
 
 Each link is a body with its joint. Each rotor is a body of its own in the world, so it feels nothing of the link's
-motion but the spring: a fixed tendon of "length" q_link - q_motor with stiffness and damping. The motor is an actuator
+motion but the spring: a fixed tendon of "length" q_link - q_motor with stiffness and damping; where a transmission
+couples joints, several links take part in its length. The motor is an actuator
 on the rotor whose gain is the voltage constant and whose bias is the back-EMF. Dry friction is the engine's own
 friction loss. No equation of motion is written here; the engine makes them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from jointscope.tools.simulator.world.inertia import full_inertia
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 
 Array = NDArray[np.float64]
+Shares = Mapping[str, Mapping[str, float]]  # of links in the deflection of each joint's spring
 
 DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
 STIFF = (4e-4, 1.0)  # [s] time constant and damping ratio with which a mimic joint is pulled back; two steps at 5 kHz
@@ -37,13 +40,38 @@ def motor_joint(joint: str) -> str:
     return f"{joint}.motor"
 
 
-def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
+def transmission(robot: Robot) -> Array:
+    """Joint angles per motor angle while no spring is stretched, shape (n_joints, n_joints)."""
+    T = np.eye(robot.n) if robot.transmission is None else robot.transmission.copy()
+    for i, joint in enumerate(robot.joints):
+        for j, motor in enumerate(robot.joints):
+            own = robot.parameters.get(f"{joint}.from_{motor}")
+            T[i, j] = T[i, j] if own is None else own.value
+    return T
+
+
+def deflection_shares(robot: Robot, T: Array) -> Shares:
+    """How far each spring is stretched per angle of each link, by names of joints; those of zero are left out.
+
+    Args:
+        robot: its joints.
+        T: joint angles per motor angle, shape (n_joints, n_joints).
+    """
+    unstretched = np.linalg.solve(T, np.eye(robot.n))
+    return {
+        joint: {other: float(share) for other, share in zip(robot.joints, row, strict=True) if share != 0.0}
+        for joint, row in zip(robot.joints, unstretched, strict=True)
+    }
+
+
+def build_specification(robot: Robot, friction: str, timestep: float, shares: Shares) -> Any:
     """The editable model: chain, rotors, springs, motors, one site per gyro.
 
     Args:
         robot: the robot with the true parameter values.
         friction: "dry" for the engine's friction loss on the rotors; anything else leaves them without friction.
         timestep: of the integration [s].
+        shares: of the links in the deflections of the springs.
 
     Returns:
         A `mujoco.MjSpec`, not yet compiled. Joints carry the robot's joint names, rotors `motor_joint(name)`.
@@ -59,7 +87,7 @@ def build_specification(robot: Robot, friction: str, timestep: float) -> Any:
     _tie_followers(mujoco, spec, robot)
     for joint in robot.joints:
         _add_rotor(mujoco, spec, robot, joint, friction)
-        _add_spring(spec, robot, joint)
+        _add_spring(spec, robot, joint, shares[joint])
         _add_motor(mujoco, spec, robot, joint)
     for gyro in robot.gyros:
         _add_site(spec, robot, gyro.name, gyro.body)
@@ -126,13 +154,27 @@ def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) 
         add_dry_friction(hinge, robot.parameter(f"{joint}.coulomb_torque").value)
 
 
-def _add_spring(spec: Any, robot: Robot, joint: str) -> None:
-    tendon = spec.add_tendon(name=spring_tendon(joint))
-    tendon.wrap_joint(joint, 1.0)
-    tendon.wrap_joint(motor_joint(joint), -1.0)
-    tendon.springlength = [0.0, 0.0]
+def _add_spring(spec: Any, robot: Robot, joint: str, shares: Mapping[str, float]) -> None:
+    tendon = add_tendon(spec, spring_tendon(joint), joint, shares)
     set_linear(tendon, "stiffness", robot.parameter(f"{joint}.stiffness").value)
     set_linear(tendon, "damping", robot.parameter(f"{joint}.damping").value)
+
+
+def add_tendon(spec: Any, name: str, joint: str, shares: Mapping[str, float]) -> Any:
+    """A tendon without stiffness whose length is the deflection of a joint's spring, relaxed at zero.
+
+    Args:
+        spec: the model.
+        name: of the tendon.
+        joint: whose motor is at its end.
+        shares: of the links in its length.
+    """
+    tendon = spec.add_tendon(name=name)
+    for link, share in shares.items():
+        tendon.wrap_joint(link, share)
+    tendon.wrap_joint(motor_joint(joint), -1.0)
+    tendon.springlength = [0.0, 0.0]
+    return tendon
 
 
 def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
@@ -185,7 +227,7 @@ def add_dry_friction(hinge: Any, torque: float) -> None:
 
 
 def spring_tendon(joint: str) -> str:
-    """Name of the tendon whose length is the deflection of a joint, q_link - q_motor."""
+    """Name of the tendon whose length is the deflection of a joint's spring."""
     return f"{joint}.spring"
 
 
