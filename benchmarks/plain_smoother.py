@@ -32,6 +32,15 @@ class KnownModel:
     factor: Factor
     calibration: Calibration
 
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.factor)
+
+    @property
+    def name(self) -> str:
+        """As the factor's."""
+        return self.factor.name
+
     @property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows."""

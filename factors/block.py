@@ -40,6 +40,14 @@ class BlockKind:
     to_gtsam: Callable[[Array], Any]
     from_gtsam: Callable[[gtsam.Values, int], Array]
 
+    def __reduce__(self) -> tuple[Callable[[str], BlockKind], tuple[str]]:
+        """Another process has the same kinds."""
+        return _kind, (self.name,)
+
+
+def _kind(name: str) -> BlockKind:
+    return next(kind for kind in (VECTOR, POINT, ROT3, POSE3) if kind.name == name)
+
 
 def _turned(R: Array, step: Array) -> Array:
     return np.asarray(R @ Rotation.from_rotvec(step).as_matrix())

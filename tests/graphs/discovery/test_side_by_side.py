@@ -41,6 +41,15 @@ def test_a_worker_that_is_killed_costs_nothing_but_time():
         assert [first, *results] == [divmod(100, 7), divmod(100, 9), divmod(100, 11)]
 
 
+def test_a_calibration_goes_to_another_process(doggy):
+    from jointscope.factors.calibration import Calibration
+
+    calibration = Calibration.of(doggy)
+    again = pickle.loads(pickle.dumps(calibration))
+    assert again.layout == calibration.layout
+    assert all(np.array_equal(again[name], calibration[name]) for name in calibration.layout)
+
+
 def test_there_is_a_core():
     assert available_cores() >= 1
 
