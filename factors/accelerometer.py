@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Linearization
-from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
 from jointscope.robots.bodies.body_accelerations import SpecificForce, specific_force
+from jointscope.robots.bodies.body_rates import skew
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.sensors import Accelerometer
 from jointscope.robots.parts.state_layout import StateLayout

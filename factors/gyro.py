@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Linearization
 from jointscope.factors.sensor_factor import SensorFactor
+from jointscope.robots.bodies.body_rates import skew
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.sensors import Gyro
 from jointscope.robots.parts.state_layout import StateLayout
@@ -63,11 +64,3 @@ class GyroFactor(SensorFactor[Gyro]):
         }
         residual = omega_body @ R.T + calibration[bias_block(self.name)] - self.measured
         return Linearization(residual, (by_state,), by_block)
-
-
-def skew(w: Array) -> Array:
-    """Matrices [w]x with [w]x u = w x u, for vectors of shape (m, 3); shape (m, 3, 3)."""
-    matrix = np.zeros((len(w), 3, 3))
-    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
-    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = w[:, 2], -w[:, 1], w[:, 0]
-    return matrix

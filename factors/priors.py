@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Factor, Linearization, Samples
-from jointscope.factors.gyro import skew
+from jointscope.robots.bodies.body_rates import skew
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro
 

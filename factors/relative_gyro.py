@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration, bias_block, rotation_block
 from jointscope.factors.factor import Linearization, Samples
-from jointscope.factors.gyro import skew
 from jointscope.factors.sensor_factor import SensorFactor
+from jointscope.robots.bodies.body_rates import skew
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.sensors import Gyro
 from jointscope.robots.parts.state_layout import StateLayout

@@ -14,13 +14,16 @@ with R = Exp(-e q) R_i^T. Derivatives by positions, velocities and accelerations
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.body_rates import turned_back
-from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.bodies.body_rates import skew, turned_back, unit_motion
+
+if TYPE_CHECKING:
+    from jointscope.robots.bodies.rigid_tree import RigidTree
 
 Array = NDArray[np.float64]
 
@@ -67,7 +70,7 @@ def specific_force(
         a: accelerations, shape (m, n) [rad/s^2].
         gravity: in the base frame, shape (3,) [m/s^2]; None for that of the tree.
     """
-    frame, coupling, chain = tree.frame_id(body), tree.coupling, BodyAccelerations(tree.model)
+    frame, coupling, chain = tree.frame_id(body), tree.coupling, tree.accelerations
     g = tree.gravity if gravity is None else gravity
     if coupling is None:
         return chain.at(frame, lever, g, q, v, a)
@@ -116,9 +119,9 @@ class BodyAccelerations:
         force = _moved(force, alpha, omega, placement.translation)
         R = placement.rotation.T
         omega, alpha, force = R @ omega, R @ alpha, R @ force
-        W = _cross(omega[:, :, 0])
+        W = skew(omega[:, :, 0])
         f = _moved(force, alpha, omega, lever)
-        by_lever = _cross(alpha[:, :, 0]) + W @ W
+        by_lever = skew(alpha[:, :, 0]) + W @ W
         return SpecificForce(f[:, :, 0], f[:, :, 1 : 1 + n], f[:, :, 1 + n : 1 + 2 * n], f[:, :, 1 + 2 * n :], by_lever)
 
     def _chain(self, frame: int) -> list[_Link]:
@@ -132,14 +135,11 @@ class BodyAccelerations:
         return self._chains[frame]
 
     def _link(self, joint: int) -> _Link:
-        model, placement = self._model.joints[joint], self._model.jointPlacements[joint]
-        probe, unit = self._model.createData(), np.zeros(self._model.nv)
-        unit[model.idx_v] = 1.0  # the motion that a unit velocity of the joint gives
-        pin.forwardKinematics(self._model, probe, pin.neutral(self._model), unit)
-        motion = probe.v[joint] - probe.liMi[joint].actInv(probe.v[self._model.parents[joint]])
+        placement, motion = self._model.jointPlacements[joint], unit_motion(self._model, joint)
         turn = np.array(motion.angular)
         slide = np.zeros(3) if np.any(turn) else np.array(motion.linear)
-        return _Link(model.idx_q, placement.rotation.copy(), placement.translation.copy(), turn, slide)
+        column = self._model.joints[joint].idx_q
+        return _Link(column, placement.rotation.copy(), placement.translation.copy(), turn, slide)
 
 
 def _turned(
@@ -148,7 +148,7 @@ def _turned(
     """Through a joint that turns about e; the arguments are in its axes, without its own motion."""
     for columns in (omega, alpha, force):
         columns[:, :, 1 + j] -= np.cross(e, columns[:, :, 0])
-    E = _cross(np.broadcast_to(e, (len(v), 3)))
+    E = skew(np.broadcast_to(e, (len(v), 3)))
     alpha = alpha - v[:, None, None] * (E @ omega)  # (R omega) x e v
     alpha[:, :, 1 + n + j] -= np.cross(e, omega[:, :, 0])
     alpha[:, :, 0] += e * a[:, None]
@@ -160,8 +160,8 @@ def _turned(
 
 def _slid(u: Array, j: int, n: int, q: Array, v: Array, a: Array, omega: Array, alpha: Array, force: Array) -> Array:
     """Force behind a joint that slides along u."""
-    U = _cross(np.broadcast_to(u, (len(v), 3)))
-    W, A = _cross(omega[:, :, 0]), _cross(alpha[:, :, 0])
+    U = skew(np.broadcast_to(u, (len(v), 3)))
+    W, A = skew(omega[:, :, 0]), skew(alpha[:, :, 0])
     moved = q[:, None, None] * _along(alpha, omega, u) - 2.0 * v[:, None, None] * (U @ omega)
     moved[:, :, 1 + j] += ((A + W @ W) @ u[:, None])[:, :, 0]
     moved[:, :, 1 + n + j] += 2.0 * (W @ u[:, None])[:, :, 0]
@@ -177,16 +177,8 @@ def _moved(force: Array, alpha: Array, omega: Array, p: Array) -> Array:
 
 def _along(alpha: Array, omega: Array, p: Array) -> Array:
     """The columns of alpha x p + omega x (omega x p)."""
-    P = _cross(np.broadcast_to(p, (len(omega), 3)))
-    W, Wp = _cross(omega[:, :, 0]), _cross(np.cross(omega[:, :, 0], p))
+    P = skew(np.broadcast_to(p, (len(omega), 3)))
+    W, Wp = skew(omega[:, :, 0]), skew(np.cross(omega[:, :, 0], p))
     inward = -(W @ P + Wp) @ omega  # d(w x (w x p)) = -w x (p x dw) - (w x p) x dw
     inward[:, :, 0] *= 0.5  # the product is of second order in omega
     return -(P @ alpha) + inward
-
-
-def _cross(w: Array) -> Array:
-    """Matrices [w]x of vectors of shape (m, 3); shape (m, 3, 3)."""
-    matrix = np.zeros((len(w), 3, 3))
-    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
-    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = w[:, 2], -w[:, 1], w[:, 0]
-    return matrix

@@ -103,14 +103,16 @@ class BodyRates:
         return self._chains[frame]
 
     def _link(self, joint: int) -> _Link:
-        model = self._model.joints[joint]
-        # the motion that a unit velocity of the joint gives; its angular part is the axis
-        probe = self._model.createData()
-        unit = np.zeros(self._model.nv)
-        unit[model.idx_v] = 1.0
-        pin.forwardKinematics(self._model, probe, pin.neutral(self._model), unit)
-        axis = (probe.v[joint] - probe.liMi[joint].actInv(probe.v[self._model.parents[joint]])).angular
-        return _Link(model.idx_q, self._model.jointPlacements[joint].rotation.copy(), np.array(axis))
+        axis = np.array(unit_motion(self._model, joint).angular)
+        return _Link(self._model.joints[joint].idx_q, self._model.jointPlacements[joint].rotation.copy(), axis)
+
+
+def unit_motion(model: pin.Model, joint: int) -> pin.Motion:
+    """The motion that a unit velocity of a joint gives to what is behind it, in the axes there."""
+    probe, unit = model.createData(), np.zeros(model.nv)
+    unit[model.joints[joint].idx_v] = 1.0
+    pin.forwardKinematics(model, probe, pin.neutral(model), unit)
+    return probe.v[joint] - probe.liMi[joint].actInv(probe.v[model.parents[joint]])
 
 
 def turned_back(axis: Array, angle: Array) -> Array:
@@ -119,3 +121,11 @@ def turned_back(axis: Array, angle: Array) -> Array:
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
     return np.eye(3) - s * K + (1.0 - c) * (K @ K)
+
+
+def skew(w: Array) -> Array:
+    """Matrices [w]x with [w]x u = w x u, for vectors of shape (m, 3); shape (m, 3, 3)."""
+    matrix = np.zeros((len(w), 3, 3))
+    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -w[:, 2], w[:, 1], -w[:, 0]
+    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = w[:, 2], -w[:, 1], w[:, 0]
+    return matrix

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.body_accelerations import BodyAccelerations
 from jointscope.robots.bodies.body_rates import BodyRates
 from jointscope.robots.bodies.coupling import Coupling, with_new_joints
 from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
@@ -126,7 +127,7 @@ class RigidTree:
         self.model, self.data = model, model.createData()
         self.coupling = Coupling.of(tuple(model.names)[1:], self.joints, self._bodies.followers)
         self.equations: Equations = equations_of(model, self.coupling)
-        self._rates = BodyRates(model)
+        self._rates, self.accelerations = BodyRates(model), BodyAccelerations(model)
 
     def with_coriolis(self, coriolis: bool) -> RigidTree:
         """The same tree with or without Coriolis and centrifugal terms."""
