@@ -126,6 +126,10 @@ class Calibration:
         """Number of coordinates of all blocks."""
         return sum(block.size for block in self.layout.values())
 
+    def free(self, hold: Sequence[str]) -> tuple[str, ...]:
+        """Names of the blocks that may change: those that are not held, and not empty."""
+        return tuple(block for block in self.layout if block not in hold and self.block_size(block))
+
     def block_size(self, block: str) -> int:
         """Number of coordinates of a block."""
         return self.layout[block].size

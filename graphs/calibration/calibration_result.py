@@ -224,16 +224,16 @@ class CalibrationResult:
             for p in self.parameters
             if p.name in self.robot.parameters
         }
+        for sensor in self.robot.biased:
+            found[f"{sensor.name}.bias"] = {
+                "value": sensor.bias.tolist(),
+                "sigma": None if sensor.bias_sigma is None else sensor.bias_sigma.tolist(),
+                "unit": sensor.units[0],
+            }
         for gyro in self.robot.gyros:
-            sigmas = (gyro.bias_sigma, gyro.R_sigma)
-            bias_sigma, R_sigma = (None if sigma is None else sigma.tolist() for sigma in sigmas)
-            found[f"{gyro.name}.bias"] = {"value": gyro.bias.tolist(), "sigma": bias_sigma, "unit": "rad/s"}
             found[f"{gyro.name}.R_imu_body"] = {
                 "value": gyro.R_imu_body.tolist(),
-                "sigma": R_sigma,
+                "sigma": None if gyro.R_sigma is None else gyro.R_sigma.tolist(),
                 "unit": "1; sigma about the axes of the body [rad]",
             }
-        for sensor in self.robot.accelerometers:
-            sigma = None if sensor.bias_sigma is None else sensor.bias_sigma.tolist()
-            found[f"{sensor.name}.bias"] = {"value": sensor.bias.tolist(), "sigma": sigma, "unit": "m/s^2"}
         return found

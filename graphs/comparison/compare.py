@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
+from jointscope.graphs.calibration.base_model import with_full_gyros
 from jointscope.graphs.calibration.calibrate import calibrate, check_recordings
 from jointscope.graphs.calibration.external_torque import external_torques_of
 from jointscope.graphs.calibration.whole_stage import approach
@@ -126,8 +127,7 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     what is compared are predictions of states.
     """
     check_recordings(robot, [recording], every_joint=False)
-    robot = with_known_drive_signal(robot, [recording]).without_accelerometers()
-    robot = robot.with_sensors({gyro.name: replace(gyro, form="full", reference=None) for gyro in robot.gyros})
+    robot = with_full_gyros(with_known_drive_signal(robot, [recording]).without_accelerometers())
     sigmas = [parameter.sigma for parameter in robot.parameters.values()]
     calibrated = "calibration" in robot.document or any(sigma is not None for sigma in sigmas)
     if robot.noise.estimate and not calibrated:

@@ -23,7 +23,6 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 ATTEMPTS = 2  # times that a task is given to processes before it is done here
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _known: dict[str, Any] = {}  # in a worker: what its last task needed, by file
 
 
@@ -90,19 +89,8 @@ class SideBySide:
 
     def _submit(self, function: Callable[[Any, T], R], file: Path, task: T) -> Future[R]:
         if self._pool is None:
-            before = {name: os.environ.get(name) for name in THREADS}
-            os.environ.update(dict.fromkeys(THREADS, "1"))  # workers read it when they begin
-            try:
-                self._pool = ProcessPoolExecutor(
-                    self.workers, multiprocessing.get_context("spawn"), _begin, (self._effect_files,)
-                )
-                return self._pool.submit(_run, function, str(file), task)
-            finally:
-                for name, value in before.items():
-                    if value is None:
-                        del os.environ[name]
-                    else:
-                        os.environ[name] = value
+            spawn = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(self.workers, spawn, _begin, (self._effect_files,))
         return self._pool.submit(_run, function, str(file), task)
 
     def _stop(self) -> None:

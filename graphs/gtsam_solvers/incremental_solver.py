@@ -14,6 +14,7 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.block import VECTOR, BlockKind
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.single import extract_calibration
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
@@ -118,14 +119,15 @@ def incrementally(graph: CondensedGraph, values: gtsam.Values, told: Callable[[K
     parameters.relinearizeSkip = 1
     parameters.setRelinearizeThreshold(0.0)  # who stays is said at every update
     smoother = gtsam.ISAM2(parameters)
-    seen, stretches = list[int](), sum(map(len, graph.stretches))
+    seen, stretches, kinds = list[int](), sum(map(len, graph.stretches)), _kinds(graph)
     for number, (bag, tick, added) in enumerate(_portions(graph)):
         new = gtsam.Values()
         for i in range(added.size()):
             for key in added.at(i).keys():
                 if key not in seen:
                     seen.append(key)
-                    _copy(values, key, new)
+                    kind = kinds.get(key, VECTOR)
+                    new.insert(key, kind.to_gtsam(kind.from_gtsam(values, key)))
         try:
             _settle(smoother, added, new, seen)
             calibration, sigmas = _shared(graph, smoother, bag)
@@ -188,8 +190,7 @@ def _list(keys: list[int]) -> gtsam.KeyList:
     return found
 
 
-def _copy(values: gtsam.Values, key: int, into: gtsam.Values) -> None:
-    if gtsam.Symbol(key).chr() == ord("r"):
-        into.insert(key, values.atRot3(key))
-    else:
-        into.insert(key, values.atVector(key))
+def _kinds(graph: CondensedGraph) -> dict[int, BlockKind]:
+    """Kind of each block by its key; all others are states."""
+    pieces = zip(graph.likes, graph.shared.owners, strict=True)
+    return {block.key(owner): block.kind for like, owner in pieces for block in like.layout.values()}

@@ -22,8 +22,7 @@ from jointscope.robots.outside_modules import need_module
 
 def free_blocks(estimate: Estimate, hold: Sequence[str] = ()) -> tuple[str, ...]:
     """Blocks of shared values that are variables: those that are not held, and not empty."""
-    like = estimate.calibrations[0]
-    return tuple(block for block in like.blocks if block not in hold and like.block_size(block))
+    return estimate.calibrations[0].free(hold)
 
 
 def nonlinear_graph(

@@ -23,6 +23,7 @@ from jointscope.factors.condensed import CondensedFactor
 from jointscope.factors.single import (
     block_key,
     extract_calibration,
+    insert_calibration,
     stacked_factor,
     state_key,
 )
@@ -77,11 +78,10 @@ class CondensedGraph:
         places = owners(problems)
         length = length or max(STRETCH, sum(len(p.dynamics) for p in motions(problems)) // MOST_STRETCHES)
         # nothing is no variable: a robot may have no free parameter
-        free = [
-            tuple(block for block in like.blocks if block not in hold and like.block_size(block))
-            for like in start.calibrations
-        ]
-        values = _shared_values(start, places, free)
+        free = [like.free(hold) for like in start.calibrations]
+        values = gtsam.Values()
+        for like, blocks, owner in zip(start.calibrations, free, places, strict=True):
+            insert_calibration(values, like, owner, blocks)
         likes = tuple(
             extract_calibration(values, calibration, blocks, owner)
             for calibration, blocks, owner in zip(start.calibrations, free, places, strict=True)
@@ -189,19 +189,6 @@ class CondensedGraph:
 def _between(cuts: Sequence[RecordingStretch | WholeSet]) -> list[int]:
     """Ticks at the ends of stretches."""
     return list(dict.fromkeys(tick for stretch in cuts for tick in stretch.ticks))
-
-
-def _shared_values(start: Estimate, owners: Sequence[int], free: Sequence[Sequence[str]]) -> gtsam.Values:
-    """Values of all blocks that may change."""
-    values = gtsam.Values()
-    for piece, owner in enumerate(owners):
-        for block in free[piece]:
-            key = block_key(block, start.calibrations[piece], owner)
-            if values.exists(key):
-                continue
-            calibration = start.calibrations[piece]
-            values.insert(key, calibration.layout[block].kind.to_gtsam(calibration[block]))
-    return values
 
 
 def _add_rows_without_states(
