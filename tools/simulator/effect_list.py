@@ -12,7 +12,13 @@ HEADINGS = {
     "outside": "effects outside the catalogue: a diagnosis should say that something is left",
     "mistake": "no physics, but mistakes in the bag",
 }
-EXAMPLES = {"joint": "joint1", "last joint": "the last joint", "imu": "imu1", "robot": "robot"}
+EXAMPLES = {
+    "joint": "joint1",
+    "elastic joint": "joint1 (elastic)",
+    "last joint": "the last joint",
+    "imu": "imu1",
+    "robot": "robot",
+}
 WIDTH = 100
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A recording of a robot from an engine that is independent of the estimator's own model.
 
-The P-controller of the paper reads the noisy, quantized encoders at every tick and its command acts, held, from its
-stamp until the next one. The engine starts at rest with relaxed springs; where effects load them at rest, it settles
-before the recording begins.
+The P-controller of the paper, or a servo where joints are rigid, reads the noisy, quantized encoders at every tick and
+its command acts, held, from its stamp until the next one. The engine starts at rest with relaxed springs; where effects
+load them at rest, it settles before the recording begins.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.simulator.loop.controller import PController
 from jointscope.tools.simulator.loop.motion import make_motion
 from jointscope.tools.simulator.loop.sensing import Sampling
+from jointscope.tools.simulator.loop.servo import Servo
 from jointscope.tools.simulator.occasion import Conditions, Occasion
 from jointscope.tools.simulator.world.disturbance import Disturbance
 from jointscope.tools.simulator.world.engine import STEPS_PER_TICK, TICK
@@ -69,7 +70,7 @@ def simulate(
     steps_per_tick: int = STEPS_PER_TICK,
     progress: Callable[[float], None] | None = None,
 ) -> Simulation:
-    """Simulates a robot under the P-controller of the paper.
+    """Simulates a robot under the P-controller of the paper, or under a servo where joints are rigid.
 
     Args:
         robot: the robot; where it has a published value, that is the truth, else the value of its file.
@@ -118,7 +119,9 @@ def simulate_under(
     """As `simulate`, with all that is true of robot and sensors in one argument."""
     occasion = Occasion(robot, motion, seconds, seed, conditions)
     schedule = make_motion(motion, robot, occasion.times, occasion.start, occasion.random("targets"))
-    controller = PController(occasion.truth, schedule, occasion.encoder())
+    truth = occasion.truth
+    law = PController if len(truth.layout.motors) == truth.n else Servo
+    controller = law(truth, schedule, occasion.encoder())
     trajectory = occasion.run(controller, progress)
     states, extra_states = occasion.states(trajectory)
     recording = occasion.recording(trajectory, controller.commands)

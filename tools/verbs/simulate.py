@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.write_bag import write_bag
@@ -81,8 +82,16 @@ def _summary(simulation: Simulation, robot: Robot, bag: Path, truth_file: Path) 
         "truth_file": str(truth_file),
         "samples": {stream.name: len(stream) for stream in streams},
         "not_simulated": [here.label for here in robot.effects if here.label not in simulated],
+        "to_simulate_them": " ".join(_option(here, robot) for here in robot.effects if here.label not in simulated),
         "truth": simulation.truth,
     }
+
+
+def _option(here: EffectAt, robot: Robot) -> str:
+    """What the command line would say to simulate an effect of the robot file at its value there."""
+    values = here.own({name: parameter.value for name, parameter in robot.parameters.items()})
+    sizes = ",".join(f"{name}={value:.6g}" for name, value in values.items())
+    return f"--effect {here.label}{':' if sizes else ''}{sizes}"
 
 
 def _as_text(summary: dict[str, Any]) -> str:
@@ -90,7 +99,11 @@ def _as_text(summary: dict[str, Any]) -> str:
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
     samples = ", ".join(f"{name} {count}" for name, count in summary["samples"].items())
     left = ", ".join(summary["not_simulated"])
-    note = f"\n  not simulated, although in the robot file: {left}; name them with --effect" if left else ""
+    note = (
+        f"\n  not simulated, although in the robot file: {left}; name them: {summary['to_simulate_them']}"
+        if left
+        else ""
+    )
     return (
         f"{summary['bag']}: {truth['seconds']:g} s of {truth['robot']}, motion {truth['motion']}, "
         f"seed {truth['seed']}, {truth['friction']} friction\n"

@@ -48,7 +48,7 @@ def make_effect(text: str, robot: Robot) -> SimulatedEffect:
     if effect_id not in known:
         raise EffectError(f"effect {effect_id!r} cannot be simulated; known are {', '.join(known)}")
     if not at or not owner:
-        example = f"{effect_id}@{owners_of(known[effect_id].acts_on[0], robot)[0]}"
+        example = f"{effect_id}@{next(iter(owners_of(known[effect_id].acts_on[0], robot)), 'JOINT')}"
         raise EffectError(f"effect {text!r}: expected ID@OWNER[:param=value,...], for example {example}")
     return known[effect_id](owner, _parameters(text, tail), robot)
 

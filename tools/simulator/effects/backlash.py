@@ -20,7 +20,7 @@ class Backlash(SimulatedEffect):
     """
 
     id = "backlash"
-    acts_on = ("joint",)
+    acts_on = ("elastic joint",)
     defaults: ClassVar[Mapping[str, float]] = {"half_gap": 0.012}  # [rad]
     never_negative = ("half_gap",)
 

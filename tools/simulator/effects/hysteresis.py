@@ -29,7 +29,7 @@ class Hysteresis(SimulatedEffect):
     """Up to `torque` beside the spring, turned round within about `deflection`."""
 
     id = "hysteresis"
-    acts_on = ("joint",)
+    acts_on = ("elastic joint",)
     defaults: ClassVar[Mapping[str, float]] = {"torque": 3.0, "deflection": 0.01}  # [N m], [rad]
     never_negative = ("torque",)
     above_zero = ("deflection",)

@@ -26,7 +26,7 @@ class KinematicCoupling(SimulatedEffect):
     """
 
     id = "kinematic_coupling"
-    acts_on = ("joint",)
+    acts_on = ("elastic joint",)
     loads_at_rest = True
 
     def default_parameters(self) -> Mapping[str, float]:

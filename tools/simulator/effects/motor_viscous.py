@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import add_linear, motor_joint
+from jointscope.tools.simulator.world.specification import add_linear, rotor_joint
 
 
 class MotorViscous(SimulatedEffect):
@@ -20,4 +20,4 @@ class MotorViscous(SimulatedEffect):
 
     def edit(self, spec: Any) -> None:
         """Raises the damping of the rotor."""
-        add_linear(spec.joint(motor_joint(self.owner)), "damping", self.parameters["coefficient"])
+        add_linear(spec.joint(rotor_joint(self.robot, self.owner)), "damping", self.parameters["coefficient"])

@@ -17,7 +17,7 @@ class SpringCubic(SimulatedEffect):
     """Torque stiffness (q_link - q_motor)^3 beside that of the linear spring; it may be negative."""
 
     id = "spring_cubic"
-    acts_on = ("joint",)
+    acts_on = ("elastic joint",)
     defaults: ClassVar[Mapping[str, float]] = {"stiffness": 20000.0}  # [N m/rad^3]
 
     def edit(self, spec: Any) -> None:

@@ -65,5 +65,12 @@ def full_command(robot: Robot) -> Array:
     effort = robot.tree.effort_limits
     if not np.all(np.isfinite(effort) & (effort > 0) & (effort < 1e9)):
         raise SimulationError(f"robot {robot.name!r}: simulating needs an effort limit of every joint in the URDF")
-    gain = 1.0 if robot.drive_gain is None else [robot.drive_parameter(j, robot.drive_gain).value for j in robot.joints]
-    return effort / np.array(gain)
+    return effort / drive_gains(robot)
+
+
+def drive_gains(robot: Robot) -> Array:
+    """Torque [N m] per unit of the command of each joint's drive at rest, shape (n_joints,)."""
+    if robot.drive_gain is None:
+        return np.ones(robot.n)
+    gains = np.array([robot.drive_parameter(joint, robot.drive_gain).value for joint in robot.joints])
+    return gains * robot.command_volts

@@ -30,7 +30,7 @@ class Address:
 
     Attributes:
         link: index of each joint's link coordinate in qpos and qvel, by joint name.
-        motor: the same for the rotors.
+        motor: the same for the rotors; of a rigid joint that of its link.
         actuator: index of each joint's motor in ctrl.
     """
 
@@ -50,7 +50,7 @@ class SimulatedEffect:
     Attributes:
         parameters: all values by name.
         id: name of the effect, that of its file.
-        acts_on: kinds of owners, of "joint", "last joint", "imu" and "robot".
+        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu" and "robot".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
         never_negative: parameters that must not be negative.
@@ -80,7 +80,10 @@ class SimulatedEffect:
     def __init__(self, owner: str, parameters: Mapping[str, float], robot: Robot):
         owners = [name for kind in self.acts_on for name in owners_of(kind, robot)]
         if owner not in owners:
-            raise EffectError(f"effect {self.id} cannot act on {owner!r}; it acts on {', '.join(owners)}")
+            acts = (
+                f"acts on {', '.join(owners)}" if owners else f"needs an {' or '.join(self.acts_on)}, and there is none"
+            )
+            raise EffectError(f"effect {self.id} cannot act on {owner!r}; it {acts}")
         self.owner = owner
         self.robot = robot
         defaults = self.default_parameters()
@@ -180,7 +183,8 @@ class SimulatedEffect:
 
 
 def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
-    """Names of the owners of a kind: "joint", "last joint", "imu" or "robot"."""
+    """Names of the owners of a kind: "joint", "elastic joint", "last joint", "imu" or "robot"."""
     if kind == "imu":
         return tuple(gyro.name for gyro in robot.gyros)
-    return {"joint": robot.joints, "last joint": robot.joints[-1:], "robot": ("robot",)}[kind]
+    elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
+    return {"joint": robot.joints, "elastic joint": elastic, "last joint": robot.joints[-1:], "robot": ("robot",)}[kind]

@@ -26,7 +26,7 @@ from jointscope.tools.simulator.world.specification import (
     deflection_shares,
     drive,
     link_body,
-    motor_joint,
+    rotor_joint,
     transmission,
 )
 from jointscope.tools.simulator.world.trajectory import Trajectory
@@ -103,7 +103,7 @@ class Engine:
 
     @property
     def motor(self) -> NDArray[np.intp]:
-        """Indices of the rotor coordinates, in the order of the joints."""
+        """Indices of the rotor coordinates, in the order of the joints; of a rigid one that of its link."""
         return self._motor
 
     @property
@@ -141,9 +141,8 @@ class Engine:
         """Integrates from the present state.
 
         Args:
-            controller: maps the number of the tick and the trajectory until now, whose last point is the true present
-                state, to the command, shape (n_joints,), which is held until the next tick. What it may know of that
-                trajectory is its own affair: see `OnlineEncoder` and `OnlineSensors`.
+            controller: maps the number of the tick and the trajectory until now, whose last point is the present state,
+                to the command, shape (n_joints,), held until the next tick; what it knows of it is its own affair.
             link_torques: disturbance on the links, shape (ticks, n_joints) [N m].
             motor_torques: disturbance on the rotors, shape (ticks, n_joints) [N m].
             progress: called now and then with the number of ticks done.
@@ -159,12 +158,13 @@ class Engine:
         ticks, h = len(link_torques), TICK / steps
         q, v = np.empty((ticks * steps + 1, model.nq)), np.empty((ticks * steps + 1, model.nv))
         q[0], v[0], row = qpos, qvel, 0
+        disturbance = self._on_coordinates(link_torques, motor_torques)
         commanding = [effect for effect in self.effects if effect.uses("command")]
         with self._hooked():
             for k in range(ticks):
                 issued = controller(k, Trajectory(h, q[: row + 1], v[: row + 1]))
                 ctrl[self._actuator] = issued
-                applied[self._link], applied[self._motor] = link_torques[k], motor_torques[k]
+                applied[:] = disturbance[k]
                 for _ in range(steps):
                     if commanding:
                         ctrl[self._actuator] = acting(commanding, row * h, issued)
@@ -178,16 +178,20 @@ class Engine:
         progress(ticks)
         return Trajectory(h, q, v)
 
+    def _on_coordinates(self, link: Array, motor: Array) -> Array:
+        """Torques on all coordinates, shape (ticks, nv); both sides of a rigid joint act on one."""
+        torques = np.zeros((len(link), self.model.nv))
+        torques[:, self._link] = link
+        torques[:, self._motor] += motor
+        return torques
+
     def body_rates(self, site: str, q: Array, v: Array) -> Array:
-        """Angular velocity of a site in its own axes, as the engine computes it.
+        """Angular velocity of a site in its own axes, shape (m, 3) [rad/s], as the engine computes it.
 
         Args:
             site: name of the gyro whose site it is.
             q: positions of all coordinates, shape (m, nq) [rad].
             v: velocities of all coordinates, shape (m, nq) [rad/s].
-
-        Returns:
-            omega_body, shape (m, 3) [rad/s].
         """
         mujoco, model, data = self._mujoco, self.model, self._seen
         site_id, kind = model.site(site).id, mujoco.mjtObj.mjOBJ_SITE
@@ -202,7 +206,7 @@ class Engine:
         return omega
 
     def specific_forces(self, site: str, gravity: Array, q: Array, v: Array, a: Array) -> Array:
-        """What an accelerometer at a site feels, in the axes of the site: the reading of the engine's own sensor.
+        """What an accelerometer at a site feels, in its axes, shape (m, 3) [m/s^2]: the engine's own sensor.
 
         Args:
             site: name of the accelerometer whose site it is.
@@ -210,9 +214,6 @@ class Engine:
             q: positions of all coordinates, shape (m, nq) [rad].
             v: velocities, shape (m, nq) [rad/s].
             a: accelerations, shape (m, nq) [rad/s^2].
-
-        Returns:
-            f_body, shape (m, 3) [m/s^2].
         """
         mujoco, model, data = self._mujoco, self.model, self._seen
         place = model.sensor(site).adr[0]
@@ -230,15 +231,12 @@ class Engine:
         return forces
 
     def points(self, joint: str, p_link: Array, q: Array) -> Array:
-        """Where a point of the body that a joint moves is, as the engine computes it.
+        """Where a point of the body that a joint moves is in the world, shape (m, 3) [m].
 
         Args:
             joint: name of the joint.
             p_link: the point in the joint's frame, shape (3,) [m].
             q: positions of all coordinates, shape (m, nq) [rad].
-
-        Returns:
-            p_world, shape (m, 3) [m].
         """
         data, body = self._seen, self.model.body(link_body(joint)).id
         p_world = np.empty((len(q), 3))
@@ -254,7 +252,7 @@ class Engine:
 
         return Address(
             link={joint: dof(joint) for joint in robot.joints},
-            motor={joint: dof(motor_joint(joint)) for joint in robot.joints},
+            motor={joint: dof(rotor_joint(robot, joint)) for joint in robot.joints},
             actuator={joint: self.model.actuator(drive(joint)).id for joint in robot.joints},
         )
 

@@ -8,6 +8,6 @@ from __future__ import annotations
 
 NOT_SIMULATED = {
     "coriolis": "every simulation contains the Coriolis terms; calibrate with 'coriolis: false' in the robot file",
-    "joint_elasticity": "every simulated joint is elastic; calibrate with a robot file that declares the joint rigid",
+    "joint_elasticity": "a joint is simulated as its robot file has it; calibrate with a file that declares it rigid",
     "integration_error": "the engine integrates exactly; calibrate with 'integrator: euler' in the robot file",
 }

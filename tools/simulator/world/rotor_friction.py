@@ -14,7 +14,7 @@ import numpy as np
 
 from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
-from jointscope.tools.simulator.world.specification import add_dry_friction, motor_joint
+from jointscope.tools.simulator.world.specification import add_dry_friction, rotor_joint
 
 PLACEHOLDER = 1e-9  # [N m] keeps a row in the engine's list of friction losses where the robot has no friction
 
@@ -36,7 +36,7 @@ class RotorFriction(SimulatedEffect):
     def edit(self, spec: Any) -> None:
         """Makes sure that the rotor has a friction loss which can be changed while the engine runs."""
         if self.friction == "dry":
-            add_dry_friction(spec.joint(motor_joint(self.owner)), PLACEHOLDER)
+            add_dry_friction(spec.joint(rotor_joint(self.robot, self.owner)), PLACEHOLDER)
             # Islands work on copies of the friction losses, made before anything may change them.
             spec.option.disableflags |= int(getattr(load_mujoco().mjtDisableBit, "mjDSBL_ISLAND", 0))
 

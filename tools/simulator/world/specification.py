@@ -3,9 +3,9 @@
 
 Each link is a body with its joint. Each rotor is a body of its own in the world, so it feels nothing of the link's
 motion but the spring: a fixed tendon of "length" q_link - q_motor with stiffness and damping; where a transmission
-couples joints, several links take part in its length. The motor is an actuator
-on the rotor whose gain is the voltage constant and whose bias is the back-EMF. Dry friction is the engine's own
-friction loss. No equation of motion is written here; the engine makes them.
+couples joints, several links take part in its length. The rotor of a rigid joint is the engine's armature of the
+link's joint. The motor is an actuator on the rotor whose gain is the voltage constant and whose bias is the back-EMF.
+Dry friction is the engine's own friction loss. No equation of motion is written here; the engine makes them.
 """
 
 from __future__ import annotations
@@ -36,8 +36,18 @@ def link_body(joint: str) -> str:
 
 
 def motor_joint(joint: str) -> str:
-    """Name of the rotor's hinge."""
+    """Name of the hinge of an elastic joint's rotor."""
     return f"{joint}.motor"
+
+
+def is_rigid(robot: Robot, joint: str) -> bool:
+    """Whether nothing gives way between rotor and link."""
+    return joint not in robot.layout.motors
+
+
+def rotor_joint(robot: Robot, joint: str) -> str:
+    """Name of the engine's joint that the rotor turns with: a hinge of its own, or that of the link."""
+    return joint if is_rigid(robot, joint) else motor_joint(joint)
 
 
 def transmission(robot: Robot) -> Array:
@@ -74,7 +84,7 @@ def build_specification(robot: Robot, friction: str, timestep: float, shares: Sh
         shares: of the links in the deflections of the springs.
 
     Returns:
-        A `mujoco.MjSpec`, not yet compiled. Joints carry the robot's joint names, rotors `motor_joint(name)`.
+        A `mujoco.MjSpec`, not yet compiled. Joints carry the robot's joint names, rotors `rotor_joint(robot, name)`.
     """
     mujoco = load_mujoco()
     spec = mujoco.MjSpec()
@@ -87,7 +97,8 @@ def build_specification(robot: Robot, friction: str, timestep: float, shares: Sh
     _tie_followers(mujoco, spec, robot)
     for joint in robot.joints:
         _add_rotor(mujoco, spec, robot, joint, friction)
-        _add_spring(spec, robot, joint, shares[joint])
+        if not is_rigid(robot, joint):
+            _add_spring(spec, robot, joint, shares[joint])
         _add_motor(mujoco, spec, robot, joint)
     for gyro in robot.gyros:
         _add_site(spec, robot, gyro.name, gyro.body)
@@ -148,8 +159,12 @@ def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
 
 def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) -> None:
     inertia = robot.drive_parameter(joint, "inertia").value
-    rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
-    hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
+    if is_rigid(robot, joint):
+        hinge = spec.joint(joint)
+        hinge.armature = inertia
+    else:
+        rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
+        hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
     if friction == "dry":
         add_dry_friction(hinge, robot.parameter(f"{joint}.coulomb_torque").value)
 
@@ -185,7 +200,7 @@ def _add_motor(mujoco: Any, spec: Any, robot: Robot, joint: str) -> None:
         back_emf = robot.drive_parameter(joint, "k_mi").value
     motor = spec.add_actuator(
         name=drive(joint),
-        target=motor_joint(joint),
+        target=rotor_joint(robot, joint),
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,

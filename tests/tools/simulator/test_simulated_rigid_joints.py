@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joints that a robot file declares rigid are simulated rigid: the rotor turns with its link."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from jointscope.robots.errors import EffectError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.simulator import simulate
+from jointscope.tools.simulator.effects import make_effect, simulated_effects
+from jointscope.tools.simulator.world.effect import owners_of
+from jointscope.tools.simulator.world.engine import Engine
+
+pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+
+URDF = """<robot name="arm"><link name="base"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+ <origin xyz="0.1 0.2 0.3" rpy="0.4 -0.3 0.2"/><axis xyz="0 1 0"/>
+ <limit effort="80" velocity="4" lower="-3" upper="3"/></joint>
+<link name="upper"><inertial><origin xyz="0.1 0 0.2"/><mass value="3"/>
+ <inertia ixx="0.05" iyy="0.05" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.4" rpy="0.5 0.1 0"/>
+ <axis xyz="0.6 0 -0.8"/><limit effort="40" velocity="4" lower="-2" upper="2"/></joint>
+<link name="fore"><inertial><origin xyz="0.05 0 0.15"/><mass value="2"/>
+ <inertia ixx="0.03" iyy="0.01" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+YAML = """
+format: 1
+name: arm
+urdf: arm.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [shoulder, elbow]
+model: {{rigid_joints: [{rigid}]}}
+command: {{topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: {unit}}}
+sensors:
+  enc: {{kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: rad, sigma: 1.0e-4}}
+parameters:
+{parameters}
+noise: {{link_velocity: [0.3, 0.3], motor_velocity: [0.3, 0.3]}}
+"""
+ROTORS, FRICTION, CONSTANT = {"shoulder": 0.5, "elbow": 0.2}, 0.8, 2.5
+VISCOUS = 0.7
+
+
+def arm_with(tmp_path, rigid=("shoulder", "elbow"), unit="N m"):
+    lines = []
+    for joint, inertia in ROTORS.items():
+        lines += [f"{joint}.inertia: {{value: {inertia}, unit: kg m2}}"]
+        lines += [f"{joint}.coulomb_torque: {{value: {FRICTION}, unit: N m}}"]
+        if unit == "A":
+            lines += [f"{joint}.torque_constant: {{value: {CONSTANT}, unit: N m/A}}"]
+        if joint not in rigid:
+            lines += [f"{joint}.stiffness: {{value: 900.0, unit: N m/rad}}"]
+            lines += [f"{joint}.damping: {{value: 1.0, unit: N m s/rad}}"]
+    (tmp_path / "arm.urdf").write_text(URDF)
+    text = YAML.format(rigid=", ".join(rigid), unit=unit, parameters="\n".join(f"  {line}" for line in lines))
+    (tmp_path / "arm.yaml").write_text(text)
+    return load_robot(tmp_path / "arm.yaml")
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+def test_rotor_and_friction_of_a_rigid_joint_are_those_of_its_link(tmp_path, unit):
+    engine = Engine(
+        arm := arm_with(tmp_path, unit=unit), [make_effect(f"motor_viscous@elbow:coefficient={VISCOUS}", arm)]
+    )
+    model = pin.buildModelFromUrdf(str(tmp_path / "arm.urdf"))
+    model.armature = np.array(list(ROTORS.values()))
+    rng, k = np.random.default_rng(0), CONSTANT if unit == "A" else 1.0
+    for _ in range(5):
+        q, v, command = rng.uniform(-1.5, 1.5, (3, 2))
+        v += np.sign(v)  # sliding, far from where the engine lets friction creep
+        command *= 20.0
+        torque = k * command - FRICTION * np.sign(v) - [0.0, VISCOUS * v[1]]
+        # pinocchio's forward dynamics know the armature
+        expected = pin.aba(model, model.createData(), q, v, torque)
+        assert engine.accelerations(q, v, command) == pytest.approx(expected, rel=2e-3, abs=2e-3)
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+def test_a_rigid_arm_moves_within_its_limits_and_holds_itself(tmp_path, unit):
+    simulation = simulate(arm_with(tmp_path, unit=unit), "calibration", 12.0, 3)
+    q, v = simulation.states[:, :2], simulation.states[:, 2:4]
+    assert np.abs(v).max() < 4.0
+    assert np.all(np.abs(q) < [3.0, 2.0])
+    assert np.all(np.ptp(q, axis=0) > 1.0)
+    assert np.all(v.std(axis=0) > 0.3)
+    assert np.array_equal(simulation.states[:, :4], simulation.states[:, 4:])  # rotors
+
+
+def test_beside_a_rigid_joint_another_may_be_elastic(tmp_path):
+    robot = arm_with(tmp_path, rigid=("shoulder",))
+    simulation = simulate(robot, "moves", 3.0, 1)
+    deflection = simulation.states[:, [0, 1]] - simulation.states[:, [4, 5]]
+    assert np.all(deflection[:, 0] == 0.0)
+    assert 1e-3 < np.abs(deflection[:, 1]).max() < 0.2
+
+
+@pytest.mark.parametrize("effect_id", list(simulated_effects()))
+def test_every_effect_runs_on_a_rigid_arm_or_says_that_it_needs_a_spring(tmp_path, effect_id):
+    robot = arm_with(tmp_path)
+    kinds = simulated_effects()[effect_id].acts_on
+    owners = [owner for kind in kinds for owner in owners_of(kind, robot)]
+    if not owners:
+        assert kinds in (("elastic joint",), ("imu",))
+        with pytest.raises(EffectError, match=f"effect {effect_id} cannot act on 'elbow'; it needs an {kinds[0]}, and"):
+            make_effect(f"{effect_id}@elbow", robot)
+        return
+    simulation = simulate(robot, "moves", 1.0, 1, effects=[f"{effect_id}@{owners[-1]}"])
+    assert np.isfinite(simulation.states).all()
+    assert np.abs(simulation.states).max() < 50
+
+
+def test_gravity_loads_the_gear_of_a_rigid_joint(tmp_path):
+    robot = arm_with(tmp_path)
+    effect = make_effect("load_dependent_friction@shoulder:coefficient=0.25", robot)
+    engine = Engine(robot, [effect])
+    model = pin.buildModelFromUrdf(str(tmp_path / "arm.urdf"))
+    data = model.createData()
+    q, v = np.array([0.9, -0.4]), np.array([1.5, 1.0])
+    for _ in range(2):  # the engine has the load of the evaluation before
+        found = engine.accelerations(q, v, np.zeros(2))
+    load = pin.nonLinearEffects(model, data, q, v)
+    model.armature = np.array(list(ROTORS.values()))
+    torque = -np.array([FRICTION + 0.25 * abs(load[0]), FRICTION])
+    expected = pin.aba(model, model.createData(), q, v, torque)
+    assert found[0] == pytest.approx(expected[0], rel=0.02)
