@@ -113,7 +113,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
 
 def _command(section: Section, joints: tuple[str, ...]) -> Topic:
     held = section.flag("held", True) if "held" in section else None
-    return replace(topic(section, joints, COMMAND_UNITS, scaled=True), held=held)
+    confirmed = section.flag("confirmed", False)
+    return replace(topic(section, joints, COMMAND_UNITS, scaled=True), held=held, confirmed=confirmed)
 
 
 def with_effects(robot: Robot, labels: Sequence[str]) -> Robot:

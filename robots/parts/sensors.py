@@ -36,6 +36,7 @@ class Topic:
         wraps: period after which the counter behind the value begins anew, in the unit of the bag; 0 if it does not.
         held: of a drive signal: whether each value acts until the next one, as a command does, or was measured and runs
             on between samples; None where the robot file does not say.
+        confirmed: of a drive signal: whether the user knows its unit, so that no size of a constant speaks against it.
     """
 
     topic: str
@@ -48,6 +49,7 @@ class Topic:
     units: tuple[str, ...] = ()
     stamped_by: tuple[str, ...] = ()
     held: bool | None = None
+    confirmed: bool = False
 
     @property
     def factor(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.presentation.torque_constants import suspicious_constants
 from jointscope.tools.presentation.whiteness import LAGS, autocorrelation, strength
 
 LEVELS = ("good", "info", "warn", "bad")
@@ -61,6 +62,7 @@ def judge(result: CalibrationResult) -> Judgement:
         _honest_sigmas(result),
         _same_time(result),
         _two_ways(result),
+        _constants(result),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
@@ -245,6 +247,14 @@ def _two_ways(result: CalibrationResult) -> Check:
         f"{worst} is {significant(found.value)} ± {significant(found.sigma, 1)} {found.unit} here and "
         f"{significant(other.value)} ± {significant(other.sigma, 1)} {found.unit} by regression on the same "
         f"recordings, {significant(apart[worst], 2)} sigma apart: one of the two is wrong.",
+    )
+
+
+def _constants(result: CalibrationResult) -> Check:
+    doubt = suspicious_constants(result)
+    name = "Torque constants like those of drives"
+    return (
+        Check("bad", name, doubt) if doubt else Check("good", name, "Nothing speaks against the unit of the command.")
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from jointscope.robots.units import joined, si_factor, si_unit
+from jointscope.tools.init.estimates.drive_values import TYPED
 from jointscope.tools.init.estimates.joint_signs import SignGuess
 from jointscope.tools.init.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.init.streams.named_signal import Chosen
@@ -149,6 +150,7 @@ def _command(guess: RobotGuess) -> list[str]:
         _line("command:", command.reason, command.sure),
         *source_lines(command.signal, unit, 2)[:3],
         _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
+        *([_line("confirmed: true", "you named the unit", True, 2)] if why == TYPED else []),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),
         *_measured(guess),
