@@ -18,7 +18,7 @@ factors
 graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns graphs.scoring
 graphs.calibration graphs.comparison graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
-tools.writing tools.bags.tidying tools.bags.messages tools.bags
+tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.init.streams tools.init.estimates tools.init tools.init.text

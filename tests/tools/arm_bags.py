@@ -26,6 +26,7 @@ JOINT = (
     '<origin xyz="0 0 {down}"/><axis xyz="{axis}"/><limit lower="-2.9" upper="2.9" effort="100" velocity="9"/>'
     "{more}</joint>"
 )
+NO_ROWS = ("names", "type", "stamped")
 AXES = ("0 1 0", "1 0 0", "0 0 1")
 
 
@@ -102,13 +103,17 @@ class ArmMotion:
         return omega @ R_imu_body.T + 2e-3 * np.random.default_rng(seed).standard_normal(omega.shape)
 
 
-def write_arm_bag(path: Path, times: np.ndarray, topics: Mapping[str, Mapping[str, object]]) -> Path:
+def write_arm_bag(
+    path: Path, times: np.ndarray, topics: Mapping[str, Mapping[str, object]], latency: float = 0.0
+) -> Path:
     """A bag; each topic holds JointStates, or what its `type` says.
 
     Args:
         path: an .mcap.
         times: of all messages, shape (n,) [s].
-        topics: names, position and effort of joints, `data` of arrays, `rate` of gyroscopes.
+        topics: names, position and effort of joints, `data` of arrays, `rate` of gyroscopes; `stamped` makes the
+            stamp in the header from the true one [ns].
+        latency: from the true stamp to the reception [s].
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -123,7 +128,9 @@ def write_arm_bag(path: Path, times: np.ndarray, topics: Mapping[str, Mapping[st
             connection = writer.add_connection(topic, kind, typestore=store)
             for k, t in enumerate(times):
                 stamp = 10**18 + round(float(t) * 1e9)
-                writer.write(connection, stamp, store.serialize_cdr(_message(store, kind, content, k, stamp), kind))
+                written = content.get("stamped", int)(stamp)
+                message = _message(store, kind, content, k, written)
+                writer.write(connection, stamp + round(1e9 * latency), store.serialize_cdr(message, kind))
     next(folder.glob("*.mcap")).rename(path)
     return path
 
@@ -140,7 +147,7 @@ def _message(store, kind, content, k, stamp):
     types = store.types
     time = types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
     header = types["std_msgs/msg/Header"](time, "")
-    row = {key: np.asarray(values)[k].astype(float) for key, values in content.items() if key not in ("names", "type")}
+    row = {key: np.asarray(values)[k].astype(float) for key, values in content.items() if key not in NO_ROWS}
     none = np.zeros(0)
     if kind == "sensor_msgs/msg/Imu":
         vector = types["geometry_msgs/msg/Vector3"]

@@ -285,12 +285,23 @@ def test_a_gyro_needs_three_values(doggy, path):
     )
 
 
-def test_stamps_that_nobody_fills_are_refused(doggy, path):
-    write_with(path, doggy, [dataclasses.replace(message, stamp=0) for message in joint_messages()])
-    assert error_of(path, doggy) == (
-        "motor_encoder: all 300 messages have the same stamp 0.000000000 s; expected the time of measurement in "
-        "header.stamp: the driver does not fill it"
+@pytest.mark.parametrize(
+    ("stamp", "told"),
+    [(0, "all its stamps are zero"), (1_700_000_000_000_000_000, "all its stamps are 1700000000.000 s")],
+)
+def test_stamps_that_nobody_fills_are_replaced_by_times_of_reception(doggy, path, stamp, told):
+    stamped = path.with_stem("stamped")
+    write_with(stamped, doggy, joint_messages())
+    expected = read_recording(stamped, doggy).streams["motor_encoder"]
+    write_with(path, doggy, [dataclasses.replace(message, stamp=stamp) for message in joint_messages()])
+    recording = read_recording(path, doggy)
+    found = recording.streams["motor_encoder"]
+    assert f"motor_encoder: {told}; the time of reception stands in for it" in "".join(
+        n.text for n in recording.notices
     )
+    np.testing.assert_array_equal(found.values, expected.values)
+    steps = np.diff(found.times) - np.diff(expected.times)
+    assert np.abs(steps).max() < 1e-3
 
 
 def test_stamps_far_in_the_epoch_keep_their_nanoseconds(doggy, tmp_path):

@@ -20,17 +20,17 @@ from jointscope.tools.bags.bag_description import (
     NeedDescription,
     TopicDescription,
 )
+from jointscope.tools.bags.clocks.clock_steps import on_one_clock
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.unfilled_stamps import without_unfilled
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType, inner_type
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
 from jointscope.tools.bags.needed_streams import check_topic, full_type_name, needed_streams
 from jointscope.tools.bags.read_recording import left_out_notices, read_columns, read_recording
-from jointscope.tools.bags.tidying.clock_steps import on_one_clock
 from jointscope.tools.bags.tidying.not_finite import numbers_only
 from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
 
 FLOATS = ("float32", "float64")
 NOT_SHOWN = "covariance"

@@ -19,6 +19,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.arrivals import Arrivals
 from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Progress, RawTopic, bag_sha256, open_bag
@@ -31,7 +32,6 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.read_recording import read_columns
-from jointscope.tools.bags.tidying.durations import counted
 
 BLOCK = 20_000  # messages
 ONE_SECOND = 1_000_000_000  # [ns]

@@ -16,6 +16,11 @@ from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.units import joined
+from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
+from jointscope.tools.bags.clocks.own_stamps import at_message_stamps
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.fitting_messages import fitting_messages
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.messages.columns import Columns
@@ -31,18 +36,10 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.silences import with_silences_left_out
-from jointscope.tools.bags.tidying.clock_steps import on_one_clock
-from jointscope.tools.bags.tidying.durations import counted
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
-from jointscope.tools.bags.tidying.own_stamps import at_message_stamps
 from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, timing_notices
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.two_clocks import brought_together
-from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
-from jointscope.tools.bags.unstamped import sent_earlier
 
 
 def read_recording(
@@ -78,7 +75,7 @@ def read_recording(
     columns = {need.name: fitting_messages(parts[need.name], *wanted_of(need)) for need in needed}
     samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
     notices += found
-    samples, seams, found = _on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
+    samples, seams, found = on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
     notices += found
     for need in needed:
         samples[need.name], found = _cleaned(need, samples[need.name])
@@ -132,24 +129,6 @@ def _in_bag_order(
         samples[need.name], found = _samples(need, topic, message_type, columns[need.name], stamps, known=known)
         notices += found
     return samples, notices
-
-
-def _on_one_time_axis(
-    samples: dict[str, TimedSamples], stamped: Sequence[str]
-) -> tuple[dict[str, TimedSamples], list[tuple[int, int]], list[Notice]]:
-    """All streams with stamps of one clock that was never set, and where it was [ns]; still in the order of the bag."""
-    notices = list[Notice]()
-    for name in stamped:
-        samples[name], found = without_unfilled(name, samples[name])
-        notices += found
-    moved, seams, found = on_one_clock({name: samples[name] for name in stamped})
-    notices += found
-    moved, found = brought_together(moved)
-    notices += found
-    for name in samples.keys() - moved.keys():
-        moved[name], notice = sent_earlier(name, samples[name], {other: moved[other] for other in stamped})
-        notices.append(notice)
-    return {name: moved[name] for name in samples}, seams, notices
 
 
 def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:

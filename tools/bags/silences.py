@@ -14,7 +14,7 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
-from jointscope.tools.bags.tidying.durations import duration
+from jointscope.tools.bags.clocks.durations import duration
 from jointscope.tools.bags.tidying.stream_notices import timing
 
 Stretch = tuple[float, float]

@@ -10,18 +10,18 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.bags.clocks.clock_steps import on_one_clock
+from jointscope.tools.bags.clocks.durations import duration
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.two_clocks import brought_together
+from jointscope.tools.bags.clocks.unfilled_stamps import without_unfilled
 from jointscope.tools.bags.silences import with_silences_left_out
-from jointscope.tools.bags.tidying.clock_steps import on_one_clock
-from jointscope.tools.bags.tidying.durations import duration
 from jointscope.tools.bags.tidying.glitches import without_glitches
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
 from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
 from jointscope.tools.bags.tidying.staircase import without_repetitions
 from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.two_clocks import brought_together
-from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
 
 PERIOD = 2_000_000  # [ns]
 START = 1_700_000_000_000_000_000
@@ -260,11 +260,11 @@ def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
     values[700, 1] = wild
     with np.errstate(all="raise"):
         one = plausible_samples(
-            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True)
+            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values))
         )
         values[::2] = wild
         half = plausible_samples(
-            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values), stamped=True)
+            "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values))
         )
     assert len(one) == 1499
     assert len(half) == 1500 and np.isnan(half.values[::2]).all() and np.isfinite(half.values[1::2]).all()

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RecordingError
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing, timing_notices
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 MILLISECOND = 1_000_000
 

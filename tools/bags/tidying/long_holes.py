@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
-from jointscope.tools.bags.tidying.durations import duration
+from jointscope.tools.bags.clocks.durations import duration
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import counted
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 MOST = 0.05  # share of the messages that may lack a number
 FEW = 5  # or so many

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import counted
+from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.neighbours import smallest_changes
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 FEWEST = 3  # visits
 LONGEST_VISIT = 3  # samples

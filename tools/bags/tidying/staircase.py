@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recordings.recording import Notice
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.neighbours import smallest_changes
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 QUANTA = 3.0  # smallest changes of a channel that a change during motion spans
 SHARE = 0.1  # of the messages during motion that must repeat

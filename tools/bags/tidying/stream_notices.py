@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import counted, duration
+from jointscope.tools.bags.clocks.durations import counted, duration
 
 Array = NDArray[np.float64]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One stream tidied up by itself, before the robot is known: clock, order, glitches, second publishers, staircases."""
+"""One stream tidied up by itself, before the robot is known: order, glitches, second publishers, staircases."""
 
 from __future__ import annotations
 
@@ -8,33 +8,27 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.clock_steps import on_one_clock
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.glitches import without_glitches
 from jointscope.tools.bags.tidying.not_finite import numbers_only
 from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
 from jointscope.tools.bags.tidying.staircase import without_repetitions
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.unfilled_stamps import without_unfilled
 
 MOSTLY = 0.9  # of the samples that must be numbers to tell wild ones
 FEWEST = 30  # samples that tell anything
 
 
-def ordered_samples(name: str, samples: TimedSamples, stamped: bool) -> TimedSamples:
+def ordered_samples(name: str, samples: TimedSamples) -> TimedSamples:
     """The samples in the order of their stamps, whatever is no number as NaN.
 
     Args:
         name: of the stream.
-        samples: in the order of the bag; NaN may be among them.
-        stamped: whether the messages carry stamps.
+        samples: on the clock of all streams, in the order of the bag; NaN may be among them.
 
     Raises:
-        RecordingError: the clock cannot be trusted, or too much would be left out.
+        RecordingError: the clock cannot be trusted.
     """
-    if stamped:
-        samples, _ = without_unfilled(name, samples)
-        samples = on_one_clock({name: samples})[0][name]
     samples, _ = in_time_order(name, samples)
     return replace(samples, values=numbers_only(samples.values))
 

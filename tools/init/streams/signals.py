@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream
+from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
+from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.tidying.long_holes import LongHoles
 from jointscope.tools.bags.tidying.stream_notices import Timing, timing
 from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 from jointscope.tools.init.streams.known_fields import KnownField, known_fields
 
 Array = NDArray[np.float64]
@@ -94,12 +96,17 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
-    troubles: list[RecordingError] = []
-    found = [
-        _signal(raw[topic], kind, known, start, troubles)
+    fields = [
+        field
         for topic, kind in filled.items()
         for known in known_fields(kind, raw[topic].data[0])
+        if (field := _field(raw[topic], kind, known)) is not None
     ]
+    timed, _, _ = on_one_time_axis(
+        {field.label: field.samples for field in fields}, {field.label for field in fields if field.stamped}
+    )
+    troubles: list[RecordingError] = []
+    found = [_signal(field, timed[field.label], start, troubles) for field in fields]
     signals = [signal for signal in found if signal is not None]
     if troubles and not signals:
         raise troubles[0]
@@ -125,10 +132,24 @@ def _useful_type(bag: Bag, topic: str) -> MessageType | None:
     return kind if interfaces or known_fields(kind, None) else None
 
 
-def _signal(
-    raw: RawTopic, kind: MessageType, known: KnownField, start_ns: int, troubles: list[RecordingError]
-) -> Signal | None:
-    """One field; None where it is empty in some messages or changes its length, or its times cannot be told."""
+@dataclass(frozen=True)
+class _Field:
+    """One field of the messages of a topic, in the order of the bag."""
+
+    topic: str
+    kind: MessageType
+    known: KnownField
+    names: tuple[str, ...]
+    samples: TimedSamples
+    stamped: bool
+
+    @property
+    def label(self) -> str:
+        return f"{self.topic} {self.known.path}"
+
+
+def _field(raw: RawTopic, kind: MessageType, known: KnownField) -> _Field | None:
+    """One field; None where it is empty in some messages or changes its length."""
     try:
         columns = read_columns(raw, kind, known.path)
     except RecordingError:
@@ -139,18 +160,25 @@ def _signal(
         return None
     received = columns.of(raw.received_ns)
     stamps = received if columns.stamps is None else columns.stamps
-    stamped = columns.stamps is not None
-    everything = TimedSamples(stamps, received, columns.values)
+    samples = TimedSamples(stamps, received, columns.values)
+    return _Field(raw.name, kind, known, names, samples, columns.stamps is not None and not empty_stamps(samples))
+
+
+def _signal(field: _Field, timed: TimedSamples, start_ns: int, troubles: list[RecordingError]) -> Signal | None:
+    """A field as a signal, from its samples on the clock of all; None where its times cannot be told."""
+    known = field.known
 
     def signal(samples: TimedSamples, sent: Signal | None = None) -> Signal:
         times = (samples.stamps - start_ns) / 1e9
         later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
-        values = samples.values[later]
-        return Signal(raw.name, kind.name, known.path, names, times[later], values, stamped, known.quantity, sent)
+        names, values = field.names, samples.values[later]
+        return Signal(
+            field.topic, field.kind.name, known.path, names, times[later], values, field.stamped, known.quantity, sent
+        )
 
     try:
-        ordered = ordered_samples(raw.name, everything, stamped)
-        samples = plausible_samples(raw.name, ordered) if known.quantity in MEASURED else ordered
+        ordered = ordered_samples(field.topic, timed)
+        samples = plausible_samples(field.topic, ordered) if known.quantity in MEASURED else ordered
     except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
         troubles.append(err)
         return None

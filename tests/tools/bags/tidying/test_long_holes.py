@@ -8,10 +8,10 @@ import dataclasses
 import numpy as np
 
 from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.bags.clocks.time_order import in_time_order
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.tidying.long_holes import LongHoles, with_short_holes
-from jointscope.tools.bags.tidying.time_order import in_time_order
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
 
 HOUR = 3600.0
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import counted, duration
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.durations import counted, duration
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 NEAR = 1.0  # [s] a clock that starts at zero goes on within this
 MOST_UNFILLED = 0.5  # share of the messages

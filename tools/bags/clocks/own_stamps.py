@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.parts.sensors import BY_MESSAGE
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.time_order import LATE_ALLOWED
+from jointscope.tools.bags.clocks.time_order import LATE_ALLOWED
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

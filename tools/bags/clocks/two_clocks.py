@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import duration
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.durations import duration
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 APART = 0.5  # [s] no transport takes so much longer than another
 TOGETHER = 0.9  # of the span in which a stream came in, its stamps must span too

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import duration
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.durations import duration
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 SMALLEST_FORWARD, SMALLEST_BACK = 0.1, 0.02  # [s] lost messages and a queue that empties look like small steps forward
 PERIODS = 5.0  # a step is longer than so many periods

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.tidying.durations import counted, duration
-from jointscope.tools.bags.tidying.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.durations import counted, duration
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 LATE_ALLOWED = 0.5  # [s] messages overtake each other by less than this; more is a clock that was set back
 FORWARD_ALLOWED = 3600.0  # [s] more than between the times of reception is a clock that was set

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`init` puts the streams of a bag on one clock as `calibrate` does, so that its regression is right at once."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from arm_bags import ArmMotion, write_arm_bag, write_urdf
+
+from jointscope.tools.command_line import main
+
+ARM = {"shoulder": None, "elbow": "shoulder"}
+HOUR = 3600 * 10**9
+STAMPS = {
+    "hours ahead": (lambda stamp: stamp + 2 * HOUR, "its stamps are 2 h 0 min ahead of those of the other streams"),
+    "two seconds behind": (lambda stamp: stamp - 2 * 10**9, "its stamps are 2 s behind those of the other streams"),
+    "not filled": (lambda stamp: 0, "all its stamps are zero; the time of reception stands in for it"),
+    "filled once": (lambda stamp: 7 * 10**9, "all its stamps are 7.000 s; the time of reception stands in for it"),
+    "no fractions": (lambda stamp: stamp // 10**9 * 10**9, "its stamps hold whole seconds only; the time of reception"),
+}
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    urdf = write_urdf(tmp_path_factory.mktemp("arm") / "arm.urdf", ARM)
+    return urdf, ArmMotion(urdf, tuple(ARM))
+
+
+def regression_of(arm, tmp_path, capsys, stamped):
+    """Lines of the regression's table by joint, and all that `init` says."""
+    urdf, motion = arm
+    topics = {"/joint_states": motion.states(), "/motor_command": motion.commands(tuple(ARM))}
+    topics = {
+        name: content | ({"stamped": stamped[name]} if name in stamped else {}) for name, content in topics.items()
+    }
+    bag = write_arm_bag(tmp_path / "arm.mcap", motion.times, topics, latency=2e-4)
+    assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 0
+    said = capsys.readouterr().out
+    rows = {line.split()[0]: line for line in said.splitlines() if re.match(r"  (shoulder|elbow) +[0-9]", line)}
+    return rows, said
+
+
+@pytest.mark.parametrize("topic", ["/joint_states", "/motor_command"])
+@pytest.mark.parametrize("kind", STAMPS)
+def test_the_regression_is_right_whatever_clock_a_stream_has(arm, tmp_path, capsys, kind, topic):
+    stamped, told = STAMPS[kind]
+    rows, said = regression_of(arm, tmp_path, capsys, {topic: stamped})
+    assert told in said
+    assert "can be used with it" in said
+    for joint in ARM:
+        gain, inertia, dry, viscous = (float(x) for x in re.findall(r"([0-9.-]+) \+-", rows[joint]))
+        assert (gain, viscous) == (pytest.approx(1.0, rel=0.01), pytest.approx(0.4, rel=0.02))
+        assert (dry, inertia) == (pytest.approx(0.3, rel=0.03), pytest.approx(0.05, rel=0.1))
+
+
+def test_without_any_filled_stamp_all_streams_go_by_their_reception(arm, tmp_path, capsys):
+    nothing = STAMPS["not filled"][0]
+    rows, said = regression_of(arm, tmp_path, capsys, {"/joint_states": nothing, "/motor_command": nothing})
+    assert said.count("all its stamps are zero") == 2
+    assert all(re.search(r" 1\.0+\d* \+-", line) or " 0.99" in line for line in rows.values())
