@@ -137,8 +137,8 @@ def _check_overlap(recording: Recording) -> list[Notice]:
         raise RecordingError(f"the recording is too short: {common:.3f} s; expected at least {MIN_SECONDS:g} s")
     whole = recording.duration
     if common < 0.95 * whole:
-        text = (
-            f"all streams together cover only {common:.3f} of {whole:.3f} s: {late} begins late or {early} ends early"
+        text = f"all streams together cover only {common:.3f} of {whole:.3f} s: {late} begins late" + (
+            " and ends early" if late == early else f" or {early} ends early"
         )
         return [Notice(late, "info", 0, text)]
     return []

@@ -36,7 +36,8 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
         RecordingError: one of them moves.
     """
     names = _other_names(found, robot)
-    ranges = {name: (_unit_of(robot, joint), _range(found, name)) for name, joint in names.items()}
+    at_mean = robot.held_at_mean
+    ranges = {name: (_unit_of(robot, joint), _range(found, name, joint in at_mean)) for name, joint in names.items()}
     ends = [
         robot.tree.posture({names[name]: spans[k] * si_factor(unit) for name, (unit, spans) in ranges.items() if spans})
         for k in range(3)
@@ -78,8 +79,8 @@ def _other_names(found: Sequence[MessageParts], robot: Robot) -> dict[str, str]:
     return {name: name.removeprefix(prefix) for name in seen if name not in own}
 
 
-def _range(found: Sequence[MessageParts], name: str) -> tuple[float, float, float] | None:
-    """Smallest, middle and largest value of a name, without outliers; None where there are too few."""
+def _range(found: Sequence[MessageParts], name: str, mean: bool) -> tuple[float, float, float] | None:
+    """Smallest, middle (or mean) and largest value of a name, without outliers; None where there are too few."""
     values = [
         part.values[:, part.names.index(name)]
         for parts in found
@@ -91,6 +92,8 @@ def _range(found: Sequence[MessageParts], name: str) -> tuple[float, float, floa
     if len(every) < FEWEST:
         return None
     low, middle, high = np.quantile(every, [OUTLYING, 0.5, 1.0 - OUTLYING])
+    if mean:
+        middle = np.mean(every[(every >= low) & (every <= high)])
     return float(low), float(middle), float(high)
 
 

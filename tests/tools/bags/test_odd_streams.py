@@ -191,15 +191,29 @@ def test_stamps_of_zero_and_single_wild_ones_are_left_out():
     assert without_unfilled("imu1", simulated) == (simulated, [])
 
 
-def test_a_few_samples_without_numbers_are_left_out_and_many_refused():
+def test_samples_without_numbers_are_left_out_and_a_stream_of_mostly_those_refused():
     samples = motion()
     values = samples.values.copy()
     values[[7, 9], 0] = np.nan, 1e300
     kept, (notice,) = without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
     assert len(kept) == 1498 and "in a.motor_position, the first at 0.014 s" in notice.text
     values[::3, 1] = np.inf
-    with pytest.raises(RecordingError, match=r"b.motor_position is no number .* in 500 of 1500 messages \(33.3 %\)"):
+    kept, _ = without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
+    assert len(kept) == 999  # the message at 9 lacks both
+    values[:800, 1] = np.inf
+    with pytest.raises(RecordingError, match=r"b.motor_position is no number .* in 1034 of 1500 messages \(68.9 %\)"):
         without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
+
+
+def test_commands_without_numbers_are_left_out_in_runs_but_only_few_alone():
+    samples = motion()
+    off = samples.values.copy()
+    off[:600] = np.nan  # before the controller is switched on
+    kept, (notice,) = without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
+    assert len(kept) == 900 and "command: left out 600 messages" in notice.text
+    off[600::10, 0] = np.nan  # whatever acted there stands in no message
+    with pytest.raises(RecordingError, match=r"a.motor_position is no number .* use a part of the recording in which"):
+        without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
 
 
 def test_a_stream_of_which_nothing_is_a_number_is_refused_however_short():

@@ -310,3 +310,28 @@ def test_a_spring_needs_an_inertia_behind_it(tmp_path, capsys):
     (tmp_path / "a.yaml").write_text(re.sub("rigid_joints: .finger.", "rigid_joints: []", own))
     assert main(["info", str(bag), "--robot", str(tmp_path / "a.yaml")]) == 1
     assert "finger moves no inertia in g.urdf, so nothing swings on a spring" in capsys.readouterr().err
+
+
+def test_a_joint_that_is_driven_and_whose_encoder_says_nothing_is_no_joint_that_stands(arm, free, tmp_path, capsys):
+    states = free.states()
+    states["position"][:, states["names"].index("wrist")] = np.nan
+    topics = {"/joint_states": states, "/motor_command": free.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
+    told = capsys.readouterr().err
+    assert "wrist: driven in" in told and "its position is no number (NaN) in most messages of /joint_states" in told
+    assert main(shlex.split(told.partition("type: ")[2])[1:]) == 0
+    assert "locked: wrist (assumed at 0: no number in the bag)" in capsys.readouterr().out
+
+
+def test_a_joint_that_swings_to_one_side_is_held_at_its_mean_on_the_users_word(arm, free, tmp_path, capsys):
+    states = free.states()
+    wrist = states["names"].index("wrist")
+    states["position"][:, wrist] = np.where(free.times < 1.0, 1.0, 0.2)
+    topics = {"/joint_states": states, "/motor_command": free.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml", "--joints", "shoulder,elbow", "--lock", "wrist") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    mean = float(np.mean(states["position"][:, wrist]))
+    assert robot.tree.locked["wrist"] == pytest.approx(mean, abs=2e-3)
+    assert read_recording(bag, robot).posture["wrist"] == pytest.approx(mean, abs=5e-3)

@@ -18,6 +18,7 @@ from jointscope.tools.init.streams.named_signal import Wish
 from jointscope.tools.init.streams.roles import Roles
 
 NOT_THERE = "assumed at 0: not in the bag"
+NO_NUMBER = "assumed at 0: no number in the bag"
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ def held_joints(bodies: UrdfBodies, roles: Roles, typed: Typed, free_links: bool
         RecordingError: one of them moves, with the command that holds it or uses it.
     """
     others = bodies.that_matter(roles.joints)
+    blind = [j for j in others if j in roles.no_number and j in roles.driven and j not in typed.wish.locked]
+    if blind:
+        raise RecordingError(_blind(blind, roles, typed))
     moving = [j for j in others if j in roles.stances and roles.stances[j].moves and j not in typed.wish.locked]
     if moving and not free_links:
         raise RecordingError(_left_out(moving, bodies, roles, typed))
@@ -103,12 +107,22 @@ def held_joints(bodies: UrdfBodies, roles: Roles, typed: Typed, free_links: bool
 def _held(joint: str, roles: Roles, wish: Wish) -> HeldJoint:
     stance = roles.stances.get(joint)
     if stance is None:
-        return HeldJoint(joint, 0.0, NOT_THERE, seen=False)
+        return HeldJoint(joint, 0.0, NO_NUMBER if joint in roles.no_number else NOT_THERE, seen=False)
     moved = f"{stance.span:.2g}"
-    if stance.moves:
+    if stance.moves or joint in wish.locked:
         said = "--lock says so" if joint in wish.locked else "not among the joints"
         return HeldJoint(joint, stance.mean, f"{said}; it moves by {moved}, this is its mean", True, on_word=True)
     return HeldJoint(joint, stance.mean, f"stands still there, moves by {moved}", seen=True)
+
+
+def _blind(joints: Sequence[str], roles: Roles, typed: Typed) -> str:
+    """Why joints that are driven, and whose positions are no numbers, cannot be left out."""
+    who = ", ".join(joints)
+    return (
+        f"{who}: driven in {typed.bag}, but its position is no number (NaN) in most messages of "
+        f"{roles.motor_encoder.signal.topic}, so nothing tells how it moved, and {', '.join(roles.joints)} feel it; "
+        f"expected an encoder that works. If it stood at zero, type: {typed.locking(joints).command()}"
+    )
 
 
 def _left_out(moving: Sequence[str], bodies: UrdfBodies, roles: Roles, typed: Typed) -> str:

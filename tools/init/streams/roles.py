@@ -34,6 +34,7 @@ class Roles:
         imus: gyroscopes, in the order of the bag.
         stances: joints of the URDF that the bag knows, and whether they move.
         driven: joints whose command or measured effort varies.
+        no_number: joints whose positions are no numbers in most messages.
     """
 
     joints: tuple[str, ...]
@@ -44,6 +45,7 @@ class Roles:
     imus: tuple[Signal, ...]
     stances: Mapping[str, Stance] = field(default_factory=dict)
     driven: tuple[str, ...] = ()
+    no_number: tuple[str, ...] = ()
 
 
 def assign_roles(
@@ -100,6 +102,7 @@ def assign_roles(
         imus=tuple(s for s in signals if s.msgtype == IMU and s.quantity == "rate"),
         stances=stance,
         driven=tuple(joint for joint in urdf_joints if drive.varies(joint)),
+        no_number=tuple(joint for joint in urdf_joints if joint in motors.names and joint not in stance),
     )
 
 

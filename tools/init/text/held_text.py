@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jointscope.tools.init.streams.other_joints import NOT_THERE, HeldJoint
+from jointscope.tools.init.streams.other_joints import NO_NUMBER, NOT_THERE, HeldJoint
 from jointscope.tools.init.text.robot_line import as_list, line, plain
 
 
@@ -24,7 +24,8 @@ def locked_line(held: Sequence[HeldJoint]) -> str:
     ways = (
         ("stand still in the recording", [h for h in held if h.seen and not h.on_word]),
         ("held at their mean on your word", [h for h in held if h.on_word]),
-        (NOT_THERE, [h for h in held if not h.seen]),
+        (NOT_THERE, [h for h in held if not h.seen and h.reason == NOT_THERE]),
+        (NO_NUMBER, [h for h in held if not h.seen and h.reason == NO_NUMBER]),
     )
     parts = [
         ", ".join(f"{h.joint} {h.position:.4g}" if h.seen else h.joint for h in those) + f" ({why})"
