@@ -49,16 +49,28 @@ def need_module(name: str, also: Sequence[str] = ()) -> ModuleType:
         also: further names in it that are used here.
 
     Raises:
+        KeyboardInterrupt: the user stopped the import.
         JointscopeError: it is missing, cannot be imported, or lacks names; says what is installed and what to do.
     """
     try:
         module = importlib.import_module(name)
     except Exception as err:  # a module of another project may raise anything while it is imported
+        if _interrupted(err):
+            raise KeyboardInterrupt from err
         raise JointscopeError(_not_there(name, err)) from err
     lacking = [used for used in (*MODULES[name].uses, *also) if not hasattr(module, used)]
     if lacking:
         raise JointscopeError(_another(name, module, lacking))
     return module
+
+
+def _interrupted(err: BaseException | None) -> bool:
+    """Whether the user stopped the import; extension modules turn that into errors of their own."""
+    while err is not None:
+        if isinstance(err, KeyboardInterrupt) or "KeyboardInterrupt" in str(err):
+            return True
+        err = err.__cause__ or err.__context__
+    return False
 
 
 def trouble_with_modules() -> str:

@@ -46,11 +46,17 @@ class UrdfBodies:
         """Reads a URDF.
 
         Raises:
-            RobotError: no such file, or no URDF.
+            RobotError: no such file, no URDF, or one with macros of xacro.
         """
         if not path.is_file():
             raise RobotError(f"the URDF {path} does not exist; set `urdf` in the robot file, relative to that file")
         text = UrdfText(path)
+        if text.macro:
+            expanded = path.with_name(f"{path.name.partition('.')[0]}_expanded.urdf")
+            raise RobotError(
+                f"{path} is a xacro file ({text.macro}), expected a URDF without macros: xacro {path} > {expanded} "
+                "(from ROS, or pip install xacro)"
+            )
         model, complaints = parse_urdf(path, text)
         names = set(model.names)
         followers = {name: follower for name, follower in followers_of(text, path.name).items() if name in names}

@@ -25,13 +25,14 @@ class UrdfText:
         joints: names of all joints, fixed ones, too.
         mimics: attributes of <mimic>, by joint.
         trouble: why it is no XML; empty if it is.
+        macro: the first place where bodies or joints wait for xacro; empty if there is none.
     """
 
     def __init__(self, urdf: Path):
         self._text = urdf.read_bytes()
         self.joints: set[str] = set()
         self.mimics: dict[str, Mapping[str, str]] = {}
-        self.trouble = ""
+        self.trouble = self.macro = ""
         self._open: list[str] = []
         self._joint: Mapping[str, str] = {}
         self._limited = False
@@ -56,6 +57,8 @@ class UrdfText:
 
     def _begin(self, tag: str, attributes: Mapping[str, str]) -> None:
         self._open.append(tag)
+        if not self.macro:
+            self.macro = self._expression(tag, attributes)
         name = self._joint.get("name", "")
         if self._open == ["robot", "joint"]:
             self._joint, self._limited = attributes, False
@@ -76,3 +79,10 @@ class UrdfText:
         if whole and self._joint.get("type") in LIMITED and self._text[place : place + 2] == b"</":
             self._missing.append((place, NO_LIMIT))
         self._open.pop()
+
+    def _expression(self, tag: str, attributes: Mapping[str, str]) -> str:
+        """Where an attribute of a body or joint is an expression of xacro; how it looks is no matter."""
+        if "visual" in self._open or "collision" in self._open or self._open[1:2] not in (["link"], ["joint"]):
+            return ""
+        found = next((f'{key}="{value}"' for key, value in attributes.items() if "${" in value), "")
+        return found and f"line {self._parser.CurrentLineNumber}: <{tag} {found}>"

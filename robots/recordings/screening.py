@@ -203,6 +203,8 @@ def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
         if si_unit(unit) == si_unit(now) and excess * si_factor(unit) / si_factor(now) <= BEYOND_LIMIT:
             word = {"deg": "degrees", "rad": "radians"}.get(unit, unit)
             return f"the {'angles' if si_unit(now) == 'rad' else 'positions'} look like {word}: set {place} to {unit}"
+    if si_unit(now) == "rad":
+        return f"check {place}; counts of an encoder are `unit: rad` with `scale: [6.2832/COUNTS_PER_TURN, ...]`"
     return f"check {place}"
 
 

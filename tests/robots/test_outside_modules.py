@@ -98,6 +98,15 @@ def test_a_module_that_breaks_while_it_is_imported_is_named(monkeypatch, tmp_pat
         need_module("mujoco")
 
 
+@pytest.mark.parametrize("wrapped", ["raise KeyboardInterrupt", "raise ImportError('KeyboardInterrupt: ')"])
+def test_an_import_that_the_user_stopped_is_an_interruption(monkeypatch, tmp_path, wrapped):
+    (tmp_path / "mujoco.py").write_text(f"{wrapped}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "mujoco", raising=False)
+    with pytest.raises(KeyboardInterrupt):
+        need_module("mujoco")
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [("gtsam", "def symbol(*_): return 0\n"), ("pinocchio", "raise ImportError('plugins of another program')\n")],

@@ -181,3 +181,12 @@ def test_a_urdf_that_cannot_be_read_is_refused_with_the_reason(changed, old, new
     assert told in str(error.value)
     assert "\n" not in str(error.value)
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("place", ['<mass value="${m}"/>', '<origin xyz="0 0 ${h}"/>'])
+def test_expressions_of_xacro_in_bodies_are_said_with_the_command_that_expands_them(changed, place):
+    urdf = changed(('<link name="base"/>', f'<link name="base"><inertial>{place}</inertial></link>'))
+    with pytest.raises(
+        RobotError, match=r"arm.urdf is a xacro file \(line \d+: <.*\$\{.\}.*: xacro .*arm_expanded.urdf"
+    ):
+        RigidTree(urdf, JOINTS, DOWN)

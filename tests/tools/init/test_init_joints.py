@@ -335,3 +335,47 @@ def test_a_joint_that_swings_to_one_side_is_held_at_its_mean_on_the_users_word(a
     mean = float(np.mean(states["position"][:, wrist]))
     assert robot.tree.locked["wrist"] == pytest.approx(mean, abs=2e-3)
     assert read_recording(bag, robot).posture["wrist"] == pytest.approx(mean, abs=5e-3)
+
+
+def test_a_lock_that_leaves_no_joint_and_names_given_twice_are_one_line(arm, free, tmp_path, capsys):
+    topics = {"/joint_states": free.states(), "/motor_command": free.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    for options, told in (
+        (("--lock", "shoulder,elbow,wrist"), "--lock shoulder,elbow,wrist leaves no joint that moves and is driven"),
+        (("--lock", "wrist,wrist"), "--lock names wrist twice; expected every joint once"),
+        (("--joints", "shoulder,elbow,shoulder"), "--joints names shoulder twice; expected every joint once"),
+    ):
+        assert init(arm, bag, "-o", tmp_path / "a.yaml", *options) == 1
+        assert told in capsys.readouterr().err
+
+
+def test_counts_are_recognised_by_their_whole_numbers(arm, free, tmp_path, capsys):
+    states = free.states()
+    states["position"] = np.rint(states["position"] * 65536 / (2 * np.pi))
+    topics = {"/joint_states": states, "/motor_command": free.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    told = capsys.readouterr().out
+    assert "write unit: rad and scale: [6.2832/COUNTS_PER_TURN, ...]" in told
+    text = (tmp_path / "a.yaml").read_text()
+    scaled = re.sub(r"\n    unit: deg.*", f"\n    unit: rad\n    scale: {[2 * np.pi / 65536] * 3}", text)
+    (tmp_path / "b.yaml").write_text(scaled)
+    values = read_recording(bag, load_robot(tmp_path / "b.yaml")).streams["motor_encoder"].values
+    np.testing.assert_allclose(values, free.states(tuple(ARM))["position"], atol=6e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', "error: changed.urdf: joint shoulder has no axis"),
+        ('<mass value="2"/>', '<mass value="-2"/>', "has a negative inertia: principal moments"),
+    ],
+)
+def test_what_is_wrong_in_the_urdf_is_not_taken_for_a_lack_of_masses(arm, free, tmp_path, capsys, old, new, told):
+    urdf = tmp_path / "changed.urdf"
+    urdf.write_text(arm.read_text().replace(old, new, 1))
+    topics = {"/joint_states": free.states(), "/motor_command": free.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 1
+    said = capsys.readouterr().err
+    assert told in said and "add <inertial>" not in said

@@ -102,6 +102,11 @@ def _roles(typed: Typed, signals: list[Signal], known: tuple[str, ...], bodies: 
     if linked.link_encoder is not None:
         return linked, False
     if trouble:
+        RigidTree(
+            typed.urdf, roles.joints, np.array(GRAVITY), inertias=False
+        )  # axes and the like are no lack of masses
+        if any(inertia.mass < 0.0 for inertia in bodies.model.inertias):
+            raise RobotError(trouble)
         raise RobotError(
             f"{typed.urdf.name} has no inertias for all moving links, and the bag no encoders on the links: expected "
             f"one of them; add <inertial> to the links, or record a topic with the positions of the links ({trouble})"

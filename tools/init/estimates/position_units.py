@@ -28,6 +28,10 @@ BEFORE_A_GEAR = (
     "the motion would go far beyond the limits of the URDF otherwise; if these are positions before a gear, write "
     "unit: rad and scale: [1/ratio, ...]"
 )
+COUNTS = (
+    "the motion would go far beyond the limits of the URDF otherwise; all values are whole numbers: if they are counts, "
+    "write unit: rad and scale: [6.2832/COUNTS_PER_TURN, ...]"
+)
 INSTANTS, LEAST = 600, 200  # that are enough to judge by; of many joints
 
 
@@ -65,6 +69,8 @@ def position_units(tree: RigidTree, encoder: Stream, gyros: Sequence[Stream]) ->
     beyond = span > BEYOND * allowed
     turning, sliding = "deg" if np.any(beyond & ~slides) else "rad", "mm" if np.any(beyond & slides) else "m"
     reason = BEFORE_A_GEAR if np.any(beyond) else ""
+    if reason and np.array_equal(encoder.values, np.rint(encoder.values)):
+        reason = COUNTS
     by_limits = UnitGuess(tuple(sliding if slide else turning for slide in slides), reason)
     left = {turning: _left(tree, encoder, gyros, by_limits)}
     for unit in ("rad", "deg", "turn"):

@@ -113,6 +113,10 @@ def _check_wish(wish: Wish, urdf_joints: tuple[str, ...]) -> None:
             raise RecordingError(
                 f"{option}: the URDF has no moving joint {unknown[0]!r}; it has {', '.join(urdf_joints)}"
             )
+    for option, names in (("--joints", wish.joints), ("--lock", wish.locked)):
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice:
+            raise RecordingError(f"{option} names {twice} twice; expected every joint once")
     both = [name for name in wish.locked if name in wish.joints]
     if both:
         raise RecordingError(f"{both[0]} stands under --joints and under --lock; expected one of them")
@@ -188,6 +192,11 @@ def _joints(
             "out, or hold it at its mean with --lock"
         )
     driven = [joint for joint in here if stance[joint].moves and drive.varies(joint)]
+    if wish.locked and not driven:
+        raise RecordingError(
+            f"--lock {','.join(wish.locked)} leaves no joint that moves and is driven; expected one at least: "
+            f"name fewer under --lock"
+        )
     if wish.joints:
         found = tuple(joint for joint in driven if joint in wish.joints)
         if not found:
