@@ -16,7 +16,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import jointscope
 from jointscope.robots.errors import JointscopeError
@@ -68,10 +68,20 @@ def verbs() -> dict[str, str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """No abbreviations: --effect must not be taken for --effects where a verb has only that."""
+    """No abbreviations: --effect must not be taken for --effects where a verb has only that.
+
+    Attributes:
+        verb: what to add to the program's name to get help, for what only the outer parser notices.
+    """
+
+    verb = ""
 
     def __init__(self, *args: Any, **kwargs: Any):
         super().__init__(*args, **{"allow_abbrev": False, **kwargs})
+
+    def error(self, message: str) -> NoReturn:
+        """Says in one line what is wrong with the usage, and where the right one stands; exit code 2."""
+        self.exit(2, f"{self.prog}: error: {' '.join(message.split())}; usage: {self.prog}{self.verb} --help\n")
 
 
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
@@ -87,6 +97,7 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     asked_for = next((argument for argument in arguments if not argument.startswith("-")), None)
     for name, summary in verbs().items():
         if name == asked_for:
+            parser.verb = f" {name}"
             module = name.replace("-", "_")
             importlib.import_module(f"jointscope.tools.verbs.{module}").add_parser(subparsers)
         else:

@@ -38,7 +38,7 @@ from jointscope.tools.bags.needed_streams import (
 from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
-from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, timing_notices
+from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, said_once, timing_notices
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
 
 
@@ -74,7 +74,7 @@ def read_recording(
     notices += found
     columns = {need.name: fitting_messages(parts[need.name], *wanted_of(need)) for need in needed}
     samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
-    notices += found
+    notices += said_once(found)
     samples, seams, found = on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
     notices += found
     for need in needed:

@@ -125,7 +125,15 @@ def test_wrong_usage_exits_with_2(arguments, capsys):
     with pytest.raises(SystemExit) as exit_:
         main(arguments)
     assert exit_.value.code == 2
-    assert "usage: jointscope" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "usage: jointscope" in said and said.count("\n") == 1
+
+
+def test_an_unknown_option_is_told_with_the_help_of_its_verb(capsys):
+    with pytest.raises(SystemExit):
+        main(["calibrate", "doggy", "train.mcap", "-o", "out.yaml", "--foo"])
+    told = "jointscope: error: unrecognized arguments: --foo; usage: jointscope calibrate --help\n"
+    assert capsys.readouterr().err == told
 
 
 def test_help_imports_nothing_heavy():

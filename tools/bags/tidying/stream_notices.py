@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,3 +143,15 @@ def _clipped(column: Array, extreme: float) -> int:
         if stop - start >= CLIPPED_RUN and around.max(initial=0.0) > at_speed:
             count += int(stop - start)
     return count
+
+
+def said_once(notices: Sequence[Notice]) -> list[Notice]:
+    """The notices in which several streams say the same as one, under the names of all."""
+    by_text: dict[str, list[Notice]] = {}
+    for notice in notices:
+        by_text.setdefault(notice.text.removeprefix(f"{notice.stream}: "), []).append(notice)
+    found = []
+    for text, same in by_text.items():
+        names = ", ".join(dict.fromkeys(notice.stream for notice in same))
+        found.append(same[0] if len(same) == 1 else replace(same[0], text=f"{names}: {text}"))
+    return found

@@ -29,7 +29,7 @@ BEFORE_A_GEAR = (
     "unit: rad and scale: [1/ratio, ...]"
 )
 COUNTS = (
-    "the motion would go far beyond the limits of the URDF otherwise; all values are whole numbers: if they are counts, "
+    "the motion would go far beyond the limits of the URDF otherwise; values are whole numbers: if they are counts, "
     "write unit: rad and scale: [6.2832/COUNTS_PER_TURN, ...]"
 )
 INSTANTS, LEAST = 600, 200  # that are enough to judge by; of many joints

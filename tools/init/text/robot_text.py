@@ -101,13 +101,13 @@ def _names(chosen: Chosen, joints: tuple[str, ...], indent: int) -> list[str]:
     if not chosen.names or chosen.names == joints:
         return []
     if not chosen.signal.names:
-        text = "places in the messages, counted from 0, in the order of `joints`"
+        text = f"places in {chosen.signal.topic}, counted from 0, in the order of `joints`"
     elif chosen.by_order:
-        text = "nothing in common with the URDF: taken in its order, which may be wrong"
+        text = f"in {chosen.signal.topic}, nothing in common with the URDF: taken in its order, which may be wrong"
     elif chosen.by_ending:
-        text = "in the messages, in the order of `joints`; matched by their endings"
+        text = f"in {chosen.signal.topic}, in the order of `joints`; matched by their endings"
     else:
-        text = "in the messages, in the order of `joints`"
+        text = f"in {chosen.signal.topic}, in the order of `joints`"
     return [_line(f"names: {_list(chosen.names)}", text, False, indent)]
 
 
