@@ -47,6 +47,7 @@ SMALL_STEP = 0.1  # [sigma] a last step that changes no value
 BLUNT = (20.0, 60.0)  # [s/rad] friction sharpness on the way to that of the robot
 BELOW_ITERATIONS = 25  # where it does not come to rest in as many, the larger noise stays
 BELOW = 10.0  # times smaller process noise that is tried
+VANISHED = 0.1  # of its prior, a size that may be on its way to nothing
 BETTER = 1.5  # times smaller, the one that is preferred ...
 AS_GOOD = 0.02  # ... where the cost rises by less than this per measured value
 
@@ -100,7 +101,7 @@ class WholeStage:
         passes = FixedPoint()
         for _ in range(NOISE_PASSES):
             solution = self._step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
-            _must_converge(solution, NUISANCE if self.hold else SMALL_STEP)
+            _must_converge(solution, problems[0].robot, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
             other = _with_sigmas(problems, solved) if self.sigmas else None
@@ -212,15 +213,39 @@ def _with_sigmas(problems: Sequence[BagProblem], solved: Solved) -> list[BagProb
     return anchored([problem.of_robot(other) for problem in problems], solved.solution.estimate.calibrations)
 
 
-def _must_converge(solution: Solution, enough: float) -> None:
+def _must_converge(solution: Solution, robot: Robot, enough: float) -> None:
     """Raises unless the solver converged, gained nothing more, or made a last step shorter than `enough` sigmas."""
     if solution.converged or solution.flat:
         return
     last = solution.iterations[-1]
     if last.step_in_sigmas >= enough:
+        gone = _vanishing(robot, solution)
         raise SolveError(
             f"no convergence after {len(solution.iterations)} iterations: the last step was still "
             f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
-            "start values may be far off, or the model may contradict the recording: look at what "
+            + gone
+            + "start values may be far off, or the model may contradict the recording: look at what "
             "`jointscope info BAG --robot ROBOT` says, then `jointscope diagnose ROBOT BAG` for what the model lacks"
         )
+
+
+def _vanishing(robot: Robot, solution: Solution) -> str:
+    """A clause about effects whose sizes go to nothing, a long way for logarithms; empty if there are none."""
+    calibration = solution.estimate.calibrations[0]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    gone = [
+        here.label
+        for here in robot.effects
+        if any(
+            name in values
+            and robot.parameters[name].positive
+            and values[name] < VANISHED * robot.parameters[name].prior
+            for name in (here.parameter(p.name) for p in here.effect.parameters_at(robot, here.owner))
+        )
+    ]
+    if not gone:
+        return ""
+    return (
+        f"sizes of {', '.join(gone)} are below a tenth of their start, so the recording may show no such effect: "
+        f"`jointscope remove {robot.path.name} {' '.join(gone)} -o OUT.yaml`; else "
+    )
