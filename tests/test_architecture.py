@@ -12,11 +12,11 @@ ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("robots", "factors", "graphs", "tools")
 MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 ROOMS = """
-robots robots.bodies robots.parts robots.effect_kinds robots.model robots.effects robots.dynamics robots.recordings
-robots.files robots.ready
+robots robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects robots.dynamics
+robots.recordings robots.files robots.ready
 factors
 graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns graphs.scoring
-graphs.calibration graphs.comparison graphs.discovery graphs.transmission graphs.fixed_lag.window
+graphs.calibration graphs.poses graphs.comparison graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator

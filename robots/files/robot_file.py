@@ -21,6 +21,7 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.noise_section import process_noise
+from jointscope.robots.files.pose_section import check_pose_parameters, pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
 from jointscope.robots.files.transmission_section import transmission_matrix
@@ -38,6 +39,7 @@ READY_PREFIX = "ready:"
 
 INTEGRATORS = ("euler", "midpoint", "simpson")
 COMMAND_UNITS = ("duty", "V", "A", "N m")
+NO_COMMAND = Topic("", "", "", "N m")  # of a robot of which only poses are measured
 CONSTANTS = ("motor.supply_voltage", "motor.gear")
 
 
@@ -69,7 +71,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
         raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
     choices = top.section("model", {}).build(lambda s: _model_choices(s, joints))
     gravity = top.array("gravity", (3,))
-    urdf, masses = _urdf_path(top.text("urdf"), path), choices.link_dynamics == "model"
+    motion = "poses" not in top or "command" in top or "sensors" in top
+    urdf, masses = _urdf_path(top.text("urdf"), path), motion and choices.link_dynamics == "model"
     locked = top.section("locked", {}).build(_locked)
     try:
         tree = RigidTree(urdf, joints, gravity, choices.coriolis, masses, locked)
@@ -78,14 +81,15 @@ def load_robot(name_or_path: str | Path) -> Robot:
             raise RobotError(f"{path.name}: {err}") from err
         raise
     constants = top.section("constants", {}).build(_constants)
-    command = top.section("command").build(lambda s: _command(s, joints))
-    sensors = {name: section.build(sensor(name, joints)) for name, section in top.section("sensors").sections()}
-    parameters = {name: section.build(_parameter(name)) for name, section in top.section("parameters").sections()}
+    poses = top.section("poses").build(lambda s: pose_setup(s, joints)) if "poses" in top else None
+    command = top.section("command").build(lambda s: _command(s, joints)) if motion else NO_COMMAND
+    sensors = {name: s.build(sensor(name, joints)) for name, s in top.section("sensors", *_none(motion)).sections()}
+    parameters = {name: s.build(_parameter(name)) for name, s in top.section("parameters", *_none(motion)).sections()}
     controller = top.section("controller").build(lambda s: _controller(s, joints)) if "controller" in top else None
     matrix = (
         top.section("transmission").build(lambda s: transmission_matrix(s, joints)) if "transmission" in top else None
     )
-    noise_section = top.section("noise", *([{}] if choices.link_dynamics == "free" else []))
+    noise_section = top.section("noise", *_none(motion and choices.link_dynamics != "free"))
     robot = Robot(
         name=top.text("name"),
         description=top.text("description", ""),
@@ -101,14 +105,26 @@ def load_robot(name_or_path: str | Path) -> Robot:
         document=document,
         controller=controller,
         transmission=matrix,
+        motion=motion,
     )
+    if poses is not None:
+        robot = with_poses(robot, poses)
     robot = replace(robot, held_at_mean=_held_at_mean(top, locked))
     robot = with_effects(robot, top.texts("effects", ()))
-    robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
+    if motion:
+        robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
     top.finish()
-    check_robot(robot)
+    if motion:
+        check_robot(robot)
+    else:
+        check_pose_parameters(robot, parameters)
     return robot
+
+
+def _none(needed: bool) -> list[dict[str, Any]]:
+    """What stands in for a section that is not there, where the robot can do without it."""
+    return [] if needed else [{}]
 
 
 def _command(section: Section, joints: tuple[str, ...]) -> Topic:

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
+from jointscope.robots.files.pose_section import write_tracker
 from jointscope.robots.files.robot_file import dump_document, urdf_reference
 from jointscope.robots.files.transmission_section import write_transmission
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import Parameter
 
 
 def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None = None) -> str:
@@ -32,16 +34,21 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     _write_locked(document, (robot.as_filed or robot.tree).locked)
     if robot.command.held is not None:
         document["command"]["held"] = robot.command.held
-    for name, parameter in robot.parameters.items():
+    for parameter in robot.parameters.values():
         if parameter.fixed:
             continue
-        entry = document["parameters"][name]
+        entry = _entry(document, parameter)
         entry["value"] = _rounded(parameter.value)
         if parameter.sigma is not None:
             entry["sigma"] = _rounded(parameter.sigma, 3)
         entry.setdefault("prior", _rounded(parameter.prior))
         entry.setdefault("prior_sigma", _rounded(parameter.prior_sigma))
     write_transmission(document, robot)
+    if robot.poses is not None:
+        write_tracker(document["poses"], robot.poses)
+    if not robot.motion:
+        _write_provenance(document, provenance)
+        return dump_document(document)
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
             _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)
@@ -65,9 +72,21 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
             rotation.insert(1, "sigma", _row(gyro.R_sigma, 3))
     if not robot.free_links:
         _write_noise(document["noise"], robot)
+    _write_provenance(document, provenance)
+    return dump_document(document)
+
+
+def _write_provenance(document: Any, provenance: Mapping[str, Any] | None) -> None:
     if provenance is not None:
         document["calibration"] = _plain(provenance)
-    return dump_document(document)
+
+
+def _entry(document: Any, parameter: Parameter) -> Any:
+    """Where a parameter stands; geometric errors that the file left out are written where they are found."""
+    parameters = document.setdefault("parameters", CommentedMap())
+    if parameter.name not in parameters:
+        parameters[parameter.name] = _flow({"value": 0.0, "unit": parameter.unit, "positive": parameter.positive})
+    return parameters[parameter.name]
 
 
 def _write_locked(document: Any, locked: Mapping[str, float]) -> None:

@@ -24,6 +24,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.position_controller import PositionController
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
@@ -55,6 +56,8 @@ class Robot:
         path: the file it was read from.
         document: the file's content with comments, for writing it again.
         transmission: joint angles per motor angle, q_joint = T q_motor, shape (n, n); None for the identity.
+        poses: what is measured of the arm at rest; None where nothing is.
+        motion: whether the file describes drives and sensors, too, so that recordings of motion can be used.
         held_at_mean: joints in `locked` that move in recordings, and are held on the user's word.
         as_filed: the rigid bodies as the file has them, where `tree` is in another posture.
     """
@@ -76,6 +79,8 @@ class Robot:
     as_filed: RigidTree | None = None
     held_at_mean: tuple[str, ...] = ()
     transmission: Array | None = None
+    poses: PoseSetup | None = None
+    motion: bool = True
 
     @property
     def n(self) -> int:

@@ -8,15 +8,17 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import SolveError
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.pose_runs import add_poses_option, run_pose_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
+  jointscope calibrate tx90l --poses poses.csv -o arm.yaml --urdf arm.urdf --report arm.html
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
 takes as ROBOT."""
@@ -32,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
-    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument("bags", metavar="BAG", nargs="*", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
     parser.add_argument(
         "--solver",
@@ -46,6 +48,8 @@ def add_parser(subparsers: Any) -> None:
         action="store_true",
         help="stretch after stretch by iSAM2, saying what is known after each; ends where the batch ends",
     )
+    add_poses_option(parser)
+    parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
     add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
@@ -57,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     if args.incremental and args.solver == "samples":
         raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
     files = ResultFiles.of(args)
-    check_outputs(files.all, inputs=[*args.bags, *args.effects])
+    _check_kinds(args)
+    check_outputs([*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.effects])
     from jointscope.graphs.calibration.calibrate import calibrate
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags import read_recording
@@ -67,6 +72,12 @@ def run(args: argparse.Namespace) -> int:
 
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
+    if args.poses:
+        with progress_bar() as progress:
+            text = run_pose_calibration(robot, args.poses, files, args.urdf, progress)
+        print(text)
+        print(f"\nWrote {', '.join(map(str, [*files.all, *filter(None, [args.urdf])]))}")
+        return 0
     if robot.free_links and (args.incremental or args.solver != "condensed"):
         raise SolveError(
             f"{robot.name}: its links are free, so there are no states to estimate one by one; leave out "
@@ -93,6 +104,36 @@ def run(args: argparse.Namespace) -> int:
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
     return 0
+
+
+def _check_kinds(args: argparse.Namespace) -> None:
+    """One kind of recording at least, and what goes with it.
+
+    Raises:
+        RecordingError: none, both, or an option of the other kind.
+    """
+    if not args.bags and not args.poses:
+        raise RecordingError(
+            "nothing to calibrate from; expected BAG... before the first option, or --poses TABLE-or-BAG"
+        )
+    if args.bags and args.poses:
+        raise RecordingError(
+            "recordings of motion and poses in one estimate are not on the command line yet; from Python: "
+            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...)]), see docs/poses.md"
+        )
+    motion_only = [
+        option
+        for option, given in (
+            ("--incremental", args.incremental),
+            ("--solver samples", args.solver == "samples"),
+            ("--leave-out", bool(args.leave_out)),
+        )
+        if given
+    ]
+    if args.poses and motion_only:
+        raise RecordingError(f"{motion_only[0]} is for recordings of motion; leave it out with --poses")
+    if args.urdf is not None and not args.poses:
+        raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
 
 
 def _solver(args: argparse.Namespace, robot: Any) -> Any:

@@ -11,14 +11,16 @@ from typing import Any
 from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_comparison
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.writing.whole_file import check_outputs
+from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
 
-The last argument is the bag; all before it are robots. Use a recording that was not used for calibration."""
+The last argument is the bag; all before it are robots. Use a recording that was not used for calibration. With poses:
+  jointscope compare arm.yaml --poses other_poses.csv"""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -31,14 +33,19 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_models_and_bag(parser)
+    add_poses_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
 
 def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
     """Adds ROBOT... BAG [--leave-out T0:T1] [--effects FILE]."""
-    parser.add_argument("robots", metavar="ROBOT", nargs="+", help="name of a ready robot, or a robot file")
-    parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument(
+        "robots",
+        metavar="ROBOT... BAG",
+        nargs="+",
+        help="names of ready robots, or robot files; last a .bag, .mcap, .db3 or a ROS 2 bag folder",
+    )
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -46,9 +53,15 @@ def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compares, writes the files, and says what was found."""
     files = ResultFiles.of(args)
+    poses: list[Path] = getattr(args, "poses", [])
+    if not poses:
+        *args.robots, bag = args.robots
+        args.bag = Path(bag)
+        if not args.robots:
+            raise RobotError(f"expected ROBOT... BAG, got {bag} alone; to compare on poses: --poses TABLE-or-BAG")
     names = labels(args.robots)
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
-    check_outputs(files.all, inputs=[args.bag, *robot_files, *args.effects])
+    check_outputs(files.all, inputs=[*([] if poses else [args.bag]), *poses, *robot_files, *args.effects])
     from jointscope.graphs.comparison.compare import compare
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags import read_recording
@@ -56,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
 
     load_user_effects(args.effects)
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
+    if poses:
+        return _on_poses(robots, poses, files)
     check_same_streams(robots)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
@@ -65,6 +80,21 @@ def run(args: argparse.Namespace) -> int:
     print(comparison_text(result))
     if files.all:
         print(f"\nWrote {', '.join(map(str, files.all))}")
+    return 0
+
+
+def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles) -> int:
+    """Compares the models on poses.
+
+    Raises:
+        RobotError: pictures were asked for.
+    """
+    if files.pictures:
+        raise RobotError("pictures of poses come with `jointscope calibrate ROBOT --poses ... --report F.html`")
+    text, content = compare_poses(robots, poses)
+    if files.json is not None:
+        write_json(files.json, content)
+    print(text)
     return 0
 
 

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Geometry and sag of an arm from poses, in one estimate: every value with its sigma, and what poses cannot tell.
+
+The solver is that of every calibration. The size of what transmissions do unseen is found from the residuals, outliers
+are left out by name, and both are repeated until nothing changes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.poses.determined import Determined, determined
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.screen_poses import screen_poses
+from jointscope.graphs.poses.tip_errors import TipErrors
+from jointscope.graphs.poses.tracker_start import base_from_tracker
+from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.posterior import posteriors
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.errors import SolveError
+from jointscope.robots.geometry.error_parameters import error_names
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.poses import Poses
+
+Array = NDArray[np.float64]
+PASSES = 12  # of repeatability and outliers
+AGREES = 0.02  # relative change of the repeatability that asks for no further pass
+OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
+MOST_OUT = 0.2  # share of the poses that may be left out
+MOST_ITERATIONS = 60
+TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
+
+
+@dataclass(frozen=True)
+class PoseCalibration:
+    """Result of a calibration from poses.
+
+    Attributes:
+        robot: with the values that were found, their sigmas and the repeatability.
+        start: before.
+        problems: the sessions without the poses that were left out.
+        calibrations: the shared values of each session, points of contacts included.
+        names: of the free parameters, shape (p,).
+        covariance: of their coordinates (logarithms of positive ones), shape (p, p).
+        errors: of each session at the found values.
+        before: the same at the start values.
+        determined: which geometric errors these poses tell apart.
+        repeatability: factor on the sigmas of the joints that the robot file had.
+        chi2: of the residuals per degree of freedom.
+        left_out: path, name of the pose and its distance in sigmas.
+        iterations: of all passes.
+        wall_seconds: of the whole.
+    """
+
+    robot: Robot
+    start: Robot
+    problems: tuple[PoseSet, ...]
+    calibrations: tuple[Calibration, ...]
+    names: tuple[str, ...]
+    covariance: Array
+    errors: tuple[TipErrors, ...]
+    before: tuple[TipErrors, ...]
+    determined: Determined
+    repeatability: float
+    chi2: float
+    left_out: tuple[tuple[str, str, float], ...]
+    iterations: int
+    wall_seconds: float
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Names of the parameters of which the poses say anything."""
+        parameters = self.robot.parameters
+        return tuple(n for n in self.names if (parameters[n].sigma or 0.0) < TOUCHED * parameters[n].prior_sigma)
+
+    @property
+    def count(self) -> int:
+        """Number of poses that were used."""
+        return sum(len(problem.poses) for problem in self.problems)
+
+
+@in_solver_context
+def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress | None = None) -> PoseCalibration:
+    """Calibrates an arm from poses.
+
+    Args:
+        robot: with a section `poses`.
+        sessions: poses with one place of the tracker each; contacts of several sessions have names of their own.
+        progress: called with a text and the share done.
+
+    Raises:
+        RobotError: the robot has no such section.
+        RecordingError: poses that cannot be those of this robot, or too few.
+        SolveError: no convergence, or too many outliers.
+    """
+    began, report = time.perf_counter(), progress or (lambda text, share: None)
+    report("looking at the poses", 0.0)
+    robot, problems = placed(robot, sessions)
+    screen_poses(problems)
+    before = tuple(_errors(problems, _starts(problems)))
+    out: list[tuple[str, str, float]] = []
+    scale, iterations, solution = 1.0, 0, None
+    from_before: Sequence[Calibration] = ()
+    for i in range(PASSES):
+        problems = [replace(problem, repeatability=scale) for problem in problems]
+        start = _estimate(problems, solution, from_before)
+        solution = solve(problems, start, max_iterations=MOST_ITERATIONS, progress=None)
+        iterations += len(solution.iterations)
+        report(f"pass {i + 1}, cost {solution.cost:.6g}", (i + 1) / PASSES)
+        if not (solution.converged or solution.flat):
+            raise SolveError(
+                f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
+                "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
+            )
+        distances = [_squared_distances(p, c) for p, c in zip(problems, solution.estimate.calibrations, strict=True)]
+        worst = max(float(d.max()) for d in distances)
+        if i and worst > OUTLYING:
+            problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
+            out += found
+            from_before = solution.estimate.calibrations
+            solution = None
+            if len(out) > MOST_OUT * sum(map(len, sessions)):
+                raise SolveError(
+                    f"{len(out)} poses fit no arm, as {out[0][1]} of {out[0][0]} by {out[0][2]:.0f} sigma: check joint "
+                    "angles that had not settled, targets that were lost, and names and units of columns"
+                )
+            continue
+        ratio = _chi2(problems, solution, distances)
+        wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
+        if abs(np.log(wanted / scale)) < AGREES:
+            break
+        scale = float(wanted)
+    assert solution is not None
+    return _result(robot, problems, solution, before, scale, ratio, out, iterations, time.perf_counter() - began)
+
+
+def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:
+    """The sessions with the tracker where it stands; found from the poses where nothing says it."""
+    setup = robot.poses
+    problems = [
+        PoseSet(robot, poses, np.eye(4) if setup is None or setup.tracker is None else setup.tracker)
+        for poses in sessions
+    ]
+    if setup is None or setup.tracker is not None or all(poses.contacts for poses in sessions):
+        for problem in problems:
+            _ = problem.arm  # says what is missing
+        return robot, problems
+    placed = []
+    for problem in problems:
+        e, calibration = problem.start(Calibration.of(robot))
+        targets = problem.arm.at(problem.q, e, problem.values(calibration)).target
+        assert problem.poses.target is not None
+        placed.append(replace(problem, tracker=base_from_tracker(targets, problem.poses.target)[0]))
+    robot = replace(robot, poses=replace(setup, tracker=placed[0].tracker))
+    return robot, [problem.of_robot(robot) for problem in placed]
+
+
+def _starts(problems: Sequence[PoseSet]) -> list[Calibration]:
+    return [problem.start(Calibration.of(problem.robot))[1] for problem in problems]
+
+
+def _estimate(problems: Sequence[PoseSet], before: Solution | None, known: Sequence[Calibration]) -> Estimate:
+    """Where to go on: at the last solution, at values that were known with other poses, or at the start values."""
+    if before is not None:
+        return before.estimate
+    starts = [problem.start(Calibration.of(problem.robot)) for problem in problems]
+    found = [start for _, start in starts]
+    if known:
+        pairs = zip(found, known, strict=True)
+        found = [start.with_points({name: other[name] for name in start.layout}) for start, other in pairs]
+    return Estimate(tuple(x for x, _ in starts), tuple(found))
+
+
+def _errors(problems: Sequence[PoseSet], calibrations: Sequence[Calibration]) -> list[TipErrors]:
+    """Errors with transmissions that do nothing unseen."""
+    found = []
+    for problem, calibration in zip(problems, calibrations, strict=True):
+        e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
+        found.append(TipErrors(problem.misses(problem.point(e, calibration), calibration)))
+    return found
+
+
+def _squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
+    """Squared distance of each pose in sigmas, transmissions and noise of the target together, shape (m,)."""
+    assert problem.robot.poses is not None
+    e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
+    point = problem.point(e, calibration)
+    J = point.by_joint * problem.sigmas
+    V = J @ np.swapaxes(J, 1, 2) + problem.robot.poses.target_sigma**2 * np.eye(3)
+    r = problem.misses(point, calibration)
+    return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(V, r[:, :, None])[:, :, 0]))
+
+
+def _chi2(problems: Sequence[PoseSet], solution: Solution, distances: Sequence[Array]) -> float:
+    """Squared distances per degree of freedom that the fit has left."""
+    rows = sum(problem.measured for problem in problems)
+    _, covariance = posteriors(problems, solution)
+    robot, index = problems[0].robot, solution.estimate.calibrations[0].columns[DYNAMICS]
+    prior = np.array([_prior_sigma(robot, name) for name in solution.estimate.calibrations[0].names])
+    used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
+    return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
+
+
+def _prior_sigma(robot: Robot, name: str) -> float:
+    p = robot.parameters[name]
+    return p.prior_sigma / p.prior if p.positive else p.prior_sigma
+
+
+def _without_outliers(
+    problems: Sequence[PoseSet], distances: Sequence[Array], limit: float
+) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
+    """The sessions without poses beyond a limit: the worst ones first, for they pull others along."""
+    kept, out = [], []
+    for problem, found in zip(problems, distances, strict=True):
+        far = found > limit
+        poses = problem.poses
+        out += [(poses.path, poses.names[i], float(np.sqrt(found[i]))) for i in np.flatnonzero(far)]
+        kept.append(replace(problem, poses=poses.only(~far)))
+    return kept, out
+
+
+def _result(
+    robot: Robot,
+    problems: Sequence[PoseSet],
+    solution: Solution,
+    before: tuple[TipErrors, ...],
+    scale: float,
+    chi2: float,
+    out: Sequence[tuple[str, str, float]],
+    iterations: int,
+    seconds: float,
+) -> PoseCalibration:
+    _, covariance = posteriors(list(problems), solution)
+    calibrations = solution.estimate.calibrations
+    first, index = calibrations[0], calibrations[0].columns[DYNAMICS]
+    own = covariance[index, index]
+    sigmas = np.sqrt(np.diag(own)) * first.value_by_coordinate
+    found = robot.with_values(dict(zip(first.names, first.values.tolist(), strict=True)))
+    parameters = dict(found.parameters)
+    for name, sigma in zip(first.names, sigmas.tolist(), strict=True):
+        parameters[name] = replace(parameters[name], sigma=sigma)
+    assert robot.poses is not None
+    setup = replace(robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale)
+    found = replace(found, parameters=parameters, poses=setup)
+    columns: dict[str, list[Array]] = {}
+    for problem, calibration in zip(problems, calibrations, strict=True):
+        e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
+        for name, column in problem.point(e, calibration).by_value.items():
+            columns.setdefault(name, []).append(column)
+    order = [n for n in (*error_names(problems[0].arm.chain.joints), *_gaps(first)) if n in columns]
+    told = determined({name: np.concatenate(columns[name]) for name in order}, order)
+    errors = tuple(_errors(problems, calibrations))
+    return PoseCalibration(
+        found, robot, tuple(problems), calibrations, first.names, own, errors, before, told, scale, chi2, tuple(out),
+        iterations, seconds,
+    )  # fmt: skip
+
+
+def _gaps(calibration: Calibration) -> list[str]:
+    return [name for name in calibration.names if name.endswith(".backlash")]

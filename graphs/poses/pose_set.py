@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All poses of a session as one set of states: what each transmission does in each pose that no encoder sees.
+
+    target_measured = tracker(target(q_motor + e, values)) + noise,    e = 0 +- repeatability of each joint
+
+Eliminating e leaves the covariance J S J' of the transmissions in every pose, which is no sphere. Where a contact holds
+the target, the unknown point of the contact takes the place of the measured position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.block import POINT, Block
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
+from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.poses import Poses
+
+Array = NDArray[np.float64]
+
+
+def contact_block(contact: str) -> str:
+    """Name of the block with the point of a contact."""
+    return f"contact.{contact}"
+
+
+@dataclass(frozen=True)
+class PoseSet:
+    """Poses as the solver sees them (`SetProblem`).
+
+    Attributes:
+        robot: with a section `poses`.
+        poses: the poses.
+        tracker: base from tracker, shape (4, 4).
+        repeatability: factor on the joints' sigmas of the robot file.
+        owner: number of the session; None for a whole one.
+    """
+
+    robot: Robot
+    poses: Poses
+    tracker: Array
+    repeatability: float = 1.0
+    owner: int | None = None
+
+    kind = "poses"
+    priors = ()
+
+    @property
+    def measured(self) -> int:
+        """Number of measured coordinates."""
+        return 3 * len(self.poses)
+
+    def of_robot(self, robot: Robot) -> PoseSet:
+        """The same poses of a robot with other values."""
+        return replace(self, robot=robot)
+
+    @cached_property
+    def arm(self) -> SaggingArm:
+        """The robot's arm."""
+        return SaggingArm(self.robot)
+
+    @cached_property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts, in the order of the poses."""
+        return tuple(dict.fromkeys(self.poses.contacts))
+
+    @cached_property
+    def sigmas(self) -> Array:
+        """Of the transmissions of the chain's joints, shape (n,) [rad]."""
+        assert self.robot.poses is not None
+        return self.robot.poses.joint_sigmas[self.arm.chain.places] * self.repeatability
+
+    @property
+    def q(self) -> Array:
+        """Measured angles of the chain's joints, shape (m, n) [rad]."""
+        return self.poses.q[:, self.arm.chain.places]
+
+    def start(self, common: Calibration) -> tuple[Array, Calibration]:
+        """No transmission error; contacts where the start values have the target on average."""
+        e = np.zeros((len(self.poses), len(self.arm.chain.joints)))
+        calibration = common.only([DYNAMICS])
+        if self.contacts:
+            target = self.point(e, calibration).target
+            named = np.array(self.poses.contacts)
+            calibration = calibration.with_blocks(
+                [
+                    (Block(contact_block(c), POINT, "contact", 3, "c", i), target[named == c].mean(axis=0))
+                    for i, c in enumerate(self.contacts)
+                ]
+            )
+        return e, calibration
+
+    def values(self, calibration: Calibration) -> dict[str, float]:
+        """Values of all parameters, those that are held included."""
+        held = {name: p.value for name, p in self.robot.parameters.items() if p.fixed}
+        return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+
+    def point(self, e: Array, calibration: Calibration) -> SaggingPoint:
+        """Where the target is: in the axes of the tracker, or in those of the base where contacts hold it."""
+        values = self.values(calibration)
+        found = self.arm.at(self.q, e, values)
+        return found if self.poses.contacts else in_tracker(found, self.tracker, values)
+
+    def columns(self, point: SaggingPoint, calibration: Calibration) -> Array:
+        """Derivative of what is predicted less what is measured by all coordinates of the calibration, (m, 3, p)."""
+        J = np.zeros((len(self.poses), 3, calibration.size))
+        start = calibration.columns[DYNAMICS].start
+        for i, (name, scale) in enumerate(zip(calibration.names, calibration.value_by_coordinate, strict=True)):
+            if name in point.by_value:
+                J[:, :, start + i] = scale * point.by_value[name]
+        for contact in self.contacts:
+            here = [c == contact for c in self.poses.contacts]
+            J[here, :, calibration.columns[contact_block(contact)]] = -np.eye(3)
+        return J
+
+    def misses(self, point: SaggingPoint, calibration: Calibration) -> Array:
+        """Where the target is predicted less where it was, shape (m, 3) [m]."""
+        if self.poses.target is not None:
+            return point.target - self.poses.target
+        return point.target - np.array([calibration[contact_block(c)] for c in self.poses.contacts])
+
+    def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
+        """Normal equations at transmission errors of shape (m, n)."""
+        assert self.robot.poses is not None
+        point, sigma = self.point(x, calibration), self.robot.poses.target_sigma
+        r, J, P = (
+            self.misses(point, calibration) / sigma,
+            point.by_joint / sigma,
+            self.columns(point, calibration) / sigma,
+        )
+        system = NormalEquations.zeros(len(x), x.shape[1], calibration.size)
+        system.D[:] = np.swapaxes(J, 1, 2) @ J + np.diag(self.sigmas**-2.0)
+        system.g_x[:] = np.einsum("mkn,mk->mn", J, r) + x / self.sigmas**2
+        system.B[:] = np.swapaxes(J, 1, 2) @ P
+        rows = P.reshape(-1, calibration.size)
+        system.C[:], system.g_p[:] = rows.T @ rows, rows.T @ r.reshape(-1)
+        system.costs[:] = 0.5 * (np.sum(r**2, axis=1) + np.sum((x / self.sigmas) ** 2, axis=1))
+        system.cost = float(np.sum(system.costs))
+        self._add_distances(system, calibration)
+        return system
+
+    def _add_distances(self, system: NormalEquations, calibration: Calibration) -> None:
+        """Contacts of one place are a known distance apart."""
+        setup = self.robot.poses
+        assert setup is not None
+        if setup.contact_distance is None:
+            return
+        by_place: dict[str, list[str]] = {}
+        for contact, place in self.poses.places:
+            by_place.setdefault(place, []).append(contact)
+        for pair in (contacts for contacts in by_place.values() if len(contacts) == 2):
+            a, b = (calibration[contact_block(contact)] for contact in pair)
+            distance = float(np.linalg.norm(a - b))
+            row = np.zeros(calibration.size)
+            along = (a - b) / max(distance, 1e-12) / setup.target_sigma
+            row[calibration.columns[contact_block(pair[0])]] = along
+            row[calibration.columns[contact_block(pair[1])]] = -along
+            r = (distance - setup.contact_distance) / setup.target_sigma
+            system.C += np.outer(row, row)
+            system.g_p += row * r
+            system.cost += 0.5 * r * r

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mistakes in poses that are told before any physics: units, hands, lost targets, poses that are all alike, too few."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tracker_start import base_from_tracker
+from jointscope.robots.errors import RecordingError
+
+Array = NDArray[np.float64]
+FEWEST = 6
+FULL_TURN = 2.0 * np.pi
+LARGEST_ERROR = 0.05  # [m] that geometric errors of an arm can make
+ALIKE = 1e-3  # [rad]
+
+
+def screen_poses(problems: Sequence[PoseSet]) -> None:
+    """Looks at all sessions.
+
+    Raises:
+        RecordingError: something is plainly wrong.
+    """
+    for problem in problems:
+        _check_angles(problem)
+        if problem.poses.target is not None:
+            _check_targets(problem, problem.poses.target)
+    _check_number(problems)
+
+
+def _check_angles(problem: PoseSet) -> None:
+    poses, joints = problem.poses, problem.arm.chain.joints
+    largest = np.abs(problem.q).max(axis=0)
+    limits = problem.robot.tree.limits[problem.arm.chain.places]
+    allowed = np.where(np.isfinite(limits), np.abs(limits), FULL_TURN).max(axis=1)
+    k = int(np.argmax(largest / allowed))
+    if largest[k] > max(1.2 * allowed[k], 1.0):
+        degrees = largest[k] * np.pi / 180.0 < 1.2 * allowed[k] and largest[k] > 3.0 * FULL_TURN / 2.0
+        hint = (
+            "the angles look like degrees: set `unit: deg` of poses.joint_states"
+            if degrees
+            else "check units and names"
+        )
+        raise RecordingError(
+            f"{poses.path}: {joints[k]} is at {largest[k]:.4g} rad; {problem.robot.tree.urdf.name} allows "
+            f"{allowed[k]:.4g} rad; {hint} in {problem.robot.path.name}"
+        )
+    if len(poses) > 1 and np.ptp(problem.q, axis=0).max() < ALIKE:
+        raise RecordingError(f"{poses.path}: all {len(poses)} poses are alike; expected poses all over the workspace")
+
+
+def _check_targets(problem: PoseSet, target: Array) -> None:
+    poses, place = problem.poses, problem.robot.path.name
+    lost = [poses.names[i] for i in np.flatnonzero(np.all(target == 0.0, axis=1))]
+    if lost:
+        raise RecordingError(
+            f"{poses.path}: the target is at exactly zero in pose "
+            f"{', '.join(lost[:5])}{' and more' * (len(lost) > 5)}: "
+            "the tracker had lost it; remove these poses"
+        )
+    if len(poses) < FEWEST:
+        return
+    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
+    predicted = problem.point(e, calibration).target
+    misses = float(np.sqrt(np.mean(np.sum((predicted - target) ** 2, axis=1))))
+    if misses < LARGEST_ERROR:
+        return
+    spread = [float(np.sqrt(np.mean(np.sum((x - x.mean(axis=0)) ** 2, axis=1)))) for x in (predicted, target)]
+    ratio = spread[1] / max(spread[0], 1e-12)
+    if 500.0 < ratio < 2000.0:
+        raise RecordingError(
+            f"{poses.path}: targets are {ratio:.4g} times as far apart as the arm puts them, as in millimetres; "
+            f"expected m: "
+            f"set `unit: mm` of poses.positions in {place}"
+        )
+    _, left, mirrored = base_from_tracker(predicted, target)
+    if mirrored:
+        raise RecordingError(
+            f"{poses.path}: only a mirrored arm would fit: the axes of the tracker are left-handed, or two columns "
+            f"of the "
+            "target are exchanged; expected right-handed x, y, z"
+        )
+    joints = _exchanged(problem, target, left)
+    if joints:
+        raise RecordingError(
+            f"{poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other way "
+            f"round the arm "
+            f"fits; check the names in the table, or `names` of poses.joint_states in {place}"
+        )
+    if left < LARGEST_ERROR:
+        raise RecordingError(
+            f"{poses.path}: the tracker does not stand where {place} says: another place fits to {1e3 * left:.2g} mm "
+            f"instead of {1e3 * misses:.3g} mm; leave out `tracker` in the section poses, and its place is found"
+        )
+    raise RecordingError(
+        f"{poses.path}: the arm misses the measured targets by {1e3 * misses:.3g} mm (rms), {1e3 * left:.3g} mm "
+        f"with a tracker "
+        "anywhere; check names, signs and units of the joints, and the link that carries the target"
+    )
+
+
+def _exchanged(problem: PoseSet, target: Array, left: float) -> tuple[str, str] | None:
+    """Two joints whose angles fit much better the other way round."""
+    joints = problem.arm.chain.joints
+    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
+    values = problem.values(calibration)
+    for a, b in permutations(range(len(joints)), 2):
+        if a < b:
+            q = problem.q.copy()
+            q[:, [a, b]] = q[:, [b, a]]
+            other = base_from_tracker(problem.arm.at(q, e, values).target, target)[1]
+            if other < LARGEST_ERROR and other < 0.2 * left:
+                return joints[a], joints[b]
+    return None
+
+
+def _check_number(problems: Sequence[PoseSet]) -> None:
+    """More coordinates than values, or priors decide."""
+    poses = sum(len(problem.poses) for problem in problems)
+    contacts = sum(len(problem.contacts) for problem in problems)
+    told = 3 * poses - 3 * contacts
+    if poses < FEWEST or told < FEWEST:
+        more = max(FEWEST - poses, -(-(FEWEST - told) // 3))
+        raise RecordingError(
+            f"{problems[0].poses.path}: {poses} poses{f' at {contacts} contacts' if contacts else ''} tell "
+            f"{max(told, 0)} "
+            f"coordinates; expected at least {FEWEST} poses that tell as many: add {more} more"
+        )

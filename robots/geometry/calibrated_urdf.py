@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The URDF of an arm with its geometric errors in the origins of its joints.
+
+Everything that is fixed before a joint turns fits into its <origin>: lengths, tilts of the axis, zero of the encoder.
+Sag and backlash depend on the load; a comment says that they are not in it.
+"""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.geometry.arm_chain import across, turned
+from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, TRACKER
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.structured_tree import joint_motion_axis
+
+Array = NDArray[np.float64]
+NOTE = " geometric errors found by jointscope; sag of drives and bearings and backlash are not in this file "
+
+
+def calibrated_urdf(robot: Robot) -> str:
+    """The text of the URDF with the errors of a robot that has a section `poses`.
+
+    Raises:
+        RobotError: the file is XML that no parser without its macros reads, or a joint has no element of its own.
+    """
+    assert robot.poses is not None
+    errors = {name: parameter.value for name, parameter in robot.parameters.items()}
+    try:
+        builder = ET.TreeBuilder(insert_comments=True)
+        root = ET.fromstring(robot.tree.urdf.read_text(encoding="utf-8"), ET.XMLParser(target=builder))
+    except ET.ParseError as err:
+        raise RobotError(f"{robot.tree.urdf}: no calibrated URDF can be made of it: {err}") from err
+    joints = {element.get("name"): element for element in root.findall("joint")}
+    model = robot.tree.model
+    for j in range(1, model.njoints):
+        name = model.names[j]
+        along, x, y = across(joint_motion_axis(model, j)[3:])
+        turn = np.eye(3)
+        for part, axis in (("mis_y", y), ("mis_x", x), ("offset", along)):
+            turn = turn @ turned(axis, np.array(errors.get(f"{name}.{part}", 0.0)))
+        _move(joints.get(name), name, _lengths(errors, name), turn)
+    parent = {child.get("link"): joint for joint in joints.values() for child in joint.findall("child")}
+    for owner, link, sign in ((TOOL, robot.poses.link, 1.0), (TRACKER, robot.poses.tracker_link, -1.0)):
+        mount = parent.get(link) if link is not None else None
+        if mount is not None and mount.get("type") == "fixed":
+            _move_behind(mount, sign * _lengths(errors, owner))
+    root.insert(0, ET.Comment(NOTE))
+    ET.indent(root)
+    stream = io.BytesIO()
+    ET.ElementTree(root).write(stream, encoding="utf-8", xml_declaration=True)
+    return stream.getvalue().decode() + "\n"
+
+
+def _lengths(errors: Mapping[str, float], owner: str) -> Array:
+    return np.array([errors.get(f"{owner}.{part}", 0.0) for part in LENGTHS])
+
+
+def _move(joint: ET.Element | None, name: str, shift: Array, turn: Array) -> None:
+    """Shifts a joint in the axes of the link before it, and turns it in its own."""
+    if joint is None:
+        raise RobotError(f"the URDF has no <joint name={name!r}>")
+    xyz, R = _origin(joint)
+    _write(joint, xyz + shift, R @ turn)
+
+
+def _move_behind(joint: ET.Element, shift: Array) -> None:
+    """Shifts what a fixed joint carries in its own axes."""
+    xyz, R = _origin(joint)
+    _write(joint, xyz + R @ shift, R)
+
+
+def _origin(joint: ET.Element) -> tuple[Array, Array]:
+    origin = joint.find("origin")
+    xyz, rpy = ("0 0 0", "0 0 0") if origin is None else (origin.get("xyz", "0 0 0"), origin.get("rpy", "0 0 0"))
+    turn = np.array(pin.rpy.rpyToMatrix(*(float(x) for x in rpy.split())))
+    return np.array([float(x) for x in xyz.split()]), turn
+
+
+def _write(joint: ET.Element, xyz: Array, R: Array) -> None:
+    origin = joint.find("origin")
+    if origin is None:
+        origin = ET.SubElement(joint, "origin")
+    origin.set("xyz", " ".join(f"{x:.9g}" for x in xyz))
+    origin.set("rpy", " ".join(f"{x:.9g}" for x in pin.rpy.matrixToRpy(R)))

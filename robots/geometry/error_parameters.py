@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The names of geometric errors and of what sags, as they stand in robot files.
+
+Of every joint: where it is mounted (`lx ly lz` in the axes of the link before it), how its axis is tilted (`mis_y`,
+then `mis_x`), the zero of its encoder (`offset`); of the tracker and of the target where they are. Neubauer et al.
+(2015), Sec. 3, count them so. All are zero on a nominal arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from jointscope.robots.parts.parameter import Parameter
+
+TRACKER, TOOL = "tracker", "tool"
+LENGTHS = ("lx", "ly", "lz")
+ANGLES = ("mis_y", "mis_x", "offset")  # in the order in which they turn
+BACKLASH = "backlash"
+WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of an encoder's error, once per turn
+STIFFNESS = "stiffness"  # of a drive
+BEARING = ("bearing.stiffness_x", "bearing.stiffness_y")
+
+
+def error_names(joints: Sequence[str]) -> tuple[str, ...]:
+    """Names of all geometric errors along a chain of joints, from the tracker to the target."""
+    names = [f"{TRACKER}.{part}" for part in LENGTHS]
+    for joint in joints:
+        names += [f"{joint}.{part}" for part in (*LENGTHS, *ANGLES)]
+    return (*names, *(f"{TOOL}.{part}" for part in (*LENGTHS, *ANGLES)))
+
+
+def is_length(name: str) -> bool:
+    """Whether an error is a length [m]; the others are angles [rad]."""
+    return name.rpartition(".")[2] in LENGTHS
+
+
+def error_parameters(joints: Sequence[str], length_sigma: float, angle_sigma: float) -> dict[str, Parameter]:
+    """All errors at zero, with the sizes that they may have as standard deviations of their priors [m], [rad]."""
+    found = {}
+    for name in error_names(joints):
+        unit, sigma = ("m", length_sigma) if is_length(name) else ("rad", angle_sigma)
+        found[name] = Parameter(name, 0.0, unit, 0.0, sigma, positive=False)
+    return found
+
+
+def pose_units(joints: Sequence[str]) -> dict[str, str]:
+    """Units of all parameters that poses may tell, by name."""
+    units = {name: "m" if is_length(name) else "rad" for name in error_names(joints)}
+    for joint in joints:
+        units |= {f"{joint}.{BACKLASH}": "rad", f"{joint}.{STIFFNESS}": "N m/rad"}
+        units |= {f"{joint}.{part}": "N m/rad" for part in BEARING} | {f"{joint}.{part}": "rad" for part in WAVES}
+    return units

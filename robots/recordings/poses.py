@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses of an arm at rest: angles of its joints, and where a target was, or which contact held it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.recordings.recording import Notice
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of one session.
+
+    Attributes:
+        path: where they come from.
+        sha256: of that file.
+        names: of the poses, as the user counts them.
+        q: angles of the robot's joints, shape (m, n) [rad].
+        target: measured positions in the axes of the tracker, shape (m, 3) [m]; None where contacts hold the target.
+        contacts: name of the contact of each pose; empty where positions were measured.
+        places: name of the place of each contact, by contact; contacts of one place have a known distance.
+        torque: measured torques of the motors, shape (m, n) [N m]; None where there are none.
+        notices: what was left out or looked odd.
+    """
+
+    path: str
+    sha256: str
+    names: tuple[str, ...]
+    q: Array
+    target: Array | None
+    contacts: tuple[str, ...] = ()
+    places: tuple[tuple[str, str], ...] = ()
+    torque: Array | None = None
+    notices: tuple[Notice, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def only(self, kept: NDArray[np.bool_]) -> Poses:
+        """Some of the poses."""
+        some = [i for i, keep in enumerate(kept) if keep]
+        contacts = tuple(self.contacts[i] for i in some) if self.contacts else ()
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in some),
+            q=self.q[kept],
+            target=None if self.target is None else self.target[kept],
+            contacts=contacts,
+            places=tuple(pair for pair in self.places if pair[0] in contacts),
+            torque=None if self.torque is None else self.torque[kept],
+        )
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What belongs together when some are held out: the place of each pose, or the pose itself."""
+        places = dict(self.places)
+        return tuple(places.get(c, c) for c in self.contacts) if self.contacts else self.names

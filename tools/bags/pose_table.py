@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses from a table (CSV): one row per pose, with angles of the joints and the place of the target, or its contact.
+
+Columns: `pose`, a name for each joint (its own, its ending, or q1, q2, ...), `x`, `y`, `z` or `contact`, and where they
+are there `JOINT.torque` (or tau1, tau2, ...) and `place`, which contacts of a known distance share.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.units import si_factor
+
+Array = NDArray[np.float64]
+AXES = ("x", "y", "z")
+
+
+def poses_from_table(path: Path, robot: Robot) -> Poses:
+    """The poses of a table.
+
+    Raises:
+        RecordingError: a column is missing, or a cell is no number.
+    """
+    setup = robot.poses
+    assert setup is not None
+    text = _text(path)
+    rows = list(csv.reader(text.splitlines()))
+    if len(rows) < 2:
+        raise RecordingError(
+            f"{path}: expected a line with the names of the columns and one per pose, got {len(rows)} lines"
+        )
+    head, body = [cell.strip() for cell in rows[0]], [row for row in rows[1:] if any(cell.strip() for cell in row)]
+    wrong = next((i for i, row in enumerate(body) if len(row) != len(head)), None)
+    if wrong is not None:
+        raise RecordingError(f"{path}: line {wrong + 2} has {len(body[wrong])} cells, the first line {len(head)}")
+    joints = [_joint_column(path, head, joint, i) for i, joint in enumerate(robot.joints)]
+    if len(set(joints)) < len(joints):
+        raise RecordingError(
+            f"{path}: two joints would have the same column; name the columns {', '.join(robot.joints)}"
+        )
+    q = _numbers(path, body, head, joints) * setup.joint_states.factor
+    torques = [_torque_column(head, joint, i) for i, joint in enumerate(robot.joints)]
+    tau = None if None in torques else _numbers(path, body, head, [t for t in torques if t is not None])
+    names = (
+        tuple(row[head.index("pose")].strip() for row in body) if "pose" in head else tuple(map(str, range(len(body))))
+    )
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    if "contact" in head:
+        contacts = tuple(row[head.index("contact")].strip() for row in body)
+        places = tuple(row[head.index("place")].strip() for row in body) if "place" in head else contacts
+        pairs = tuple(dict.fromkeys(zip(contacts, places, strict=True)))
+        return Poses(str(path), digest, names, q, None, contacts, pairs, tau)
+    missing = [axis for axis in AXES if axis not in head]
+    if missing:
+        raise RecordingError(
+            f"{path}: no column {missing[0]!r}; expected x, y, z of the target, or `contact`; there are "
+            f"{', '.join(head)}"
+        )
+    target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
+    return Poses(str(path), digest, names, q, target, torque=tau)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as err:
+        raise RecordingError(f"cannot read {path}: {err.strerror or err}") from err
+    except UnicodeDecodeError as err:
+        raise RecordingError(f"{path} is no table: it is not text") from err
+
+
+def _joint_column(path: Path, head: Sequence[str], joint: str, place: int) -> int:
+    """The column of a joint: by its name, by a name that ends it, or by its number."""
+    for name in (joint, f"q{place + 1}"):
+        if name in head:
+            return head.index(name)
+    ends = [i for i, name in enumerate(head) if name and joint.endswith(name)]
+    if len(ends) == 1:
+        return ends[0]
+    raise RecordingError(f"{path}: no column of {joint}; expected {joint} or q{place + 1}, there are {', '.join(head)}")
+
+
+def _torque_column(head: Sequence[str], joint: str, place: int) -> int | None:
+    return next((head.index(n) for n in (f"{joint}.torque", f"tau{place + 1}") if n in head), None)
+
+
+def _numbers(path: Path, body: Sequence[Sequence[str]], head: Sequence[str], columns: Sequence[int]) -> Array:
+    found = np.empty((len(body), len(columns)))
+    for i, row in enumerate(body):
+        for k, column in enumerate(columns):
+            try:
+                found[i, k] = float(row[column])
+            except ValueError:
+                raise RecordingError(
+                    f"{path}: line {i + 2}, column {head[column]}: expected a number, got {row[column]!r}"
+                ) from None
+    if not np.all(np.isfinite(found)):
+        i, k = np.argwhere(~np.isfinite(found))[0]
+        raise RecordingError(
+            f"{path}: line {i + 2}, column {head[columns[k]]}: expected a finite number, got {found[i, k]}"
+        )
+    return found

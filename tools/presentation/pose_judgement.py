@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is this calibration from poses good? Checks with limits, as for recordings of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
+from jointscope.graphs.poses.tip_errors import summary
+from jointscope.robots.geometry.error_parameters import BACKLASH
+from jointscope.tools.presentation.judgement import ANSWERS, LEVELS, Check, Judgement
+from jointscope.tools.presentation.numbers import significant
+
+REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
+REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
+SURE = 3.0  # [sigma]
+BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach
+
+
+def judge_poses(result: PoseCalibration) -> Judgement:
+    """Applies all checks."""
+    checks = (_enough(result), _repeatability(result), _within(result), _backlash(result), _worth(result))
+    worst = max(LEVELS.index(check.level) for check in checks)
+    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
+    return Judgement(level, ANSWERS[level], checks)
+
+
+def _enough(result: PoseCalibration) -> Check:
+    measured = sum(problem.measured for problem in result.problems)
+    contacts = 3 * sum(len(problem.contacts) for problem in result.problems)
+    values = result.determined.rank + sum(n not in _geometric(result) for n in result.told)
+    ratio = (measured - contacts) / max(values, 1)
+    level = "good" if ratio >= REDUNDANT[0] else "warn" if ratio >= REDUNDANT[1] else "bad"
+    text = f"{measured - contacts} measured coordinates tell {values} values"
+    if level != "good":
+        more = int(np.ceil((REDUNDANT[0] * values - measured + contacts) / 3))
+        text += f"; {more} more poses would make the values trustworthy, till then priors decide a part of them"
+    return Check(level, "Enough poses", f"{text}.")
+
+
+def _geometric(result: PoseCalibration) -> set[str]:
+    return {n for n in result.names if result.robot.parameters[n].unit in ("m", "rad")}
+
+
+def _repeatability(result: PoseCalibration) -> Check:
+    name, factor = "Residuals as the arm repeats", result.repeatability
+    level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
+    assert result.robot.poses is not None
+    micro = 1e6 * float(np.median(result.robot.poses.joint_sigmas))
+    text = f"What is left is as transmissions that repeat to {significant(micro, 2)} urad would leave it"
+    if level != "good":
+        text += (
+            f", {significant(factor, 2)} times what the robot file says: joints that had not settled, another "
+            f"session of the "
+            "tracker, or an effect that is missing"
+        )
+    return Check(level, name, f"{text}.")
+
+
+def _within(result: PoseCalibration) -> Check:
+    name = "Errors of a size that geometry has"
+    far = []
+    for n in result.told:
+        p = result.robot.parameters[n]
+        if n in _geometric(result) and abs(p.value - p.prior) > BEYOND * p.prior_sigma:
+            far.append(f"{n} ({significant(1e3 * p.value, 3)} {'mm' if p.unit == 'm' else 'mrad'})")
+    if not far:
+        return Check("good", name, "All geometric errors are of the size that the robot file expects.")
+    return Check(
+        "warn",
+        name,
+        f"{', '.join(far[:3])} {'is' if len(far) == 1 else 'are'} beyond {BEYOND:g} times what the robot file expects "
+        "(`length_sigma`, `angle_sigma`): a wrong URDF, or an effect that is missing.",
+    )
+
+
+def _backlash(result: PoseCalibration) -> Check:
+    gaps = [result.robot.parameters[n] for n in result.told if n.endswith(f".{BACKLASH}")]
+    sure = [p for p in gaps if p.sigma and abs(p.value) > SURE * p.sigma]
+    if not sure:
+        return Check("info", "Backlash", "No backlash is seen." if gaps else "The model has no backlash.")
+    said = ", ".join(f"{p.name} {1e6 * p.value:.0f} +- {1e6 * (p.sigma or 0.0):.0f} urad" for p in sure)
+    return Check(
+        "info", "Backlash", f"{said}: gaps of half that width (stiffness is told apart from it in this estimate)."
+    )
+
+
+def _worth(result: PoseCalibration) -> Check:
+    before, after = (summary(errors).to_json()["rms_mm"] for errors in (result.before, result.errors))
+    text = (
+        f"The target is {significant(before / max(after, 1e-12), 2)} times nearer than before (rms); judge it by poses "
+    )
+    return Check("info", "Better than before", text + "that were not fitted: jointscope compare ROBOT --poses OTHERS.")

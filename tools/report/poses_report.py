@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a calibration from poses: verdict, errors of the target before and after, where they lie, values."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
+from jointscope.graphs.poses.determined import combination_text
+from jointscope.graphs.poses.tip_errors import parts_of, summary
+from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.pose_judgement import judge_poses
+from jointscope.tools.report.page.page import Key, Section, figure, page, table
+from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
+
+Array = NDArray[np.float64]
+BINS = 30
+MM, MICRO = 1e3, 1e6
+
+
+def poses_report(result: PoseCalibration) -> str:
+    """The whole page as text, without references to anything outside of itself."""
+    paths = ", ".join(problem.poses.path for problem in result.problems)
+    sections = [
+        _verdict(result),
+        _waterfall(result),
+        _histogram(result),
+        _against(result),
+        _values(result),
+        _silent(result),
+    ]
+    return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
+
+
+def _verdict(result: PoseCalibration) -> Section:
+    judgement = judge_poses(result)
+    items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
+    out = "".join(
+        f"<li>pose {escape(name)} of {escape(path)} was left out: {size:.0f} sigma away</li>"
+        for path, name, size in result.left_out
+    )
+    return Section("verdict", "Is it good?", f"<ul>{items}{out}</ul>", judgement.headline)
+
+
+def _waterfall(result: PoseCalibration) -> Section:
+    """What each part of the model is worth on the poses that were used."""
+    each = [parts_of(replace(problem, robot=result.robot)) for problem in result.problems]
+    rows = []
+    for part in reversed(each[0]):
+        mm = summary([found[part] for found in each]).to_json()
+        rows.append([escape(part), *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm", "rms_mm"))])
+    head = ["model", "mean [mm]", "90 % [mm]", "largest [mm]", "rms [mm]"]
+    lead = "Distance of the predicted target from the measured one, with and without each part of the model."
+    return Section("parts", "What each part is worth", table(head, rows, range(1, 5)), lead)
+
+
+def _histogram(result: PoseCalibration) -> Section:
+    after, before = (MM * summary(errors).distances for errors in (result.errors, result.before))
+    pictures = []
+    for title, values, colour in (("before", before, "k0"), ("after", after, "k1")):
+        counts, edges = np.histogram(values, BINS, (0.0, float(values.max()) * 1.02 + 1e-12))
+        axes = Axes(f"{title}: number of poses", x_label="distance [mm]", width=510)
+        pictures.append(figure([plot(axes, [Bars(title, edges, counts.astype(float), colour)])]))
+    return Section(
+        "histogram", "How far off", "".join(pictures), "Every pose is one error; the last bar is the worst one."
+    )
+
+
+def _against(result: PoseCalibration) -> Section:
+    """What is left against the order of the poses and each joint: a trend is something that the model lacks."""
+    panels = []
+    for problem, errors in zip(result.problems, result.errors, strict=True):
+        number = np.arange(len(problem.poses), dtype=float)
+        panels.append(_dots("pose, in the order of the session", number, errors.vectors))
+        for j, joint in enumerate(problem.arm.chain.joints):
+            panels.append(_dots(f"{joint} [rad]", problem.q[:, j], errors.vectors))
+    keys = [Key("x", "k0"), Key("y", "k1"), Key("z", "k2")]
+    lead = "A cloud without a shape is wanted. Drift over the session is the tracker's; waves over a joint are its own."
+    return Section("left", "What is left", figure(panels, keys), lead)
+
+
+def _dots(label: str, x: Array, vectors: Array) -> str:
+    order = np.argsort(x)
+    axes = Axes("left over [um]", x_label=label, height=170, zoomable=False)
+    marks = [Curve("xyz"[k], x[order], MICRO * vectors[order, k], f"k{k}", "dots") for k in range(3)]
+    return plot(axes, marks)
+
+
+def _values(result: PoseCalibration) -> Section:
+    rows = []
+    for name in result.names:
+        p = result.robot.parameters[name]
+        factor, unit = (1e3, "mm" if p.unit == "m" else "mrad") if p.unit in ("m", "rad") else (1.0, p.unit)
+        value, sigma = with_sigma(factor * p.value, factor * (p.sigma or 0.0))
+        told = "" if name in result.told else "not told by these poses"
+        rows.append([escape(name), value, sigma, escape(unit), told])
+    lead = (
+        "Standard deviations include what transmissions do unseen. Geometric errors that look alike share their values."
+    )
+    return Section("values", "Values", table(["parameter", "value", "± sigma", "unit", ""], rows, [1, 2]), lead)
+
+
+def _silent(result: PoseCalibration) -> Section:
+    items = "".join(f"<li>{escape(combination_text(weights))}</li>" for weights in result.determined.combinations)
+    lead = f"{result.determined.rank} combinations of geometric errors are determined; these move no target:"
+    return Section("silent", "What poses cannot tell", f"<ul>{items}</ul>", lead)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A calibration from poses, and a comparison with poses, on one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
+from jointscope.graphs.poses.determined import combination_text
+from jointscope.graphs.poses.tip_errors import TipErrors, summary
+from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.pose_judgement import judge_poses
+from jointscope.tools.terminal.text_table import text_table
+
+SHOWN_OUT, SHOWN_COMBINATIONS = 5, 18
+
+
+def pose_calibration_text(result: PoseCalibration) -> str:
+    """The summary of a calibration."""
+    parts = [_headline(result), _verdict(result), _tips(result), _parameters(result), _combinations(result)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def pose_errors_text(by_label: Mapping[str, Mapping[str, TipErrors]], count: int) -> str:
+    """Errors of some models and of each without its parts.
+
+    Args:
+        by_label: by name of the model, then by what is left in it.
+        count: number of poses.
+    """
+    rows = []
+    for label, parts in by_label.items():
+        for part, errors in parts.items():
+            mm = errors.to_json()
+            rows.append([label, part, *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm", "rms_mm"))])
+    head = ["model", "of it", "mean [mm]", "90 % [mm]", "largest [mm]", "rms [mm]"]
+    return f"{count} poses, distance of the predicted target from the measured one\n{text_table(head, rows, '<<>>>>')}"
+
+
+def _headline(result: PoseCalibration) -> str:
+    paths = ", ".join(problem.poses.path for problem in result.problems)
+    return (
+        f"{result.robot.name} from {paths}: {result.count} poses, calibrated in {result.wall_seconds:.1f} s, "
+        f"{result.iterations} iterations"
+    )
+
+
+def _verdict(result: PoseCalibration) -> str:
+    judgement = judge_poses(result)
+    lines = [judgement.headline]
+    lines += [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
+    lines += [f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")]
+    lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.poses.notices]
+    if result.left_out:
+        said = ", ".join(f"{name} of {path} ({size:.0f} sigma)" for path, name, size in result.left_out[:SHOWN_OUT])
+        more = f" and {len(result.left_out) - SHOWN_OUT} more" if len(result.left_out) > SHOWN_OUT else ""
+        lines.append(f"  - left out as outliers: pose {said}{more}")
+    return "\n".join(lines)
+
+
+def _tips(result: PoseCalibration) -> str:
+    rows = []
+    for label, errors in (("before", summary(result.before)), ("after", summary(result.errors))):
+        mm = errors.to_json()
+        rows.append([label, *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm"))])
+    return text_table(["target", "mean [mm]", "90 % [mm]", "largest [mm]"], rows, "<>>>")
+
+
+def _parameters(result: PoseCalibration) -> str:
+    rows, silent = [], []
+    for name in result.names:
+        p = result.robot.parameters[name]
+        if name not in result.told:
+            silent.append(name)
+            continue
+        value, sigma = with_sigma(*_shown(p.value, p.sigma or 0.0, p.unit))
+        rows.append([name, value, sigma, _unit(p.unit)])
+    table = text_table(["parameter", "value", "± sigma", "unit"], rows, "<>><")
+    return table + (f"\n\nThe poses say nothing about {', '.join(silent)}." if silent else "")
+
+
+def _shown(value: float, sigma: float, unit: str) -> tuple[float, float]:
+    factor = 1e3 if unit in ("m", "rad") else 1.0
+    return factor * value, factor * sigma
+
+
+def _unit(unit: str) -> str:
+    return {"m": "mm", "rad": "mrad"}.get(unit, unit)
+
+
+def _combinations(result: PoseCalibration) -> str:
+    found: Sequence[dict[str, float]] = result.determined.combinations
+    if not found:
+        return "These poses tell all geometric errors apart."
+    lines = [f"  - {combination_text(weights)}" for weights in found[:SHOWN_COMBINATIONS]]
+    if len(found) > SHOWN_COMBINATIONS:
+        lines.append(f"  - and {len(found) - SHOWN_COMBINATIONS} more")
+    head = (
+        f"{result.determined.rank} of {result.determined.rank + len(found)} geometric errors are independent; these "
+        "combinations move no target, so priors share them out:"
+    )
+    return "\n".join([head, *lines])
