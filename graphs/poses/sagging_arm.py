@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.files.pose_section import no_poses
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, LENGTHS, STIFFNESS, TRACKER, WAVES
 from jointscope.robots.model.robot import Robot
@@ -57,10 +58,7 @@ class SaggingArm:
 
     def __init__(self, robot: Robot):
         if robot.poses is None:
-            raise RobotError(
-                f"{robot.path.name} has no section `poses`, which says what is measured of a pose: "
-                "see docs/poses.md, or `jointscope robots tx90l` for an example"
-            )
+            raise RobotError(no_poses(robot))
         self.chain = ArmChain(robot.tree, robot.poses.link, robot.poses.at)
 
     def at(self, q: Array, e: Array, values: Mapping[str, float]) -> SaggingPoint:

@@ -34,7 +34,9 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
 
     Raises:
         EffectError: unknown effect or owner, the effect is there already, or the model has it by itself.
+        RobotError: the robot file describes poses alone.
     """
+    robot.need_motion()
     effect, owner = parse_effect(label, robot)
     here = EffectAt(effect, owner)
     if robot.has_effect(effect.id, owner):

@@ -27,6 +27,14 @@ LENGTH_SIGMA, ANGLE_SIGMA = 2e-3, 5e-3  # [m], [rad] of an arm as it leaves the 
 SIZES = ("sigma", "length_sigma", "angle_sigma", "tool_sigma")
 
 
+def no_poses(robot: Robot) -> str:
+    """What to say of a robot file that does not say what is measured of a pose."""
+    return (
+        f"{robot.path.name} has no section `poses`, which says what is measured of a pose: see docs/poses.md, or "
+        "`jointscope robots tx90l` for an example"
+    )
+
+
 def pose_setup(section: Section, joints: tuple[str, ...]) -> PoseSetup:
     """Reads the section.
 

@@ -111,15 +111,20 @@ class Robot:
         return self.choices.link_dynamics == "free"
 
     def need_link_dynamics(self) -> None:
-        """Complains about a robot without equations of motion.
-
-        Raises:
-            RobotError: its links are free.
-        """
+        """Raises RobotError for a robot without equations of motion: its links are free, or it has no drives."""
+        self.need_motion()
         if self.free_links:
             raise RobotError(
                 f"{self.name} has link_dynamics: free, so there are no equations of motion to predict with; "
                 "`calibrate` and `discover` compare motors, links and gyros without them"
+            )
+
+    def need_motion(self) -> None:
+        """Raises RobotError for a robot file that describes poses alone, without drives and sensors."""
+        if not self.motion:
+            raise RobotError(
+                f"{self.path.name} has no `command` and no `sensors`: it describes poses; give them with --poses, or "
+                "add both sections for recordings of motion"
             )
 
     @property

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.recording import Notice
@@ -42,11 +42,7 @@ def needed_streams(robot: Robot) -> list[StreamSource]:
     Raises:
         RobotError: the robot file describes poses alone.
     """
-    if not robot.motion:
-        raise RobotError(
-            f"{robot.path.name} has no `command` and no `sensors`: it describes poses; give them with --poses, or add "
-            "both sections for recordings of motion"
-        )
+    robot.need_motion()
     command = StreamSource("command", robot.command, tuple(f"{joint}.command" for joint in robot.joints))
     return [command, *(StreamSource(s.name, s.source, s.channels) for s in robot.sensors.values())]
 

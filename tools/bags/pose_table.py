@@ -109,3 +109,15 @@ def _numbers(path: Path, body: Sequence[Sequence[str]], head: Sequence[str], col
             f"{path}: line {i + 2}, column {head[columns[k]]}: expected a finite number, got {found[i, k]}"
         )
     return found
+
+
+def pose_table(poses: Poses, robot: Robot) -> str:
+    """Poses with measured targets as the text of a table [rad, N m, m]."""
+    assert poses.target is not None
+    torque = [f"{joint}.torque" for joint in robot.joints] if poses.torque is not None else []
+    lines = [",".join(["pose", *robot.joints, *torque, *AXES])]
+    for i, name in enumerate(poses.names):
+        tau = [] if poses.torque is None else poses.torque[i].tolist()
+        cells = [f"{x:.9f}" for x in poses.q[i]] + [f"{x:.4f}" for x in tau] + [f"{x:.7f}" for x in poses.target[i]]
+        lines.append(",".join([name, *cells]))
+    return "\n".join(lines) + "\n"

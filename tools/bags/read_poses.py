@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jointscope.robots.errors import RecordingError
+from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.files.pose_section import no_poses
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.bags.pose_table import poses_from_table
@@ -16,8 +17,11 @@ def read_poses(path: Path, robot: Robot) -> Poses:
     """Reads a table (.csv), a bag, or a folder with one of them.
 
     Raises:
+        RobotError: the robot file does not say what is measured of a pose.
         RecordingError: it cannot be read, or holds no poses.
     """
+    if robot.poses is None:
+        raise RobotError(no_poses(robot))
     if not path.exists():
         raise RecordingError(f"there is no {path}; expected a table of poses (.csv) or a bag")
     if path.suffix.lower() in (".csv", ".txt"):

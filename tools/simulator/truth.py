@@ -30,6 +30,7 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
         RobotError: an override names no parameter.
         SimulationError: a value is impossible.
     """
+    robot.need_motion()
     robot = without_effects(robot)
     published = {p.name: p.published for p in robot.parameters.values() if p.published is not None}
     truth = robot.with_values({**published, **overrides})

@@ -67,10 +67,15 @@ def conditions_of(args: argparse.Namespace) -> Conditions:
         not args.white_encoder,
     )
     disturbance = Disturbance.parse(args.disturbance or "")
-    return Conditions(_assignments(args.set), args.effect, args.friction, disturbance, sampling)
+    return Conditions(assignments(args.set), args.effect, args.friction, disturbance, sampling)
 
 
-def _assignments(texts: Sequence[str]) -> dict[str, float]:
+def assignments(texts: Sequence[str]) -> dict[str, float]:
+    """Values by name from texts NAME=VALUE.
+
+    Raises:
+        SimulationError: another form.
+    """
     values = {}
     for text in texts:
         name, _, number = text.partition("=")

@@ -46,6 +46,7 @@ def add_models_and_bag(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="names of ready robots, or robot files; last a .bag, .mcap, .db3 or a ROS 2 bag folder",
     )
+    parser.set_defaults(parser=parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -58,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         *args.robots, bag = args.robots
         args.bag = Path(bag)
         if not args.robots:
-            raise RobotError(f"expected ROBOT... BAG, got {bag} alone; to compare on poses: --poses TABLE-or-BAG")
+            args.parser.error(f"expected ROBOT... BAG, got {bag} alone; to compare on poses: --poses TABLE-or-BAG")
     names = labels(args.robots)
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
     check_outputs(files.all, inputs=[*([] if poses else [args.bag]), *poses, *robot_files, *args.effects])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.errors import SimulationError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.write_bag import write_bag
@@ -17,11 +18,12 @@ from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.writing.whole_file import check_outputs, write_json
+from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 EXAMPLE = """example:
   jointscope simulate doggy -o train.mcap --seed 3 --friction smooth --effect bearing_flexibility@joint1
   jointscope simulate doggy -o test.mcap --motion moves --seed 3 --friction smooth --effect bearing_flexibility@joint1
+  jointscope simulate tx90l --kind poses -o poses.csv --seed 3 --effect encoder_eccentricity@joint4
 
 The same seed is the same robot; the truth is written beside the bag as train.truth.json."""
 
@@ -37,7 +39,16 @@ def add_parser(subparsers: Any) -> None:
     )
     defaults = ", ".join(f"{seconds:g} for {motion}" for motion, seconds in DEFAULT_SECONDS.items())
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
-    parser.add_argument("-o", "--output", metavar="BAG", type=Path, required=True, help=".bag, .mcap, .db3 or a folder")
+    parser.add_argument(
+        "-o", "--output", metavar="BAG", type=Path, required=True, help=".bag, .mcap, .db3 or a folder; .csv of poses"
+    )
+    parser.add_argument(
+        "--kind",
+        choices=("motion", "poses"),
+        help="motion: a bag; poses: a table (.csv) of an arm at rest with a tracker; default: what the robot has",
+    )
+    parser.add_argument("--count", type=int, default=40, metavar="N", help="number of poses; default 40")
+    parser.add_argument("--session", default="poses", metavar="NAME", help="another name: other poses of the same arm")
     parser.add_argument(
         "--motion",
         choices=list(DEFAULT_SECONDS),
@@ -58,6 +69,8 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.output if args.output.suffix else None, truth_file, args.json], inputs=args.effects)
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
+    if (args.kind or ("motion" if robot.motion else "poses")) == "poses":
+        return _poses(robot, args, truth_file)
     with progress_bar() as progress:
         simulation = _simulate(robot, args, lambda share: progress("simulating", share))
     write_bag(args.output, simulation.recording, robot)
@@ -66,6 +79,31 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, summary)
     print(_as_text(summary))
+    return 0
+
+
+def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
+    """Simulates poses, and writes the table and the truth.
+
+    Raises:
+        SimulationError: an option of recordings of motion, or another file than a table.
+    """
+    from jointscope.tools.bags.pose_table import pose_table
+    from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
+    from jointscope.tools.verb_parts.simulation_options import assignments
+
+    if args.output.suffix.lower() != ".csv":
+        raise SimulationError(f"{args.output}: poses are written as a table; expected a name that ends with .csv")
+    conditions = PoseConditions(assignments(args.set), args.effect)
+    poses, truth = simulate_poses(robot, args.count, args.seed, conditions, args.session)
+    with whole_file(args.output) as path:
+        path.write_text(pose_table(poses, robot), encoding="utf-8")
+    write_json(truth_file, truth)
+    if args.json is not None:
+        write_json(args.json, {"table": str(args.output), "truth_file": str(truth_file), "truth": truth})
+    effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
+    print(f"{args.output}: {len(poses)} poses of {robot.name}, seed {args.seed}")
+    print(f"  effects: {effects}\n  truth:   {truth_file}")
     return 0
 
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`calibrate` and `compare` with --poses: what is read, written and said."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from measured_poses import PANDA, TX90L
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags.read_poses import read_poses
+from jointscope.tools.command_line import main
+
+needs_poses = pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")
+
+
+@pytest.fixture(scope="module")
+def tx90l():
+    return load_robot("tx90l")
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("poses")
+    names = {"-o": "arm.yaml", "--urdf": "arm.urdf", "--report": "arm.html", "--json": "arm.json"}
+    options = [text for option, name in names.items() for text in (option, str(folder / name))]
+    assert main(["calibrate", "tx90l", "--poses", str(TX90L / "poses_calibration"), *options]) == 0
+    return folder
+
+
+@needs_poses
+def test_a_bag_and_the_table_made_of_it_hold_the_same_poses(tx90l):
+    bag = read_poses(TX90L / "poses_calibration", tx90l)
+    table = read_poses(TX90L / "poses_calibration" / "poses.csv", tx90l)
+    assert len(bag) == len(table) == 40
+    np.testing.assert_allclose(bag.q, table.q, atol=1e-6)
+    np.testing.assert_allclose(bag.target, table.target, atol=1e-5)
+    np.testing.assert_allclose(bag.torque, table.torque, atol=0.05)
+
+
+@needs_poses
+def test_robot_file_urdf_report_and_json_are_written(calibrated):
+    robot = load_robot(calibrated / "arm.yaml")
+    assert robot.parameters["joint3.lz"].sigma < 1e-5
+    assert "How far off" in (calibrated / "arm.html").read_text()
+    assert load_robot("tx90l").tree.n == robot.tree.n and "<robot" in (calibrated / "arm.urdf").read_text()
+    content = json.loads((calibrated / "arm.json").read_text())
+    assert content["rank"] == 29 and len(content["undetermined"]) == 18
+    assert content["parameters"]["joint3.stiffness"]["unit"] == "N m/rad"
+    assert content["samples"] == 40 and content["wall_seconds"] > 0.0
+
+
+@needs_poses
+def test_compare_says_millimetres_with_and_without_each_part(calibrated, tmp_path, capsys):
+    arguments = ["compare", "tx90l", str(calibrated / "arm.yaml"), "--poses", str(TX90L / "poses_verification")]
+    assert main([*arguments, "--json", str(tmp_path / "v.json")]) == 0
+    assert "150 poses, distance of the predicted target" in capsys.readouterr().out
+    models = json.loads((tmp_path / "v.json").read_text())["models"]
+    assert models["arm"]["poses"]["p90_mm"] <= 0.055 and models["arm"]["poses"]["max_mm"] <= 0.11
+    assert models["tx90l"]["poses"]["p90_mm"] > 3.0
+    parts = models["arm"]["poses"]["parts"]
+    assert parts["without sag"]["p90_mm"] > 0.5 < parts["without geometric errors"]["p90_mm"]
+
+
+@needs_poses
+def test_a_calibrated_file_is_the_start_of_the_next_calibration(calibrated, tmp_path, capsys):
+    again = ["calibrate", str(calibrated / "arm.yaml"), "--poses", str(TX90L / "poses_verification")]
+    assert main([*again, "-o", str(tmp_path / "again.yaml")]) == 0
+    assert "Yes, this calibration is good." in capsys.readouterr().out
+    assert load_robot(tmp_path / "again.yaml").parameters["joint3.lz"].value == pytest.approx(0.000234, abs=1.5e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["calibrate", "tx90l", "-o", "a.yaml"], "nothing to calibrate from; expected BAG"),
+        (
+            ["calibrate", "tx90l", "x.mcap", "--poses", "p.csv", "-o", "a.yaml"],
+            "in one estimate are not on the",
+        ),
+        (
+            ["calibrate", "tx90l", "--poses", "p.csv", "--incremental", "-o", "a.yaml"],
+            "--incremental is for",
+        ),
+        (
+            ["calibrate", "tx90l", "--poses", "none.csv", "-o", "a.yaml"],
+            "there is no none.csv; expected a table",
+        ),
+        (["calibrate", "doggy", "--poses", "p.csv", "-o", "a.yaml"], "doggy.yaml has no section `poses`"),
+        (["info", "x.mcap", "--robot", "tx90l"], "it describes poses; give them with --poses"),
+        (["calibrate", "doggy", "x.mcap", "--urdf", "a.urdf", "-o", "a.yaml"], "--urdf writes the geometry that poses"),
+    ],
+)
+def test_what_does_not_go_together_is_one_line(tmp_path, monkeypatch, capsys, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.csv").write_text("pose,q1\n0,1\n")
+    if "info" in arguments:
+        from jointscope.tools.bags import write_bag
+        from jointscope.tools.simulator import simulate
+
+        doggy = load_robot("doggy")
+        write_bag("x.mcap", simulate(doggy, "moves", 1.0, 1).recording, doggy)
+    assert main(arguments) == 1
+    said = capsys.readouterr().err
+    assert told in said and said.count("\n") == 1
+    assert not (tmp_path / "a.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            "pose,q1,q2,q3,q4,q5,q6,x,y\n0,1,1,1,1,1,1,2,2\n",
+            "no column 'z'; expected x, y, z of the target",
+        ),
+        ("pose,q1,q2,q3,q4,q5,x,y,z\n0,1,1,1,1,1,2,2,2\n", "no column of joint6; expected joint6 or q6"),
+        ("pose,q1,q2,q3,q4,q5,q6,x,y,z\n0,1,1,a,1,1,1,2,2,2\n", "line 2, column q3: expected a number, got 'a'"),
+        ("pose,q1,q2,q3,q4,q5,q6,x,y,z\n0,1,1,1,1\n", "line 2 has 5 cells, the first line 10"),
+        ("pose,q1,q2,q3,q4,q5,q6,x,y,z\n0,1,1,1,1,1,nan,2,2,2\n", "column q6: expected a finite number"),
+        ("", "expected a line with the names of the columns"),
+    ],
+)
+def test_a_table_that_cannot_be_read_says_where(tx90l, tmp_path, text, told):
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    with pytest.raises(RecordingError, match=told.replace("(", r"\(")):
+        read_poses(path, tx90l)
+
+
+@pytest.mark.skipif(not PANDA.is_dir(), reason="shared/data/real/panda_sockets is not beside the project")
+def test_contacts_and_places_of_a_table(tx90l):
+    path = PANDA / "panda_1.csv"
+    poses = read_poses(path, tx90l)  # its first six joints have the same names
+    assert len(poses) == 182 and len(set(poses.contacts)) == 6
+    assert set(poses.groups) == {"back-high", "front", "right"} and poses.target is None

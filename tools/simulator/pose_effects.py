@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What may be wrong with an arm at rest beside its geometry, in the simulator's own form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from jointscope.robots.errors import EffectError
+
+DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    "backlash": {"half_gap": 2.0e-4},  # [rad]
+    "encoder_eccentricity": {"cos": 1.0e-4, "sin": 6.0e-5},  # [rad] once per turn
+    "gear_ripple": {"amplitude": 8.0e-5, "order": 100.0, "phase": 0.3},  # [rad], [1/turn], [rad]
+    "spring_cubic": {"stiffness": 2.0e10},  # [N m/rad^3] beside the linear spring
+    "joint_elasticity": {"compliance": 4.0e-5},  # [rad/(N m)] of a joint without a stiffness in the robot file
+    "bearing_flexibility": {"compliance_x": 5.0e-6, "compliance_y": 5.0e-6},  # [rad/(N m)] beside the robot file's
+    "payload": {"mass": 2.0},  # [kg] at the target
+    "tracker_drift": {"x": 1.0e-4, "y": 0.0, "z": 5.0e-5},  # [m] from the first pose to the last
+}
+OF_ROBOT = ("payload", "tracker_drift")
+
+
+@dataclass(frozen=True)
+class PoseEffect:
+    """One effect: id, owner (a joint, or "robot") and its sizes."""
+
+    id: str
+    owner: str
+    parameters: Mapping[str, float]
+
+
+def pose_effects(texts: Iterable[str], joints: Sequence[str]) -> list[PoseEffect]:
+    """Effects from texts ID@OWNER[:param=value,...].
+
+    Raises:
+        EffectError: unknown id, owner or parameter, or a value that is no number.
+    """
+    found = []
+    for text in texts:
+        head, _, tail = text.partition(":")
+        effect, _, owner = head.partition("@")
+        if effect not in DEFAULTS:
+            raise EffectError(f"effect {effect!r} cannot be simulated in poses; known are {', '.join(DEFAULTS)}")
+        owners = ("robot",) if effect in OF_ROBOT else tuple(joints)
+        if owner not in owners:
+            raise EffectError(f"effect {effect} cannot act on {owner!r}; it acts on {', '.join(owners)}")
+        found.append(PoseEffect(effect, owner, {**DEFAULTS[effect], **_sizes(text, effect, tail)}))
+    return found
+
+
+def _sizes(text: str, effect: str, tail: str) -> dict[str, float]:
+    sizes = {}
+    for item in filter(None, tail.split(",")):
+        name, _, number = item.partition("=")
+        if name not in DEFAULTS[effect]:
+            raise EffectError(f"effect {effect} has no parameter {name!r}; it has {', '.join(DEFAULTS[effect])}")
+        try:
+            sizes[name] = float(number)
+        except ValueError:
+            raise EffectError(f"effect {text!r}: expected param=number, got {item!r}") from None
+    return sizes
