@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint style types bench bench-arms bench-discovery bench-estimator bench-real fuzz clean
+.PHONY: demo test lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -51,6 +51,9 @@ bench-discovery: $(VENV)/bench $(VENV)/code
 # Needs the recordings in ../shared/data/real; says so and ends where they are missing.
 bench-real: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench_real.py
+
+bench-tx90l: $(VENV)/sim $(VENV)/code
+	$(BIN)/python benchmarks/bench_tx90l.py
 
 # Below an hour; fails where something is found.
 fuzz: $(VENV)/sim $(VENV)/code

@@ -34,7 +34,7 @@ PASSES = 12  # of repeatability and outliers
 AGREES = 0.02  # relative change of the repeatability that asks for no further pass
 OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
 MOST_OUT = 0.2  # share of the poses that may be left out
-MOST_ITERATIONS = 60
+MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is missing pulls along go a long way
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
 
@@ -119,7 +119,7 @@ def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress 
                 f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
-        distances = [_squared_distances(p, c) for p, c in zip(problems, solution.estimate.calibrations, strict=True)]
+        distances = [squared_distances(p, c) for p, c in zip(problems, solution.estimate.calibrations, strict=True)]
         worst = max(float(d.max()) for d in distances)
         if i and worst > OUTLYING:
             problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
@@ -187,7 +187,7 @@ def _errors(problems: Sequence[PoseSet], calibrations: Sequence[Calibration]) ->
     return found
 
 
-def _squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
+def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
     """Squared distance of each pose in sigmas, transmissions and noise of the target together, shape (m,)."""
     assert problem.robot.poses is not None
     e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))

@@ -9,6 +9,7 @@ the target, the unknown point of the contact takes the place of the measured pos
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -103,9 +104,12 @@ class PoseSet:
 
     def point(self, e: Array, calibration: Calibration) -> SaggingPoint:
         """Where the target is: in the axes of the tracker, or in those of the base where contacts hold it."""
-        values = self.values(calibration)
+        return self.seen(e, self.values(calibration))
+
+    def seen(self, e: Array, values: Mapping[str, float]) -> SaggingPoint:
+        """The same for values of all parameters by name."""
         found = self.arm.at(self.q, e, values)
-        return found if self.poses.contacts else in_tracker(found, self.tracker, values)
+        return found if self.poses.contacts else in_tracker(found, self.tracker, values, self.poses.shares)
 
     def columns(self, point: SaggingPoint, calibration: Calibration) -> Array:
         """Derivative of what is predicted less what is measured by all coordinates of the calibration, (m, 3, p)."""

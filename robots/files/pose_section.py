@@ -13,6 +13,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sensor_sections import topic
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters, pose_units
+from jointscope.robots.geometry.pose_effects import effect_units
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
@@ -99,7 +100,7 @@ def check_pose_parameters(robot: Robot, parameters: Mapping[str, Parameter]) -> 
         RobotError: unknown, or in another unit.
     """
     assert robot.poses is not None
-    units, place = pose_units(robot.joints), robot.path.name
+    units, place = pose_units(robot.joints) | effect_units(robot.joints), robot.path.name
     for name, parameter in parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")

@@ -7,6 +7,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.needed_spring import needed_spring
 from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.geometry.error_parameters import pose_units
+from jointscope.robots.geometry.pose_effects import effect_units
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
@@ -191,7 +192,8 @@ def _check_parameters(robot: Robot, place: str) -> None:
     }
     units |= of_effects | element_units(robot)
     units |= {name: "m" for sensor in robot.accelerometers for name in sensor.lever}
-    units |= {} if robot.poses is None else {n: u for n, u in pose_units(robot.joints).items() if n not in units}
+    of_poses = {} if robot.poses is None else effect_units(robot.joints) | pose_units(robot.joints)
+    units = of_poses | units
     for name, parameter in robot.parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")

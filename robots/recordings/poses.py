@@ -27,6 +27,7 @@ class Poses:
         places: name of the place of each contact, by contact; contacts of one place have a known distance.
         torque: measured torques of the motors, shape (m, n) [N m]; None where there are none.
         notices: what was left out or looked odd.
+        share: of the session that had passed at each pose, shape (m,); None for poses at even distances.
     """
 
     path: str
@@ -38,6 +39,7 @@ class Poses:
     places: tuple[tuple[str, str], ...] = ()
     torque: Array | None = None
     notices: tuple[Notice, ...] = ()
+    share: Array | None = None
 
     def __len__(self) -> int:
         return len(self.q)
@@ -54,7 +56,13 @@ class Poses:
             contacts=contacts,
             places=tuple(pair for pair in self.places if pair[0] in contacts),
             torque=None if self.torque is None else self.torque[kept],
+            share=self.shares[kept],
         )
+
+    @property
+    def shares(self) -> Array:
+        """Share of the session that had passed at each pose, shape (m,), from 0 to 1."""
+        return np.linspace(0.0, 1.0, len(self)) if self.share is None else self.share
 
     @property
     def groups(self) -> tuple[str, ...]:

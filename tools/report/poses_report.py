@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
+from jointscope.graphs.poses.discover_poses import PoseDiscovery
 from jointscope.graphs.poses.tip_errors import parts_of, summary
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.presentation.pose_judgement import judge_poses
@@ -22,18 +23,33 @@ BINS = 30
 MM, MICRO = 1e3, 1e6
 
 
-def poses_report(result: PoseCalibration) -> str:
-    """The whole page as text, without references to anything outside of itself."""
+def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None) -> str:
+    """The whole page as text, without references to anything outside of itself.
+
+    Args:
+        result: the calibration.
+        found: the discovery whose last step it is.
+    """
     paths = ", ".join(problem.poses.path for problem in result.problems)
-    sections = [
-        _verdict(result),
-        _waterfall(result),
-        _histogram(result),
-        _against(result),
-        _values(result),
-        _silent(result),
-    ]
+    makers = (_verdict, _waterfall, _histogram, _against, _values, _silent)
+    sections = [make(result) for make in makers]
+    if found is not None:
+        sections.insert(1, _steps(found))
     return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
+
+
+def _steps(found: PoseDiscovery) -> Section:
+    """The waterfall: what each effect that was added is worth."""
+    rows = []
+    for k, step in enumerate(found.steps):
+        mm = summary(step.result.errors).to_json()
+        cells = [significant(mm["p90_mm"], 3), significant(mm["max_mm"], 3)]
+        other = step.heldout.to_json() if step.heldout is not None else None
+        cells += ["-", "-"] if other is None else [significant(other[key], 3) for key in ("p90_mm", "max_mm")]
+        rows.append([str(k), escape(step.added.hypothesis.label if step.added else "base model"), *cells])
+    head = ["step", "added", "90 % [mm]", "largest [mm]", "held out: 90 % [mm]", "largest [mm]"]
+    lead = f"It ended because {found.stop_reason}."
+    return Section("steps", "What was missing", table(head, rows, range(2, 6)), lead)
 
 
 def _verdict(result: PoseCalibration) -> Section:

@@ -217,7 +217,14 @@ class _Arm:
         body.add_site(name="target", pos=at)
         payload = self._of.get(("payload", "robot"))
         if payload is not None:
-            body.add_body(name="payload", pos=at, mass=payload["mass"], explicitinertial=True, inertia=[1e-6] * 3)
+            body.add_body(
+                name="payload",
+                pos=at,
+                ipos=np.zeros(3),
+                mass=payload["mass"],
+                explicitinertial=True,
+                inertia=[1e-6] * 3,
+            )
 
     def _value(self, owner: str, part: str) -> float:
         return self._values.get(f"{owner}.{part}", 0.0)

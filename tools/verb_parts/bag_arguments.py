@@ -13,13 +13,14 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
 from jointscope.tools.verb_parts.first_look import first_look
+from jointscope.tools.verb_parts.pose_runs import add_holdout_poses_option, add_poses_option, check_one_kind
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 
 def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments."""
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
-    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument("bags", metavar="BAG", nargs="*", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument(
         "--holdout", metavar="BAG", type=Path, help="a recording that is scored and reported, but never chooses"
     )
@@ -30,6 +31,8 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
         help="hold out the last part of the only BAG instead, for example 0.33; zeros of encoders and biases of gyros "
         "are fitted again there",
     )
+    add_poses_option(parser)
+    add_holdout_poses_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -37,7 +40,24 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
 def input_files(args: argparse.Namespace) -> list[Path]:
     """Everything that must not be overwritten."""
     robot = [Path(args.robot)] if Path(args.robot).is_file() else []
-    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *args.effects]
+    poses = [*args.poses, *args.holdout_poses]
+    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *poses, *args.effects]
+
+
+def check_kind(args: argparse.Namespace) -> None:
+    """One kind of recording, and no option of the other.
+
+    Raises:
+        RecordingError: none, both, or such an option.
+    """
+    of_motion = {
+        "--holdout": args.holdout is not None,
+        "--holdout-share": args.holdout_share is not None,
+        "--leave-out": bool(args.leave_out),
+    }
+    check_one_kind(args.bags, args.poses, of_motion)
+    if args.holdout_poses and not args.poses:
+        raise RecordingError("--holdout-poses goes with --poses")
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RobotError
+from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.terminal.progress import Progress
@@ -27,6 +27,41 @@ def add_poses_option(parser: argparse.ArgumentParser) -> None:
         metavar="TABLE-or-BAG",
         help="poses of the arm at rest with a measured target (docs/poses.md)",
     )
+
+
+def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
+    """Adds --holdout-poses."""
+    parser.add_argument(
+        "--holdout-poses",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="TABLE-or-BAG",
+        help="poses that are scored once per step and never choose",
+    )
+
+
+def check_one_kind(bags: Sequence[Path], poses: Sequence[Path], options: Mapping[str, bool]) -> None:
+    """One kind of recording, and no option of the other.
+
+    Args:
+        bags: as given.
+        poses: as given.
+        options: of recordings of motion, and whether they are given.
+
+    Raises:
+        RecordingError: none, both, or such an option with poses.
+    """
+    if not bags and not poses:
+        raise RecordingError("nothing to calibrate from; expected BAG... before the first option, or --poses FILE")
+    if bags and poses:
+        raise RecordingError(
+            "recordings of motion and poses in one estimate are not on the command line yet; from Python: "
+            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...)]), see docs/poses.md"
+        )
+    given = next((option for option, there in options.items() if there), None)
+    if poses and given:
+        raise RecordingError(f"{given} is for recordings of motion; leave it out with --poses")
 
 
 def run_pose_calibration(
@@ -84,6 +119,89 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
         for label, parts in by_label.items()
     }
     return pose_errors_text(by_label, count), {"models": content}
+
+
+def run_pose_search(
+    robot: Robot, paths: Sequence[Path], holdout: Sequence[Path], files: ResultFiles, search: bool, progress: Progress
+) -> str:
+    """Looks for effects, adds them if `search`, writes the files, and returns what the screen says.
+
+    Raises:
+        RobotError: pictures were asked for that poses do not have.
+        JointscopeError: the poses cannot be used, or a file cannot be written; then none is.
+    """
+    from jointscope.graphs.poses.calibrate_poses import calibrate_poses
+    from jointscope.graphs.poses.discover_poses import discover_poses, pose_candidates
+    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.terminal.pose_discovery_text import pose_discovery_text, pose_ranking_text
+
+    if files.rrd is not None or (files.report is not None and not search):
+        raise RobotError(f"{robot.name}: poses have a report with `calibrate` and `discover`; leave the option out")
+    sessions = [read_poses(path, robot) for path in paths]
+    if not search:
+        result = calibrate_poses(robot, sessions, progress)
+        candidates = pose_candidates(result)
+        if files.json is not None:
+            write_json(
+                files.json, {"adequate": _adequate(candidates), "candidates": [_candidate(c) for c in candidates]}
+            )
+        return pose_ranking_text(candidates, result.count)
+    found = discover_poses(robot, sessions, [read_poses(path, robot) for path in holdout], progress)
+    last = found.steps[-1].result
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.files.robot_writer import robot_text
+
+            text = robot_text(found.robot, files.robot.parent, _origin(last, robot))
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        if files.report is not None:
+            from jointscope.tools.report.poses_report import poses_report
+
+            stack.enter_context(whole_file(files.report)).write_text(poses_report(last, found), encoding="utf-8")
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), _discovery(found, files.robot))
+    return pose_discovery_text(found)
+
+
+def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:
+    steps = []
+    for step in found.steps:
+        train = found.whitened(step, step.result.problems)
+        held = found.whitened(step, found.holdout) if found.holdout else None
+        errors = {"train_error": train, "heldout_error": held, "floor": 1.0}
+        by_kind = {"by_kind": {"poses": train if held is None else held}}
+        mm = {"poses": None if step.heldout is None else step.heldout.to_json()}
+        added = {"added": step.added.hypothesis.label if step.added else None, "removed": None}
+        steps.append(added | errors | by_kind | mm | {"candidates": [_candidate(c) for c in step.candidates]})
+    last = found.steps[-1].candidates
+    return {
+        "steps": steps,
+        "stop_reason": found.stop_reason,
+        "adequate": _adequate(last),
+        "robot_file": None if robot_file is None else str(robot_file),
+    }
+
+
+def _adequate(candidates: Sequence[Any]) -> bool:
+    return not any(c.verdict == "missing" for c in candidates)
+
+
+def _candidate(c: Any) -> dict[str, Any]:
+    kind = c.hypothesis.kind
+    unit = "rad/(N m)" if kind.soft else kind.unit
+    names = [n.replace("stiffness", "compliance") if kind.soft else n for n in c.hypothesis.names]
+    sizes = zip(names, c.sizes, c.sigmas, strict=True)
+    return {
+        "effect": kind.id,
+        "owner": c.hypothesis.owner,
+        "score": c.score,
+        "dof": len(c.sizes),
+        "p_value": c.p_value,
+        "parameters": {name: {"value": value, "sigma": sigma, "unit": unit} for name, value, sigma in sizes},
+        "gain": c.gain,
+        "look_alikes": list(c.look_alikes),
+        "verdict": c.verdict,
+    }
 
 
 def pose_json(result: Any) -> dict[str, Any]:

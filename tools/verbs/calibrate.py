@@ -11,7 +11,7 @@ from typing import Any
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
-from jointscope.tools.verb_parts.pose_runs import add_poses_option, run_pose_calibration
+from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
@@ -107,31 +107,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_kinds(args: argparse.Namespace) -> None:
-    """One kind of recording at least, and what goes with it.
+    """One kind of recording, and what goes with it.
 
     Raises:
         RecordingError: none, both, or an option of the other kind.
     """
-    if not args.bags and not args.poses:
-        raise RecordingError(
-            "nothing to calibrate from; expected BAG... before the first option, or --poses TABLE-or-BAG"
-        )
-    if args.bags and args.poses:
-        raise RecordingError(
-            "recordings of motion and poses in one estimate are not on the command line yet; from Python: "
-            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...)]), see docs/poses.md"
-        )
-    motion_only = [
-        option
-        for option, given in (
-            ("--incremental", args.incremental),
-            ("--solver samples", args.solver == "samples"),
-            ("--leave-out", bool(args.leave_out)),
-        )
-        if given
-    ]
-    if args.poses and motion_only:
-        raise RecordingError(f"{motion_only[0]} is for recordings of motion; leave it out with --poses")
+    of_motion = {
+        "--incremental": args.incremental,
+        "--solver samples": args.solver == "samples",
+        "--leave-out": bool(args.leave_out),
+    }
+    check_one_kind(args.bags, args.poses, of_motion)
     if args.urdf is not None and not args.poses:
         raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
 

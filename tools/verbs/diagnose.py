@@ -7,8 +7,9 @@ import argparse
 from typing import Any
 
 from jointscope.tools.terminal.progress import progress_bar
-from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of
+from jointscope.tools.verb_parts.pose_runs import run_pose_search
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_diagnosis
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
@@ -39,6 +40,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, writes the files, and says what was found."""
     files = ResultFiles.of(args)
+    check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
     from jointscope.graphs.discovery.diagnose import diagnose
@@ -46,6 +48,10 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
+    if args.poses:
+        with progress_bar() as progress:
+            print(run_pose_search(robot, args.poses, (), files, False, progress))
+        return 0
     with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
         found = diagnose(

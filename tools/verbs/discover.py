@@ -12,8 +12,9 @@ from typing import Any
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress, progress_bar
-from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, input_files, read_bags
+from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.named_recordings import discovery_of
+from jointscope.tools.verb_parts.pose_runs import run_pose_search
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_discovery
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
@@ -21,6 +22,7 @@ from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
+  jointscope discover tx90l --poses poses.csv --holdout-poses others.csv -o found.yaml
 
 Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
 after the last finished step; found.discovery.json remembers what it started from. Robots with link_dynamics:
@@ -53,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.verb_parts.discovery_state import state_file, step_file
 
     files = ResultFiles.of(args)
+    check_kind(args)
     beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MAX_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
     load_user_effects(args.effects)
@@ -60,6 +63,11 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.discovery_text import discovery_text
 
     robot = load_robot(args.robot)
+    if args.poses:
+        with progress_bar() as progress:
+            print(run_pose_search(robot, args.poses, args.holdout_poses, files, True, progress))
+        print(f"\nWrote {', '.join(map(str, files.all))}")
+        return 0
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
         if robot.free_links:

@@ -136,3 +136,49 @@ def test_contacts_and_places_of_a_table(tx90l):
     poses = read_poses(path, tx90l)  # its first six joints have the same names
     assert len(poses) == 182 and len(set(poses.contacts)) == 6
     assert set(poses.groups) == {"back-high", "front", "right"} and poses.target is None
+
+
+def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+    monkeypatch.chdir(tmp_path)
+    hidden = ["--seed", "20", "--effect", "joint_elasticity@joint5"]
+    assert main(["simulate", "tx90l", "--kind", "poses", "-o", "train.csv", *hidden]) == 0
+    assert main(["simulate", "tx90l", "-o", "test.csv", "--session", "others", "--count", "60", *hidden]) == 0
+    assert json.loads((tmp_path / "train.truth.json").read_text())["effects"][0]["effect"] == "joint_elasticity"
+    capsys.readouterr()
+    search = ["--poses", "train.csv", "--holdout-poses", "test.csv", "-o", "found.yaml", "--json", "f.json"]
+    assert main(["discover", "tx90l", *search, "--report", "f.html"]) == 0
+    assert "joint_elasticity@joint5" in capsys.readouterr().out
+    content = json.loads((tmp_path / "f.json").read_text())
+    assert [step["added"] for step in content["steps"]] == [None, "joint_elasticity@joint5"]
+    assert content["steps"][1]["heldout_error"] < content["steps"][0]["heldout_error"]
+    assert content["adequate"] is True and "What was missing" in (tmp_path / "f.html").read_text()
+    assert load_robot("found.yaml").parameters["joint5.stiffness"].value == pytest.approx(25000.0, rel=0.3)
+    assert main(["diagnose", "tx90l", "--poses", "train.csv", "--json", "d.json"]) == 0
+    first = json.loads((tmp_path / "d.json").read_text())["candidates"][0]
+    assert (first["effect"], first["owner"], first["verdict"]) == ("joint_elasticity", "joint5", "missing")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["discover", "tx90l", "-o", "a.yaml"], "nothing to calibrate from"),
+        (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
+        (
+            ["discover", "doggy", "a.mcap", "--holdout-poses", "p.csv", "-o", "a.yaml"],
+            "--holdout-poses goes with --poses",
+        ),
+        (["simulate", "tx90l", "-o", "a.mcap"], "poses are written as a table; expected a name that ends with .csv"),
+        (["simulate", "doggy", "--kind", "poses", "-o", "a.csv"], "doggy.yaml has no section `poses`"),
+        (["simulate", "tx90l", "--kind", "motion", "-o", "a.mcap"], "tx90l.yaml has no `command` and no `sensors`"),
+        (["add", "tx90l", "cogging@joint1", "-o", "a.yaml"], "tx90l.yaml has no `command` and no `sensors`"),
+        (["closed-loop", "tx90l"], "tx90l.yaml has no `command` and no `sensors`"),
+    ],
+)
+def test_verbs_that_cannot_say_so_in_one_line(tmp_path, monkeypatch, capsys, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.csv").write_text("pose,q1\n0,1\n")
+    assert main(arguments) == 1
+    said = capsys.readouterr().err
+    assert told in said and said.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["p.csv"]

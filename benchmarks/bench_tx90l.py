@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Prints what was promised of calibrations from poses beside what is measured.
+
+Usage: python benchmarks/bench_tx90l.py [--json FILE]; recordings that another program simulated lie in ../shared/data;
+arms with effects are simulated by MuJoCo.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench import environment
+
+from jointscope.graphs.poses.calibrate_poses import calibrate_poses
+from jointscope.graphs.poses.discover_poses import discover_poses
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import tip_errors, without_sag
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.poses import Poses
+from jointscope.tools.bags.read_poses import read_poses
+from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
+
+DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "tx90l"
+CLEAN = range(10)
+FAULTS = (
+    "encoder_eccentricity@joint2:cos=2e-4",
+    "encoder_eccentricity@joint4:cos=4e-4",
+    "joint_elasticity@joint5",
+    "joint_elasticity@joint4:compliance=1.2e-4",
+    "payload@robot:mass=2",
+    "payload@robot:mass=4",
+    "tracker_drift@robot:x=2e-4",
+    "tracker_drift@robot:z=3e-4",
+    "backlash@joint5:half_gap=3e-4",
+    "backlash@joint4:half_gap=3e-4",
+    "spring_cubic@joint3:stiffness=1e11",
+)
+TOGETHER = ("joint_elasticity@joint5:compliance=4e-5", "encoder_eccentricity@joint2:cos=1.5e-4", "payload@robot:mass=2")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
+    arguments = parser.parse_args()
+    print(f"# Poses\n\n{environment()}\n")
+    robot = load_robot("tx90l")
+    found: dict[str, Any] = {}
+    if DATA.is_dir():
+        found |= _made_elsewhere(robot)
+    found |= _simulated(robot)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+
+
+def _made_elsewhere(robot: Robot) -> dict[str, Any]:
+    calibration, verification = (read_poses(DATA / f"poses_{name}", robot) for name in ("calibration", "verification"))
+    result, began = calibrate_poses(robot, [calibration]), time.perf_counter()
+    calibrate_poses(robot, [verification])
+    seconds = time.perf_counter() - began
+    whole = _tip(result.robot, verification)
+    rigid = _tip(calibrate_poses(without_sag(robot), [calibration]).robot, verification)
+    gap = calibrate_poses(robot, [read_poses(DATA / "poses_backlash", robot)]).robot.parameters["joint3.backlash"]
+    print("| made elsewhere | wanted | measured |\n| --- | --- | --- |")
+    print(
+        f"| 150 poses not fitted: 90 % / largest | 0.055 / 0.11 mm | {whole['p90_mm']:.3f} / {whole['max_mm']:.3f} mm |"
+    )
+    print(f"| the same, rigid | 0.44 / 0.77 mm | {rigid['p90_mm']:.2f} / {rigid['max_mm']:.2f} mm |")
+    told = result.determined
+    print(f"| rank, combinations | 29, 18 | {told.rank}, {len(told.combinations)} |")
+    print(f"| backlash | -200 +- 15 urad | {1e6 * gap.value:.0f} +- {1e6 * (gap.sigma or 0.0):.0f} urad |")
+    print(f"| 150 poses | 2 s | {seconds:.2f} s |\n")
+    return {"verification": whole, "rigid": rigid, "rank": told.rank, "backlash": gap.value, "seconds_150": seconds}
+
+
+def _simulated(robot: Robot) -> dict[str, Any]:
+    print("| simulated, 40 poses | found | held out, 90 % before / after [mm] | s |\n| --- | --- | --- | --- |")
+    rows, false, first = [], 0, 0
+    for seed in CLEAN:
+        row = _row(robot, seed, ())
+        false += bool(row["found"])
+        rows.append(row)
+    for i, fault in enumerate(FAULTS):
+        row = _row(robot, 20 + i, (fault,))
+        first += row["found"][:1] == [fault.partition(":")[0]]
+        rows.append(row)
+    together = _row(robot, 50, TOGETHER)
+    print(f"\nclean arms with a false effect: {false} of {len(CLEAN)}; faults named first: {first} of {len(FAULTS)}")
+    return {"rows": [*rows, together], "false": false, "first": first}
+
+
+def _row(robot: Robot, seed: int, effects: tuple[str, ...]) -> dict[str, Any]:
+    conditions = PoseConditions(effects=effects)
+    train, _ = simulate_poses(robot, 40, seed, conditions)
+    held, _ = simulate_poses(robot, 150, seed, conditions, session="held out")
+    began = time.perf_counter()
+    found = discover_poses(robot, [train], [held])
+    seconds = time.perf_counter() - began
+    p90 = [step.heldout.to_json()["p90_mm"] for step in found.steps if step.heldout is not None]
+    names = [step.added.hypothesis.label for step in found.steps if step.added is not None]
+    hidden = ", ".join(effects) or f"nothing (seed {seed})"
+    print(f"| {hidden} | {', '.join(names) or 'nothing'} | {p90[0]:.3f} / {p90[-1]:.3f} | {seconds:.1f} |", flush=True)
+    return {"hidden": list(effects), "seed": seed, "found": names, "p90_mm": p90, "seconds": seconds}
+
+
+def _tip(robot: Robot, poses: Poses) -> dict[str, float]:
+    assert robot.poses is not None
+    tracker = np.eye(4) if robot.poses.tracker is None else robot.poses.tracker
+    return tip_errors(PoseSet(robot, poses, tracker)).to_json()
+
+
+if __name__ == "__main__":
+    main()
