@@ -153,6 +153,8 @@ def _message(store, kind, content, k, stamp):
         vector = types["geometry_msgs/msg/Vector3"]
         still, nine = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0), np.zeros(9)
         return types[kind](header, still, nine, vector(*row["rate"]), nine, vector(0.0, 0.0, 0.0), nine)
+    if kind in ("std_msgs/msg/Float64", "std_msgs/msg/Float32"):
+        return types[kind](float(row["data"][0]))
     if kind == "std_msgs/msg/Float64MultiArray":
         return types[kind](types["std_msgs/msg/MultiArrayLayout"]([], 0), row["data"])
     if kind == "control_msgs/msg/DynamicJointState":

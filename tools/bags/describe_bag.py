@@ -186,7 +186,7 @@ def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple
         problem = None
         try:
             check_topic(bag, source)
-            names = topics[source.topic].names
+            names = topics[source.topic].names if source.topic in topics else ()
             missing = [name for name in source.names if names and name not in names]
             if missing:
                 problem = f"no joint {missing[0]!r} on {source.topic}, which names {', '.join(names)}"

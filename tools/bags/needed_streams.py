@@ -17,6 +17,7 @@ from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.field_path import field_path
+from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag
 
@@ -54,8 +55,9 @@ def check_topic(bag: Bag, source: Topic) -> MessageType:
         RecordingError: it does not; the message says what is there instead.
     """
     place = f"{bag.path}: topic {source.topic}"
-    if source.topic not in bag.topics:
-        hint = did_you_mean(source.topic, bag.topics)
+    if not bag.holds(source.topic):
+        gone = next(part for part in parts_of(source.topic) if part not in bag.topics)
+        place, hint = f"{bag.path}: topic {gone}", did_you_mean(gone, bag.topics)
         raise RecordingError(f"{place} is missing; record it, or change `topic` in the robot file{hint}")
     types = bag.type_names(source.topic)
     if types != (full_type_name(source.msgtype),):

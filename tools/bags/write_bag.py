@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.message_template import fill_messages
 from jointscope.tools.bags.messages.message_type import MessageType, known_message_type
 from jointscope.tools.bags.messages.open_bag import Progress, one_line, storage_files
@@ -106,6 +107,11 @@ def _topics(recording: Recording, robot: Robot, ros2: bool) -> list[TopicMessage
     for need in needed_streams(robot):
         if need.name not in recording.streams:
             raise RecordingError(f"the recording has no stream {need.name!r}, which robot {robot.name!r} needs")
+        if len(parts_of(need.source.topic)) > 1:
+            raise RecordingError(
+                f"{need.name} of robot {robot.name!r} is on one topic for each joint, which can be read and not "
+                "written; name one topic with a JointState in a copy of the robot file"
+            )
         by_topic.setdefault(need.source.topic, []).append(need)
     return [_messages(recording, topic, needs, ros2) for topic, needs in by_topic.items()]
 

@@ -14,9 +14,11 @@ from jointscope.graphs.starts.drive_regression import Driven
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.urdf_bodies import UrdfBodies
+from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
+from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.open_bag import Progress
 from jointscope.tools.init.estimates.drive_values import TYPED, Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
@@ -116,7 +118,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         RecordingError: the bag cannot be read, lacks positions or what drives the motors, or a joint moves that must
             not be left out.
     """
-    signals = read_signals(typed.bag, progress)
+    signals = read_signals(typed.bag, progress, moving_joints(typed.urdf))
     robot = measured_robot(typed, signals)
     roles, tree, masses = robot.roles, robot.tree, robot.masses
     torque = None if roles.joint_torque is None else role_stream(roles.joint_torque, roles.joints)
@@ -243,7 +245,8 @@ def _sensor_name(topic: str, taken: Sequence[str]) -> str:
 
 
 def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
-    used = {roles.motor_encoder.signal.topic, roles.command.signal.topic, *(s.topic for s in roles.imus)}
+    used = {roles.motor_encoder.signal.topic, *(s.topic for s in roles.imus)}
+    used |= {roles.command.signal.topic, *parts_of(roles.command.signal.topic)}
     if roles.link_encoder is not None:
         used.add(roles.link_encoder.signal.topic)
     said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags import ArrivalReader, read_recording
 from jointscope.tools.command_line import main
 
 ARM = {"shoulder": None, "elbow": "shoulder", "wrist": "elbow"}
@@ -202,13 +203,58 @@ def test_an_array_of_commands_in_another_order_is_put_in_that_of_the_motion(arm,
         assert "the motion asks for this order" in (tmp_path / f"{name}.yaml").read_text()
 
 
-def test_commands_on_a_topic_for_each_joint_are_named(arm, held, tmp_path, capsys):
+@pytest.mark.parametrize("kind", ["std_msgs/msg/Float64", "std_msgs/msg/Float32", "std_msgs/msg/Float64MultiArray"])
+def test_commands_on_a_topic_for_each_joint_are_put_together(arm, held, tmp_path, capsys, kind):
     topics = {"/joint_states": held.states()}
-    for joint in ("shoulder", "elbow"):
-        topics[f"/{joint}_controller/command"] = {"data": held.commands((joint,))["effort"]}
-    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
-    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 1
-    assert "commands come joint by joint, on /elbow_controller/command, /shoulder_" in capsys.readouterr().err
+    for joint in ("elbow", "shoulder"):  # not the order of the URDF
+        topics[f"/{joint}_controller/command"] = {"type": kind, "data": held.commands((joint,))["effort"]}
+    bag, out = write_arm_bag(tmp_path / "a.mcap", held.times, topics), tmp_path / "a.yaml"
+    assert init(arm, bag, "-o", out) == 0
+    text = capsys.readouterr().out
+    assert "no role found" not in text and "can be used with it" in text
+    robot = load_robot(out)
+    assert robot.command.topic == "/shoulder_controller/command + /elbow_controller/command"
+    command = read_recording(bag, robot).command
+    np.testing.assert_allclose(command.values, held.torque, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(command.times), np.diff(held.times), atol=1e-6)
+    blocks = list(ArrivalReader(bag, robot))
+    place = blocks[0].names.index("command")
+    np.testing.assert_allclose(np.vstack([block.values[place] for block in blocks]), held.torque, rtol=1e-6)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_goal_positions_are_no_drive(arm, held, tmp_path, together):
+    """Position controllers command where to be; what drives the motors is the effort beside the positions."""
+    late = {joint: np.interp(held.times + 0.04, held.times, held.position[joint]) for joint in ("shoulder", "elbow")}
+    names = ("shoulder", "elbow", "wrist")
+    effort = held.commands(names)["effort"]
+    topics = {"/joint_states": {**held.states(names), "effort": effort}}
+    if together:
+        topics["/position_controller/commands"] = {"data": np.column_stack([late["shoulder"], late["elbow"]])}
+    else:
+        for joint, goal in late.items():
+            topics[f"/{joint}_controller/command"] = {"type": "std_msgs/msg/Float64", "data": goal[:, None]}
+    bag, out = write_arm_bag(tmp_path / "a.mcap", held.times, topics), tmp_path / "a.yaml"
+    assert init(arm, bag, "-o", out) == 0
+    robot = load_robot(out)
+    assert (robot.command.topic, robot.command.field) == ("/joint_states", "effort")
+
+
+def test_a_topic_of_joined_ones_that_is_missing_is_named(arm, held, tmp_path, capsys):
+    topics = {"/joint_states": held.states()}
+    for joint in ("elbow", "shoulder"):
+        topics[f"/{joint}_controller/command"] = {
+            "type": "std_msgs/msg/Float64",
+            "data": held.commands((joint,))["effort"],
+        }
+    bag, out = write_arm_bag(tmp_path / "a.mcap", held.times, topics), tmp_path / "a.yaml"
+    assert init(arm, bag, "-o", out) == 0
+    del topics["/elbow_controller/command"]
+    other = write_arm_bag(tmp_path / "b.mcap", held.times, topics)
+    with pytest.raises(RecordingError, match=r"b.mcap: topic /elbow_controller/command is missing"):
+        read_recording(other, load_robot(out))
+    assert main(["info", str(other), "--robot", str(out)]) == 0
+    assert "topic /elbow_controller/command is missing" in capsys.readouterr().out
 
 
 def test_arrays_of_motors_are_read(arm, held, tmp_path):

@@ -14,6 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.tools.bags.messages.joined_topics import (
+    JOINED_TYPE,
+    SINGLE_TYPES,
+    Joiner,
+    joined_message_type,
+    parts_of,
+)
 from jointscope.tools.bags.messages.message_type import MessageType, defined_message_type, inner_type
 
 Progress = Callable[[int, int], None]
@@ -68,12 +75,21 @@ class Bag:
         """Names of all topics."""
         return tuple(self._infos)
 
+    def holds(self, topic: str) -> bool:
+        """Whether a topic, or each of those that are joined in it, is there."""
+        return all(part in self._infos for part in parts_of(topic))
+
     def count(self, topic: str) -> int:
-        """Number of messages that the bag promises for a topic."""
-        return int(self._infos[topic].msgcount)
+        """Number of messages that the bag promises for a topic; of joined ones of all of them, 0 if one has none."""
+        counts = [int(self._infos[part].msgcount) for part in parts_of(topic)]
+        return sum(counts) if all(counts) else 0
 
     def type_names(self, topic: str) -> tuple[str, ...]:
         """Message types on a topic; more than one only in odd bags."""
+        parts = parts_of(topic)
+        if len(parts) > 1:
+            kinds = {kind for part in parts for kind in self.type_names(part)}
+            return (JOINED_TYPE,) if kinds <= set(SINGLE_TYPES) else tuple(sorted(kinds))
         return tuple(sorted({connection.msgtype for connection in self._infos[topic].connections}))
 
     def message_type(self, topic: str) -> MessageType:
@@ -82,6 +98,8 @@ class Bag:
         Raises:
             RecordingError: the definition in the bag cannot be understood.
         """
+        if len(parts_of(topic)) > 1:
+            return joined_message_type()
         connection = self._infos[topic].connections[0]
         try:
             found = defined_message_type(connection.msgtype, connection.msgdef, self.ros2)
@@ -95,7 +113,7 @@ class Bag:
             ) from err
 
     def messages(self, topics: Sequence[str], progress: Progress | None = None) -> Iterator[tuple[str, int, bytes]]:
-        """All messages of some topics, one by one in the order of the bag.
+        """All messages of some topics, joined ones, too, one by one in the order of the bag.
 
         Args:
             topics: their names.
@@ -107,8 +125,9 @@ class Bag:
         Raises:
             RecordingError: the bag is damaged or holds fewer messages than it promises.
         """
-        connections = [connection for topic in topics for connection in self._infos[topic].connections]
-        found = dict.fromkeys(topics, 0)
+        joiners = [Joiner(t, [self.message_type(p) for p in parts_of(t)]) for t in topics if len(parts_of(t)) > 1]
+        found = dict.fromkeys((part for topic in topics for part in parts_of(topic)), 0)
+        connections = [connection for topic in found for connection in self._infos[topic].connections]
         expected, k = sum(self.count(topic) for topic in found), 0
         try:
             # without connections the reader would deliver everything
@@ -119,7 +138,11 @@ class Bag:
                 k += 1
                 if progress and k % PROGRESS_STEP == 0:
                     progress(k, expected)
-                yield connection.topic, time, data
+                if connection.topic in topics:
+                    yield connection.topic, time, data
+                for joiner in joiners:
+                    if connection.topic in parts_of(joiner.name):
+                        yield from ((joiner.name, *made) for made in joiner.take(connection.topic, time, data))
         except Exception as err:  # damaged bags raise errors of every kind
             raise RecordingError(
                 f"{self.path} is damaged after {k} of {expected} messages: {one_line(err)}; {repair(self.path)}"

@@ -137,7 +137,7 @@ def _slides(bodies: UrdfBodies) -> tuple[str, ...]:
 def _ordered(roles: Roles, tree: RigidTree, encoder: Stream, masses: bool) -> Chosen:
     """The command; where it names no joints, with its columns in the order that the motion asks for."""
     command, signal = roles.command, roles.command.signal
-    if signal.names or signal.topic == roles.motor_encoder.signal.topic:
+    if signal.names or signal.joints or signal.topic == roles.motor_encoder.signal.topic:
         return command
     places = tuple(int(name) for name in command.names) or tuple(range(tree.n))
     found = order_by_motion(tree, masses, encoder, signal.times, signal.values, places)

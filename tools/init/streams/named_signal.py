@@ -13,6 +13,7 @@ from jointscope.tools.init.streams.joint_names import match_names
 from jointscope.tools.init.streams.signals import Signal
 
 TURNS = (2.0 * np.pi, 360.0, 1.0)  # periods of counters, in rad, degrees, turns
+NEAR_A_GOAL = 0.7  # of a motion's spread, rms, within which it follows its goal
 NEAR_A_TURN = 0.1  # relative; the joint moves on while its counter jumps
 
 
@@ -82,6 +83,20 @@ class NamedSignal:
         column = self.signal.columns((self.names[joint],))[:, 0]
         good = column[np.isfinite(column)]
         return bool(len(good) > len(column) / 2 and np.ptp(good) > 0)
+
+
+def are_goals(command: NamedSignal, positions: NamedSignal, joints: Sequence[str]) -> bool:
+    """Whether the numbers of a command that nobody names are goal positions: the joints are where they say."""
+    shared = [joint for joint in joints if joint in command.names and joint in positions.names]
+    lefts = []
+    for joint in shared:
+        wanted = command.signal.stream((command.names[joint],))
+        is_at = positions.signal.stream((positions.names[joint],))
+        if len(wanted.times) < 2 or len(is_at.times) < 2:
+            continue
+        seen = np.interp(wanted.times, is_at.times, is_at.values[:, 0])
+        lefts.append(float(np.sqrt(np.mean((wanted.values[:, 0] - seen) ** 2)) / max(float(np.std(seen)), 1e-12)))
+    return bool(lefts) and float(np.median(lefts)) < NEAR_A_GOAL
 
 
 def named_signal(signal: Signal, urdf_joints: tuple[str, ...], wish: Wish) -> NamedSignal:

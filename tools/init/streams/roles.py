@@ -15,7 +15,7 @@ import numpy as np
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.screening import MIN_SAMPLES
 from jointscope.tools.init.streams.known_fields import IMU
-from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, named_signal
+from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, named_signal
 from jointscope.tools.init.streams.signals import Signal
 from jointscope.tools.init.streams.standing import Stance, stances
 
@@ -235,13 +235,17 @@ def _drive(
     )
     for candidates, reason, sure in ways:
         named = [_driving(s, motors, urdf_joints, moving, wish) for s in candidates]
+        if candidates is arrays:
+            named = [n for n in named if not are_goals(n, motors, moving)]
         counts = [sum(n.varies(joint) for joint in moving) for n in named]
         if not any(counts):
             continue
         found = named[int(np.argmax(counts))]
         if found.unclear:
             raise RecordingError(found.unclear)
-        if not found.signal.names:
+        if found.signal.joints:
+            reason = "one topic for each joint, put together; their names tell whose they are"
+        elif not found.signal.names:
             reason, sure = f"{reason}; it names no joints, its columns are taken in the order of the URDF", False
         return found, reason, sure and sum(count == max(counts) for count in counts) == 1
     single = [s.topic for s in arrays if s.values.shape[1] == 1]
@@ -262,6 +266,8 @@ def _driving(
     """What a command calls the joints; one without names has as many columns as the encoder, or as joints move."""
     if signal.names:
         return named_signal(signal, urdf_joints, wish)
+    if signal.joints:
+        return NamedSignal(signal, {joint: str(place) for place, joint in enumerate(signal.joints)})
     shown = tuple(joint for joint in urdf_joints if joint in motors.names)
     chosen = tuple(joint for joint in urdf_joints if joint in wish.joints)
     fits = next((c for c in (chosen, shown, moving, urdf_joints) if len(c) == signal.values.shape[1]), ())

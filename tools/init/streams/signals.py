@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from jointscope.robots.recordings.recording import Stream
 from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, joined_message_type
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.read_recording import read_columns
@@ -43,6 +45,7 @@ class Signal:
         values: shape (n, m), in the unit of the bag.
         stamped: whether the messages carry a stamp.
         quantity: what its field says it is: "position", "effort", "rate" or "numbers".
+        joints: whose command each column is, where the topics say so that are joined in it.
         sent: the same with all messages, where some were left out; streams are compared one for one by it.
     """
 
@@ -55,6 +58,7 @@ class Signal:
     stamped: bool
     quantity: str = ""
     sent: Signal | None = None
+    joints: tuple[str, ...] = ()
 
     @property
     def as_sent(self) -> Signal:
@@ -85,14 +89,16 @@ class Signal:
         return Stream(self.topic, self.times[good], values[good], names, "")
 
 
-def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
-    """All signals of a bag, in the order of its topics.
+def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[str] = ()) -> list[Signal]:
+    """All signals of a bag, in the order of its topics; at the end commands on one topic for each of some joints.
 
     Raises:
         RecordingError: the bag cannot be read, or holds nothing that a robot file could use.
     """
     with open_bag(path) as bag:
         types = {topic: kind for topic in bag.topics if (kind := _useful_type(bag, topic)) is not None}
+        joined = joint_by_joint(bag, joints)
+        types |= dict.fromkeys(joined, joined_message_type())
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
@@ -110,6 +116,7 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
     signals = [signal for signal in found if signal is not None]
     if troubles and not signals:
         raise troubles[0]
+    signals = [replace(signal, joints=joined.get(signal.topic, ())) for signal in signals]
     holes = LongHoles.of([signal.times for signal in signals])
     signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
     if not signals:
@@ -118,6 +125,25 @@ def read_signals(path: Path, progress: Progress | None = None) -> list[Signal]:
             f"controllers, arrays of motors); jointscope info {path} shows what is there"
         )
     return signals
+
+
+def joint_by_joint(bag: Bag, joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Topics that are to be joined, as one number each commands one joint, and the joints in their order."""
+    groups: dict[tuple[str, ...], dict[str, str]] = {}
+    for topic in bag.topics:
+        kinds = bag.type_names(topic)
+        if not COMMANDED.search(topic.lower()) or not set(kinds) <= set(SINGLE_TYPES):
+            continue
+        named = [joint for joint in joints if re.search(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", topic)]
+        if named:
+            joint = max(named, key=len)
+            groups.setdefault((topic.replace(joint, "*"), *kinds), {})[joint] = topic
+    found = {}
+    for topics in groups.values():
+        order = tuple(joint for joint in joints if joint in topics)
+        if len(order) > 1:
+            found[PLUS.join(topics[joint] for joint in order)] = order
+    return found
 
 
 def _useful_type(bag: Bag, topic: str) -> MessageType | None:
