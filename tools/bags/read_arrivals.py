@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -18,8 +19,12 @@ from jointscope.graphs.fixed_lag.replay.replay_result import ReplaySource
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.arrivals import Arrivals
-from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
+from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.clocks.two_clocks import brought_together
+from jointscope.tools.bags.clocks.unstamped import sent_earlier
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Progress, RawTopic, bag_sha256, open_bag
@@ -72,6 +77,9 @@ class ArrivalReader:
         self._block = block
         self._last: dict[str, np.ndarray] = {}
         self._left_out: Counter[tuple[str, str]] = Counter()
+        self._later: dict[str, int] | None = None  # by how much stamps are moved [ns]
+        self._clocks: list[Notice] = []
+        self._untold: dict[str, str] = {}  # why the stamps of a stream tell nothing; empty where they do
 
     def __iter__(self) -> Iterator[Arrivals]:
         """Reads the bag.
@@ -86,6 +94,8 @@ class ArrivalReader:
             counts = dict.fromkeys(topics, 0)
             self._last.clear()
             self._left_out.clear()
+            self._untold.clear()
+            self._later, self._clocks = None, []
             while block := list(islice(messages, self._block)):
                 raw = {topic: RawTopic(topic) for topic in topics}
                 places: dict[str, list[int]] = {topic: [] for topic in topics}
@@ -124,6 +134,7 @@ class ArrivalReader:
             self._last[need.name] = columns[-1][1][-1]
         if not present:
             return Arrivals.merged((), [], [])
+        columns = self._on_one_clock(present, found, raw, columns)
         if not self.start_ns:
             self.start_ns = min(int(stamps.min()) for stamps, _ in columns)
         parts = [
@@ -140,6 +151,28 @@ class ArrivalReader:
         ]
         return Arrivals.merged(tuple(need.name for need in present), parts, keys)
 
+    def _on_one_clock(
+        self,
+        present: list[StreamSource],
+        found: list[Columns],
+        raw: dict[str, RawTopic],
+        columns: list[tuple[np.ndarray, np.ndarray]],
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Stamps moved as the first block asks for: of two clocks, and of messages that carry none."""
+        if self._later is None:
+            timed = {
+                need.name: TimedSamples(stamps, fitting.of(raw[need.source.topic].received_ns), values)
+                for need, fitting, (stamps, values) in zip(present, found, columns, strict=True)
+            }
+            carry = [need.name for need, fitting in zip(present, found, strict=True) if fitting.stamps is not None]
+            moved, self._clocks = brought_together({name: timed[name] for name in carry})
+            stamped = dict(moved)
+            for name in timed.keys() - moved.keys():
+                moved[name], _ = sent_earlier(name, timed[name], stamped)
+            self._later = {name: int(moved[name].stamps[0] - timed[name].stamps[0]) for name in timed}
+        later = self._later
+        return [(stamps + later.get(n.name, 0), values) for n, (stamps, values) in zip(present, columns, strict=True)]
+
     def _fitting(
         self, need: StreamSource, topic: RawTopic, types: dict[str, MessageType], counts: dict[str, int]
     ) -> Columns | None:
@@ -154,7 +187,7 @@ class ArrivalReader:
             return None
         for part in columns.left_out:
             self._left_out[need.name, part.what] += part.count
-        return self._filled(need, columns)
+        return self._filled(need, self._on_time(need, topic, columns))
 
     def _filled(self, need: StreamSource, columns: Columns) -> Columns:
         """The messages whose stamps are filled."""
@@ -166,11 +199,23 @@ class ArrivalReader:
             self._left_out[need.name, "whose stamp is zero"] += count
         return columns.take(~zero) if count else columns
 
+    def _on_time(self, need: StreamSource, topic: RawTopic, columns: Columns) -> Columns:
+        """The messages, without stamps where those of the first block tell nothing."""
+        if columns.stamps is None:
+            return columns
+        if need.name not in self._untold:
+            samples = TimedSamples(columns.stamps, columns.of(topic.received_ns), columns.values)
+            self._untold[need.name] = empty_stamps(samples)
+        return replace(columns, stamps=None) if self._untold[need.name] else columns
+
     def notices(self) -> list[str]:
-        """What was left out because it does not fit, a sentence each."""
-        return [
+        """What was left out because it does not fit, and whose stamps tell nothing, a sentence each."""
+        left = [
             f"{name}: left out {counted(count, 'message')} {what}" for (name, what), count in self._left_out.items()
         ]
+        untold = {name: why for name, why in self._untold.items() if why}
+        left += [notice.text for notice in self._clocks]
+        return left + [f"{name}: {why}; the time of reception stands in for it" for name, why in untold.items()]
 
 
 def _in_si(

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags import ArrivalReader
 from jointscope.tools.command_line import main
 
 ARM = {"shoulder": None, "elbow": "shoulder"}
@@ -17,6 +20,11 @@ STAMPS = {
     "two seconds behind": (lambda stamp: stamp - 2 * 10**9, "its stamps are 2 s behind those of the other streams"),
     "not filled": (lambda stamp: 0, "all its stamps are zero; the time of reception stands in for it"),
     "filled once": (lambda stamp: 7 * 10**9, "all its stamps are 7.000 s; the time of reception stands in for it"),
+    "filled in the last quarter": (lambda stamp: stamp if stamp > 10**18 + 4.5e9 else 0, "stamps are zero in "),
+    "a tick of 50 ms": (
+        lambda stamp: stamp // 50_000_000 * 50_000_000,
+        "it has 120 stamps for 1200 messages",
+    ),
     "no fractions": (lambda stamp: stamp // 10**9 * 10**9, "its stamps hold whole seconds only; the time of reception"),
 }
 
@@ -27,14 +35,19 @@ def arm(tmp_path_factory):
     return urdf, ArmMotion(urdf, tuple(ARM))
 
 
-def regression_of(arm, tmp_path, capsys, stamped):
-    """Lines of the regression's table by joint, and all that `init` says."""
-    urdf, motion = arm
+def written(arm, tmp_path, stamped):
+    """A bag with other stamps in some topics."""
+    motion = arm[1]
     topics = {"/joint_states": motion.states(), "/motor_command": motion.commands(tuple(ARM))}
     topics = {
         name: content | ({"stamped": stamped[name]} if name in stamped else {}) for name, content in topics.items()
     }
-    bag = write_arm_bag(tmp_path / "arm.mcap", motion.times, topics, latency=2e-4)
+    return write_arm_bag(tmp_path / "arm.mcap", motion.times, topics, latency=2e-4)
+
+
+def regression_of(arm, tmp_path, capsys, stamped):
+    """Lines of the regression's table by joint, and all that `init` says."""
+    urdf, bag = arm[0], written(arm, tmp_path, stamped)
     assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 0
     said = capsys.readouterr().out
     rows = {line.split()[0]: line for line in said.splitlines() if re.match(r"  (shoulder|elbow) +[0-9]", line)}
@@ -59,3 +72,14 @@ def test_without_any_filled_stamp_all_streams_go_by_their_reception(arm, tmp_pat
     rows, said = regression_of(arm, tmp_path, capsys, {"/joint_states": nothing, "/motor_command": nothing})
     assert said.count("all its stamps are zero") == 2
     assert all(re.search(r" 1\.0+\d* \+-", line) or " 0.99" in line for line in rows.values())
+
+
+@pytest.mark.parametrize("kind", ["hours ahead", "not filled", "no fractions"])
+def test_a_replay_has_the_same_clock(arm, tmp_path, kind):
+    stamped, told = STAMPS[kind]
+    bag = written(arm, tmp_path, {"/motor_command": stamped})
+    assert main(["init", str(arm[0]), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 0
+    reader = ArrivalReader(bag, load_robot(tmp_path / "arm.yaml"), block=500)
+    arrived = np.concatenate([block.stamps for block in reader])
+    assert arrived - arrived.min() == pytest.approx(np.repeat(arm[1].times, 2), abs=1e-3)
+    assert any(told.partition(";")[0] in text for text in reader.notices())

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Headers whose stamps no driver filled: all zero, all the same, or whole seconds. Such messages carry no stamp."""
+"""Headers whose stamps no driver filled: zero, all the same, whole seconds, or far coarser than the messages.
+
+Such messages carry no stamp.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,8 @@ import numpy as np
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
 ONE_SECOND = 1_000_000_000  # [ns]
-SHARED = 3.0  # messages per stamp from which whole seconds are a field that was left out
+SHARED = 3.0  # messages per stamp from which stamps are no times of theirs
+MOST_ZERO = 0.5  # share of the messages
 
 
 def empty_stamps(samples: TimedSamples) -> str:
@@ -18,9 +22,15 @@ def empty_stamps(samples: TimedSamples) -> str:
     stamps = samples.stamps
     if np.all(stamps == stamps[0]):
         return f"all its stamps are {'zero' if stamps[0] == 0 else f'{stamps[0] / 1e9:.3f} s'}"
-    if np.all(stamps % ONE_SECOND == 0) and len(stamps) > SHARED * len(np.unique(stamps)):
+    zero = int(np.count_nonzero(stamps == 0))
+    if zero > MOST_ZERO * len(stamps):
+        return f"its stamps are zero in {zero} of {len(stamps)} messages"
+    different = len(np.unique(stamps))
+    if len(stamps) <= SHARED * different:
+        return ""
+    if np.all(stamps % ONE_SECOND == 0):
         return "its stamps hold whole seconds only"
-    return ""
+    return f"it has {different} stamps for {len(stamps)} messages"
 
 
 def _came_in_one_by_one(samples: TimedSamples) -> bool:
