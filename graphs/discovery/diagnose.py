@@ -21,6 +21,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_m
 from jointscope.graphs.discovery.refit import refit
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.torque_verdicts import torque_verdicts
 from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
@@ -106,21 +107,30 @@ def diagnose(
     comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
+    torques = torque_verdicts(base, scored, comparison)
+    clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
     pool = side_by_side or SideBySide()
-    validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
+    validated, failed = dict[str, ValidatedRefit](), set[str]()
+    if torques is None:
+        validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
     clock.stage("refits")
     seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
     candidates = _ranked(
         [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     )
+    if torques is not None:
+        candidates = torques.candidates
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
     share = unexplained(comparison)
-    if best is not None:
+    if torques is not None:
+        share = torques.unexplained
+    elif best is not None:
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.judged_floor)
-    refits = {label: t.refit.robot for label, t in validated.items()}
+    refits = torques.refits if torques is not None else {label: t.refit.robot for label, t in validated.items()}
+    elsewhere = _elsewhere(base, holdout) if torques is None else [0.0]
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -129,7 +139,7 @@ def diagnose(
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
-        adequate=best is None and max(share, *_elsewhere(base, holdout)) < ADEQUATE,
+        adequate=best is None and max(share, *elsewhere) < ADEQUATE,
         unexplained_share=share,
         error=comparison.judged_error,
         floor=comparison.judged_floor,
@@ -144,8 +154,11 @@ def diagnose(
         wall_seconds=clock.seconds,
         recordings=base.recordings,
         heldout=holdout,
+        missing_torque=torques.missing if torques is not None else None,
+        missing_torque_percent=torques.percent if torques is not None else None,
     )
-    return replace(result, paragraphs=(*_to_look_at_first(base), *paragraphs_of(result)))
+    in_torques = (torques.sentence,) if torques is not None else ()
+    return replace(result, paragraphs=(*_to_look_at_first(base), *in_torques, *paragraphs_of(result)))
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:

@@ -119,11 +119,24 @@ class TorqueJudge:
             ratios.append(_by_block(r0, r1, self.blocks[j]))
         pairs = np.vstack(ratios)
         floor = 0.25 * float(np.median(pairs[:, 0]))
-        helped, harm = int(np.sum(pairs[:, 1] < pairs[:, 0])), float(np.max(pairs[:, 1] / np.maximum(pairs[:, 0], floor)))
+        helped, harm = (
+            int(np.sum(pairs[:, 1] < pairs[:, 0])),
+            float(np.max(pairs[:, 1] / np.maximum(pairs[:, 0], floor))),
+        )
         rows = sum(len(r) for r, yes in zip(self._split(self.left), own, strict=True) if yes)
         removed = 100.0 * float(np.sqrt(max(before - after, 0.0) / rows))
         found = TorqueJudgement(
-            hypothesis, net, score, sizes, sigmas, 1.0 - after / before, self._common(left), helped, len(pairs), harm, removed
+            hypothesis,
+            net,
+            score,
+            sizes,
+            sigmas,
+            1.0 - after / before,
+            self._common(left),
+            helped,
+            len(pairs),
+            harm,
+            removed,
         )
         return TorqueJudgement(**{**found.__dict__, "refused": self._refusal(found)})
 
@@ -138,7 +151,9 @@ class TorqueJudge:
         if found.harm > HARM:
             return f"on one block left out it makes the missing torque {found.harm:.1f} times larger"
         if found.share < CEILING * self.ceiling:
-            return "a free curve over position or speed explains more than twice as much: it stands in for something else"
+            return (
+                "a free curve over position or speed explains more than twice as much: it stands in for something else"
+            )
         return ""
 
     def _score(self, C: Array, hypothesis: EffectHypothesis) -> tuple[float, Array, Array]:
@@ -163,7 +178,11 @@ class TorqueJudge:
     def _left_out(self, C: Array) -> Array:
         """Missing torque with base parameters and columns fitted on the other folds, shape (m,)."""
         X = np.hstack([independent(self._everything), C])
-        Xw, yw, folds = self._white(X), self._white(self._target)[:, 0], np.concatenate([b % FOLDS for b in self.blocks])
+        Xw, yw, folds = (
+            self._white(X),
+            self._white(self._target)[:, 0],
+            np.concatenate([b % FOLDS for b in self.blocks]),
+        )
         left = np.empty(len(X))
         for fold in range(FOLDS):
             fit, judged = folds != fold, folds == fold

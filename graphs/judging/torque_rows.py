@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
-from jointscope.graphs.judging.standstill import near, slowest_speed
+from jointscope.graphs.problem.standstill import near, slowest_speed
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_columns import columns_of
@@ -96,7 +96,9 @@ class TorqueEquations:
         """
         robot = segments[0].problem.robot
         windows = [[_window(s, j, band) for j in range(robot.n)] for s in segments]
-        driven = [_steps(s, [Column(in_steps=np.einsum("krn,kn->kr", s.signals.response, s.signals.u))]) for s in segments]
+        driven = [
+            _steps(s, [Column(in_steps=np.einsum("krn,kn->kr", s.signals.response, s.signals.u))]) for s in segments
+        ]
         found, start = [], np.cumsum([0.0, *(float(np.ptp(s.signals.ticks)) + 10.0 for s in segments)])
         for j, joint in enumerate(robot.joints):
             parts = []
@@ -128,7 +130,9 @@ class TorqueEquations:
             by_segment.append(_steps(s, columns)[2])
         layout = self.segments[0].signals.model.layout
         return [
-            np.concatenate([w[j].averaged(c[:, int(layout.joint_link[j])]) for w, c in zip(self.windows, by_segment, strict=True)])
+            np.concatenate(
+                [w[j].averaged(c[:, int(layout.joint_link[j])]) for w, c in zip(self.windows, by_segment, strict=True)]
+            )
             for j in range(len(self.rows))
         ]
 
