@@ -47,6 +47,7 @@ PATIENCE = 2  # times as many, as long as none of them helps: one effect may hid
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 LOOK_FIRST = "Look at this before any effect"  # how a paragraph about a plain mistake begins
+DOUBTFUL = 1.2  # times the error from which a floor cannot be what noise alone would give
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -199,7 +200,8 @@ def unexplained(comparison: ModelComparison) -> float:
 
 
 def unexplained_share(error: float, floor: float) -> float:
-    """(error^2 - floor^2) / error^2, at least 0."""
+    """(error^2 - floor^2) / error^2, at least 0; a floor well above the error says nothing, the sensor's own does."""
+    floor = SENSOR_FLOOR if floor > DOUBTFUL * error else floor
     return float(max(1.0 - (floor / error) ** 2, 0.0)) if error != 0.0 else 0.0
 
 

@@ -66,6 +66,11 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: Model
     first = [j for j in equal if len(j.sizes) == fewest]
     by_label = {c.label: c for c in _scored_only(scored)}
     candidates = [_candidate(by_label.get(label), j, j in first, base.robot) for label, j in found.items()]
+    alike = tuple(j.hypothesis.label for j in first)
+    candidates = [
+        replace(c, look_alikes=tuple(a for a in alike if a != c.label)[:3]) if c.label in alike else c
+        for c in candidates
+    ]
     candidates += [c for label, c in by_label.items() if label not in found]
     refits = {j.hypothesis.label: _with(base.robot, j) for j in first}
     names, drive = [rows.joint for rows in judge.rows], judge.drive
@@ -136,7 +141,11 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
             parameters[name] = EffectEstimate(
                 float(value), float("nan"), robot.unit_at(here.owner, shapes.get(name, "1"))
             )
-    helps = f"it explains {100 * j.share:.0f} % of the squared missing torque on blocks left out, and helps on {j.helped} of {j.blocks}"
+    helps = (
+        f"it explains {100 * j.share:.0f} % of the squared missing torque on blocks left out, "
+        f"and helps on {j.helped} of {j.blocks}"
+    )
+    reasons: tuple[str, ...]
     if first:
         verdict, reasons = "missing", (helps,)
     elif not j.refused:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.judging.torque_noise import Yardstick, independent, saturated, speeds, yardstick_of
+from jointscope.graphs.judging.torque_noise import Yardstick, independent, saturated, yardstick_of
 from jointscope.graphs.judging.torque_rows import TorqueEquations, TorqueRows
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 
@@ -261,6 +261,3 @@ def _stacked(columns: Sequence[Array]) -> Array:
         total[start[0] : start[0] + len(c), start[1] : start[1] + c.shape[1]] = c
         start = [start[0] + len(c), start[1] + c.shape[1]]
     return total
-
-
-__all__ = ["FEWEST_BLOCKS", "TorqueJudge", "TorqueJudgement", "speeds"]

@@ -104,6 +104,6 @@ def independent(X: Array) -> Array:
 
 def _whitened(times: Array, values: Array, memory: float, white: float) -> tuple[Array, float]:
     covariance = np.exp(-np.abs(times[:, None] - times[None, :]) / memory)
-    covariance[np.diag_indices(len(times))] += white**2
+    covariance += white**2 * np.eye(len(times))
     L = np.linalg.cholesky(covariance)
     return solve_triangular(L, values, lower=True), float(np.sum(np.log(np.diag(L))))

@@ -39,7 +39,6 @@ class TorqueRows:
         drive: torque of the drive without friction, shape (m,) [N m].
         q, v: motion, shape (m,) [rad], [rad/s].
         slowest: speed below which nothing is told [rad/s].
-        segment, kept, width: where each row comes from: index of the segments and steps; steps of the window.
     """
 
     joint: str
