@@ -21,7 +21,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_m
 from jointscope.graphs.discovery.refit import refit
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
-from jointscope.graphs.discovery.torque_verdicts import torque_verdicts
+from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
 from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
@@ -121,8 +121,7 @@ def diagnose(
     candidates = _ranked(
         [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     )
-    if torques is not None:
-        candidates = torques.candidates
+    candidates = torques.candidates if torques is not None else candidates
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
     share = unexplained(comparison)
     if torques is not None:
@@ -131,7 +130,6 @@ def diagnose(
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.judged_floor)
     refits = torques.refits if torques is not None else {label: t.refit.robot for label, t in validated.items()}
-    elsewhere = _elsewhere(base, holdout) if torques is None else [0.0]
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -140,7 +138,7 @@ def diagnose(
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
-        adequate=best is None and max(share, *elsewhere) < ADEQUATE,
+        adequate=best is None and max(share, *_elsewhere(base, holdout, torques)) < ADEQUATE,
         unexplained_share=share,
         error=comparison.judged_error,
         floor=comparison.judged_floor,
@@ -155,11 +153,10 @@ def diagnose(
         wall_seconds=clock.seconds,
         recordings=base.recordings,
         heldout=holdout,
-        missing_torque=torques.missing if torques is not None else None,
-        missing_torque_percent=torques.percent if torques is not None else None,
+        missing_torque=None if torques is None else torques.missing,
+        missing_torque_percent=None if torques is None else torques.percent,
     )
-    in_torques = (torques.sentence,) if torques is not None else ()
-    return replace(result, paragraphs=(*_to_look_at_first(base), *in_torques, *paragraphs_of(result)))
+    return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:
@@ -171,6 +168,10 @@ def _to_look_at_first(base: BaseModel) -> list[str]:
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{LOOK_FIRST}: {text}." for text in texts]
+
+
+def _in_torques(torques: TorqueVerdicts | None) -> tuple[str, ...]:
+    return () if torques is None else (torques.sentence,)
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
@@ -188,9 +189,9 @@ def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorq
         return None
 
 
-def _elsewhere(base: BaseModel, holdout: Recording | None) -> list[float]:
+def _elsewhere(base: BaseModel, holdout: Recording | None, torques: TorqueVerdicts | None) -> list[float]:
     """Unexplained shares of the further training recordings, where no recording was held out; at least one number."""
-    others = base.recordings[1:] if holdout is None else ()
+    others = base.recordings[1:] if holdout is None and torques is None else ()
     return [0.0, *(unexplained(compare_model("base", base.robot, recording)) for recording in others)]
 
 

@@ -57,7 +57,7 @@ def yardstick_of(rows: TorqueRows, blocks: NDArray[np.intp]) -> Yardstick:
                 parts.append(y)
                 log_determinant += log
             Y = np.vstack(parts)
-            R = np.linalg.qr(Y, mode="r")
+            R: Array = np.linalg.qr(Y)[1]
             freedom = len(Y) - X.shape[1]
             s2 = max(float(R[-1, -1] ** 2) / freedom, 1e-300)
             log_border = 2.0 * float(np.sum(np.log(np.abs(np.diag(R)[:-1]) + 1e-300)))
