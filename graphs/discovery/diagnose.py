@@ -21,6 +21,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_m
 from jointscope.graphs.discovery.refit import refit
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
 from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
@@ -46,6 +47,7 @@ PATIENCE = 2  # times as many, as long as none of them helps: one effect may hid
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 LOOK_FIRST = "Look at this before any effect"  # how a paragraph about a plain mistake begins
+DOUBTFUL = 1.2  # times the error from which a floor cannot be what noise alone would give
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -106,21 +108,28 @@ def diagnose(
     comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
+    torques = torque_verdicts(base, scored, comparison)
+    clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
     pool = side_by_side or SideBySide()
-    validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
+    validated, failed = dict[str, ValidatedRefit](), set[str]()
+    if torques is None:
+        validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
     clock.stage("refits")
     seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
     candidates = _ranked(
         [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     )
+    candidates = torques.candidates if torques is not None else candidates
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
     share = unexplained(comparison)
-    if best is not None:
+    if torques is not None:
+        share = torques.unexplained
+    elif best is not None:
         after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
         share = unexplained_share(after, comparison.judged_floor)
-    refits = {label: t.refit.robot for label, t in validated.items()}
+    refits = torques.refits if torques is not None else {label: t.refit.robot for label, t in validated.items()}
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -129,7 +138,7 @@ def diagnose(
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
-        adequate=best is None and max(share, *_elsewhere(base, holdout)) < ADEQUATE,
+        adequate=best is None and max(share, *_elsewhere(base, holdout, torques)) < ADEQUATE,
         unexplained_share=share,
         error=comparison.judged_error,
         floor=comparison.judged_floor,
@@ -144,8 +153,10 @@ def diagnose(
         wall_seconds=clock.seconds,
         recordings=base.recordings,
         heldout=holdout,
+        missing_torque=None if torques is None else torques.missing,
+        missing_torque_percent=None if torques is None else torques.percent,
     )
-    return replace(result, paragraphs=(*_to_look_at_first(base), *paragraphs_of(result)))
+    return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:
@@ -157,6 +168,10 @@ def _to_look_at_first(base: BaseModel) -> list[str]:
     texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes"))
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{LOOK_FIRST}: {text}." for text in texts]
+
+
+def _in_torques(torques: TorqueVerdicts | None) -> tuple[str, ...]:
+    return () if torques is None else (torques.sentence,)
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
@@ -174,9 +189,9 @@ def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorq
         return None
 
 
-def _elsewhere(base: BaseModel, holdout: Recording | None) -> list[float]:
+def _elsewhere(base: BaseModel, holdout: Recording | None, torques: TorqueVerdicts | None) -> list[float]:
     """Unexplained shares of the further training recordings, where no recording was held out; at least one number."""
-    others = base.recordings[1:] if holdout is None else ()
+    others = base.recordings[1:] if holdout is None and torques is None else ()
     return [0.0, *(unexplained(compare_model("base", base.robot, recording)) for recording in others)]
 
 
@@ -186,7 +201,8 @@ def unexplained(comparison: ModelComparison) -> float:
 
 
 def unexplained_share(error: float, floor: float) -> float:
-    """(error^2 - floor^2) / error^2, at least 0."""
+    """(error^2 - floor^2) / error^2, at least 0; a floor well above the error says nothing, the sensor's own does."""
+    floor = SENSOR_FLOOR if floor > DOUBTFUL * error else floor
     return float(max(1.0 - (floor / error) ** 2, 0.0)) if error != 0.0 else 0.0
 
 

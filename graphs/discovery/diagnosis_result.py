@@ -18,7 +18,7 @@ from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 
-VERDICTS = ("missing", "possible", "absent", "untestable")
+VERDICTS = ("missing", "possible", "absent", "untestable", "stand_in")
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,8 @@ class Diagnosis:
         wall_seconds: by stage.
         recordings: for training.
         heldout: the held-out recording, if there was one.
+        missing_torque: of each joint on blocks left out, root mean square [N m]; None where predictions are judged.
+        missing_torque_percent: the same in percent of the drive's.
     """
 
     robot: Robot
@@ -115,6 +117,8 @@ class Diagnosis:
     wall_seconds: Mapping[str, float] = field(default_factory=dict)
     recordings: tuple[Recording, ...] = field(default=(), repr=False)
     heldout: Recording | None = field(default=None, repr=False)
+    missing_torque: Mapping[str, float] | None = None
+    missing_torque_percent: Mapping[str, float] | None = None
 
     @property
     def judged_by(self) -> str:
@@ -128,6 +132,10 @@ class Diagnosis:
             "unexplained_share": self.unexplained_share,
             "error": self.error,
             "floor": self.floor,
+            "missing_torque": dict(self.missing_torque) if self.missing_torque is not None else None,
+            "missing_torque_percent": dict(self.missing_torque_percent)
+            if self.missing_torque_percent is not None
+            else None,
             "placebo_score": self.placebo_score,
             "noise_levels": {f"{level:g}": list(labels) for level, labels in self.noise_levels.items()},
             "paragraphs": list(self.paragraphs),

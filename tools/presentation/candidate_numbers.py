@@ -10,7 +10,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 
 SMALLEST_P = 1e-12  # smaller ones mean nothing: no noise is so well known
-VERDICT_LEVELS = {"missing": "bad", "possible": "warn", "absent": "good", "untestable": "info"}
+VERDICT_LEVELS = {"missing": "bad", "possible": "warn", "absent": "good", "untestable": "info", "stand_in": "warn"}
 NOTHING = "—"
 
 STIFFNESS_UNITS = {"rad/(N m)": "N m/rad", "m/N": "N/m"}  # of a compliance, and of its inverse

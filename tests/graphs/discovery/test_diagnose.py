@@ -11,7 +11,7 @@ import pytest
 CANDIDATE_KEYS = {
     *("effect", "owner", "score", "dof", "p_value", "parameters", "heldout_error", "look_alikes", "verdict"),
 }
-VERDICTS = {"missing", "possible", "absent", "untestable"}
+VERDICTS = {"missing", "possible", "absent", "untestable", "stand_in"}
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Verdicts where sensors are better than any model: candidates stand in the order of the missing torque they explain.
+
+Predictions in sensor sigmas then measure how fine the sensor is. Joints that are rigid and seen by one encoder each are
+judged so; others by their predictions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from jointscope.graphs.calibration.base_model import BaseModel
+from jointscope.graphs.comparison.comparison_result import ModelComparison
+from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
+from jointscope.graphs.discovery.loop_validation import judged_by_loop
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
+from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
+from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
+from jointscope.graphs.judging.torque_rows import TorqueEquations
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.units import of_slide
+
+BANDS = (30.0, 15.0, 8.0)  # [Hz]
+QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
+FINE = 30.0  # [sensor sigma] error from which the model, not the sensor, limits the prediction
+EQUAL = 0.02  # difference of shares that decides nothing
+
+
+@dataclass(frozen=True)
+class TorqueVerdicts:
+    """What the missing torque says.
+
+    Attributes:
+        candidates: best first.
+        refits: robots with those that are missing, at their sizes.
+        missing: root mean square torque on blocks left out by joint [N m].
+        percent: the same in percent of the drive's.
+        unexplained: share of its square that smooth laws would explain.
+        sentence: all that in plain words.
+    """
+
+    candidates: list[Candidate]
+    refits: dict[str, Robot]
+    missing: Mapping[str, float]
+    percent: Mapping[str, float]
+    unexplained: float
+    sentence: str
+
+
+def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison) -> TorqueVerdicts | None:
+    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short."""
+    judge = _judge(base, comparison)
+    if judge is None:
+        return None
+    hypotheses = hypotheses_on_motion(base.robot, judge.rows)
+    judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
+    found = {j.hypothesis.label: j for j in judged if j is not None}
+    accepted = sorted((j for j in found.values() if not j.refused), key=lambda j: -j.common)
+    equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
+    fewest = min((len(j.sizes) for j in equal), default=0)
+    first = [j for j in equal if len(j.sizes) == fewest]
+    by_label = {c.label: c for c in _scored_only(scored)}
+    candidates = [_candidate(by_label.get(label), j, j in first, base.robot) for label, j in found.items()]
+    alike = tuple(j.hypothesis.label for j in first)
+    candidates = [
+        replace(c, look_alikes=tuple(a for a in alike if a != c.label)[:3]) if c.label in alike else c
+        for c in candidates
+    ]
+    candidates += [c for label, c in by_label.items() if label not in found]
+    refits = {j.hypothesis.label: _with(base.robot, j) for j in first}
+    names, drive = [rows.joint for rows in judge.rows], judge.drive
+    missing = dict(zip(names, map(float, judge.missing), strict=True))
+    percent = {name: 100.0 * missing[name] / float(d) for name, d in zip(names, drive, strict=True)}
+    order = {"missing": 0, "stand_in": 1, "possible": 2, "absent": 3, "untestable": 4}
+    shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
+    scores = {label: j.score for label, j in found.items()}
+    candidates.sort(key=lambda c: (order[c.verdict], -shares.get(c.label, -2.0), -scores.get(c.label, 0.0)))
+    candidates.sort(key=lambda c: -scores[c.label] if c.verdict == "missing" else 0.0)
+    candidates.sort(key=lambda c: order[c.verdict])
+    return TorqueVerdicts(
+        candidates, refits, missing, percent, judge.unexplained, _sentence(base.robot, judge, missing, percent)
+    )
+
+
+def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
+    robot = base.robot
+    if robot.layout.motors or robot.layout.memories or len(robot.sensors) > 1 or robot.transmission is not None:
+        return None
+    if judged_by_loop(robot, base.recordings) or not comparison.judged_error > FINE:
+        return None
+    segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
+    h = float(np.median(np.diff(segments[0].signals.ticks)))
+    for band in BANDS:
+        equations = TorqueEquations.of(segments, band)
+        if any(len(np.unique(rows.times)) < 100 for rows in equations.rows):
+            return None
+        judge = TorqueJudge(equations)
+        if any(len(np.unique(blocks)) < FEWEST_BLOCKS for blocks in judge.blocks):
+            return None
+        noise = robot.free_inertias() * (2.0 * np.pi * band) ** 2 * robot.motor_encoder.sigmas * np.sqrt(2.0 * h * band)
+        if bool(np.all(noise < QUIET * judge.missing)):
+            return judge
+    return None
+
+
+def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
+    """Candidates as they are before anything is judged."""
+    reason = "it acts on readings, not on torques: where sensors are finer than the model nothing tells it from motion"
+    return [
+        Candidate(
+            effect=c.best.hypothesis.here.effect.id,
+            owner=c.best.hypothesis.here.owner,
+            score=c.plausible,
+            dof=c.best.dof,
+            p_value=c.p_value,
+            parameters={},
+            verdict="untestable",
+            reasons=(reason,),
+            look_alikes=c.look_alikes,
+            numerics=c.best.hypothesis.here.effect.card.numerics,
+        )
+        for c in scored.candidates
+    ]
+
+
+def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot: Robot) -> Candidate:
+    here = j.hypothesis.here
+    start = scored or Candidate(here.effect.id, here.owner, j.score, len(j.sizes), float("nan"), {}, "absent")
+    sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
+    parameters = {
+        p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
+    }
+    if parameters:
+        shapes = {p.name: p.unit for p in here.effect.parameters_at(robot, here.owner) if p.is_shape}
+        for name, value in j.hypothesis.shapes.items():
+            parameters[name] = EffectEstimate(
+                float(value), float("nan"), robot.unit_at(here.owner, shapes.get(name, "1"))
+            )
+    helps = (
+        f"it explains {100 * j.share:.0f} % of the squared missing torque on blocks left out, "
+        f"and helps on {j.helped} of {j.blocks}"
+    )
+    reasons: tuple[str, ...]
+    if first:
+        verdict, reasons = "missing", (helps,)
+    elif not j.refused:
+        verdict, reasons = (
+            "possible",
+            (helps, "but another one explains more of it; look again once that is in the model"),
+        )
+    elif j.net <= NET:
+        verdict, reasons = "absent", (j.refused,)
+    else:
+        stands_in = j.share > SHARE and not j.refused.startswith("there")
+        verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
+    return replace(
+        start, score=j.score, dof=len(j.sizes), parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
+    )
+
+
+def _with(robot: Robot, j: TorqueJudgement) -> Robot:
+    start = {p.name: float(v) for p, v in zip(j.hypothesis.sizes, j.sizes, strict=True)}
+    return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
+
+
+def _sentence(robot: Robot, judge: TorqueJudge, missing: Mapping[str, float], percent: Mapping[str, float]) -> str:
+    parts = []
+    for noise, (joint, value) in zip(judge.noise, missing.items(), strict=True):
+        unit = of_slide("N m") if joint in robot.tree.slides else "N m"
+        parts.append(
+            f"{value:.3g} {unit} at {joint}, {percent[joint]:.1f} % of its drive, of which a random torque of "
+            f"{noise.size:.2g} {unit} with {1e3 * noise.memory:.0f} ms of memory follows no law"
+        )
+    return "The missing torque on blocks left out is " + "; ".join(parts) + "."

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Significance and size of candidates, asked one by one: a score at the yardstick noise, and blocks left out.
+
+Every candidate is fitted beside the base parameters on three quarters of the blocks, at one noise for all; on the
+others its share is the part of the squared missing torque that went. What is significant and small is told, not added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.judging.torque_noise import Yardstick, independent, saturated, yardstick_of
+from jointscope.graphs.judging.torque_rows import TorqueEquations, TorqueRows
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+
+Array = NDArray[np.float64]
+
+BLOCK, FEWEST_BLOCKS, FOLDS = 2.0, 8, 4  # [s] at the most
+FEWEST_ROWS = 10  # of a block that counts
+NET, SHARE, COMMON = 12.0, 0.05, 0.02  # significance; share of the own equations, of all
+HELPED, HELPED_BY_COMMAND = 0.8, 0.9  # of the blocks
+HARM, CEILING = 1.5, 0.5
+ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
+GAUGE = 1e-4  # of a column's square outside the base columns
+KNOTS, SPEED_KNOTS = 8, 5
+DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
+
+
+@dataclass(frozen=True)
+class TorqueJudgement:
+    """What the missing torque says about one candidate.
+
+    Attributes:
+        hypothesis: with its best shapes.
+        net: score at the yardstick noise less what sizes and shapes cost.
+        score: the same without these costs.
+        sizes, sigmas: shape (k,).
+        share, common: of the squared missing torque on blocks left out, in its own equations and in all.
+        helped, blocks: on how many of how many blocks.
+        harm: largest ratio of missing torques on a block.
+        removed: root mean square of what it takes away, in percent of the drive.
+        refused: why it is not let in, in plain words; empty if it is.
+    """
+
+    hypothesis: EffectHypothesis
+    net: float
+    score: float
+    sizes: Array
+    sigmas: Array
+    share: float
+    common: float
+    helped: int
+    blocks: int
+    harm: float
+    removed: float
+    refused: str = ""
+
+
+class TorqueJudge:
+    """Judges hypotheses on the rows of all equations."""
+
+    def __init__(self, equations: TorqueEquations):
+        self.equations, self.rows = equations, equations.rows
+        self.blocks = [_blocks(rows) for rows in self.rows]
+        self.noise: list[Yardstick] = [yardstick_of(r, b) for r, b in zip(self.rows, self.blocks, strict=True)]
+        self.drive = np.array([_rms(r.drive) for r in self.rows])
+        self._everything = np.vstack([rows.base for rows in self.rows])
+        self.left = self._left_out(np.zeros((len(self._everything), 0)))
+        self.ceiling = self._ceiling()
+
+    @property
+    def samples(self) -> int:
+        """Rows of all equations."""
+        return len(self._everything)
+
+    @property
+    def missing(self) -> Array:
+        """Root mean square of the missing torque of each equation on blocks left out, shape (n,) [N m]."""
+        return np.sqrt([float(np.mean(r**2)) for r in self._split(self.left)])
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the squared missing torque that smooth laws would explain on blocks left out, 0 to 1."""
+        smooth = self._left_out(_stacked([independent(saturated(rows)) for rows in self.rows]))
+        return max(self._common(smooth), 0.0)
+
+    def judge(self, hypotheses: Sequence[EffectHypothesis]) -> TorqueJudgement | None:
+        """The best of hypotheses that differ in their shapes alone; None for what does not act through torques."""
+        best: tuple[float, EffectHypothesis, Array, Array, Array] | None = None
+        for hypothesis in hypotheses:
+            columns = self.equations.columns(hypothesis)
+            if columns is None:
+                return None
+            C = np.vstack(columns)
+            found = self._score(C, hypothesis)
+            if best is None or found[0] > best[0]:
+                best = (found[0], hypothesis, found[1], found[2], C)
+        assert best is not None
+        score, hypothesis, sizes, sigmas, C = best
+        net = score - C.shape[1] * np.log(self.samples) - 2.0 * np.log(len(hypotheses))
+        return self._judged(hypothesis, score, float(net), sizes, sigmas, C)
+
+    def _judged(
+        self, hypothesis: EffectHypothesis, score: float, net: float, sizes: Array, sigmas: Array, C: Array
+    ) -> TorqueJudgement:
+        if score <= 0.0:
+            text = "the base parameters imitate it, or the data want the impossible sign"
+            return TorqueJudgement(hypothesis, net, 0.0, sizes, sigmas, 0.0, 0.0, 0, 0, 1.0, 0.0, text)
+        left, own = self._left_out(C), self._own(C)
+        before, after, ratios = 0.0, 0.0, []
+        for j, (r0, r1) in enumerate(zip(self._split(self.left), self._split(left), strict=True)):
+            if not own[j]:
+                continue
+            before, after = before + float(r0 @ r0) / self.drive[j] ** 2, after + float(r1 @ r1) / self.drive[j] ** 2
+            ratios.append(_by_block(r0, r1, self.blocks[j]))
+        pairs = np.vstack(ratios)
+        floor = 0.25 * float(np.median(pairs[:, 0]))
+        helped, harm = (
+            int(np.sum(pairs[:, 1] < pairs[:, 0])),
+            float(np.max(pairs[:, 1] / np.maximum(pairs[:, 0], floor))),
+        )
+        rows = sum(len(r) for r, yes in zip(self._split(self.left), own, strict=True) if yes)
+        removed = 100.0 * float(np.sqrt(max(before - after, 0.0) / rows))
+        found = TorqueJudgement(
+            hypothesis,
+            net,
+            score,
+            sizes,
+            sigmas,
+            1.0 - after / before,
+            self._common(left),
+            helped,
+            len(pairs),
+            harm,
+            removed,
+        )
+        return TorqueJudgement(**{**found.__dict__, "refused": self._refusal(found)})
+
+    def _refusal(self, found: TorqueJudgement) -> str:
+        needed = HELPED_BY_COMMAND if found.hypothesis.here.effect.id in DRIVEN else HELPED
+        if found.net <= NET:
+            return "it would explain no more than chance beside disturbances with a memory"
+        if found.share <= SHARE or found.common <= COMMON or found.removed <= 100.0 * ABSOLUTE:
+            return f"there, but small: {100 * max(found.share, 0.0):.1f} % of the squared missing torque"
+        if found.helped < needed * found.blocks:
+            return f"it helps on {found.helped} of {found.blocks} blocks left out"
+        if found.harm > HARM:
+            return f"on one block left out it makes the missing torque {found.harm:.1f} times larger"
+        if found.share < CEILING * self.ceiling:
+            return (
+                "a free curve over position or speed explains more than twice as much: it stands in for something else"
+            )
+        return ""
+
+    def _score(self, C: Array, hypothesis: EffectHypothesis) -> tuple[float, Array, Array]:
+        """Score, sizes and their sigmas beside the base parameters; score 0 for gauges and impossible signs."""
+        k, none = C.shape[1], (0.0, np.zeros(C.shape[1]), np.full(C.shape[1], np.inf))
+        X, Z, y = self._white(self._everything), self._white(C), self._white(self._target)[:, 0]
+        Q, _ = np.linalg.qr(independent(X)) if X.shape[1] else (np.zeros((len(X), 0)), None)
+        rest, r = Z - Q @ (Q.T @ Z), y - Q @ (Q.T @ y)
+        if np.any(np.sum(rest**2, axis=0) <= GAUGE * np.sum(Z**2, axis=0)):
+            return none
+        S = rest.T @ rest + np.diag([1.0 / p.prior_sigma**2 for p in hypothesis.sizes])
+        s = rest.T @ r
+        covariance = np.linalg.pinv(S, hermitian=True)
+        sizes = covariance @ s
+        possible = all(size >= 0.0 for size, p in zip(sizes, hypothesis.sizes, strict=True) if p.sign == "+")
+        # no effect is larger than the drive that overcomes it
+        acts = [_rms(part @ sizes) for part in self._split(C)]
+        if not possible or k == 0 or np.any(np.array(acts) > self.drive):
+            return none
+        return float(s @ sizes), sizes, np.sqrt(np.diag(covariance))
+
+    def _left_out(self, C: Array) -> Array:
+        """Missing torque with base parameters and columns fitted on the other folds, shape (m,)."""
+        X = np.hstack([independent(self._everything), C])
+        Xw, yw, folds = (
+            self._white(X),
+            self._white(self._target)[:, 0],
+            np.concatenate([b % FOLDS for b in self.blocks]),
+        )
+        left = np.empty(len(X))
+        for fold in range(FOLDS):
+            fit, judged = folds != fold, folds == fold
+            beta = np.linalg.lstsq(Xw[fit], yw[fit], rcond=1e-10)[0]
+            left[judged] = self._target[judged, 0] - X[judged] @ beta
+        return left
+
+    def _white(self, values: Array) -> Array:
+        found = np.empty_like(values)
+        start = 0
+        for rows, blocks, noise in zip(self.rows, self.blocks, self.noise, strict=True):
+            for block in np.unique(blocks):
+                own = np.flatnonzero(blocks == block)
+                found[start + own] = noise.whitened(rows.times[own], values[start + own])
+            start += len(blocks)
+        return found
+
+    @property
+    def _target(self) -> Array:
+        return np.concatenate([rows.missing for rows in self.rows])[:, None]
+
+    def _split(self, values: Array) -> list[Array]:
+        return np.split(values, np.cumsum([len(rows.times) for rows in self.rows])[:-1])
+
+    def _own(self, C: Array) -> list[bool]:
+        return [bool(np.any(part)) for part in self._split(C)]
+
+    def _common(self, left: Array) -> float:
+        def weighed(parts: list[Array]) -> float:
+            return float(sum(np.mean(p**2) / d**2 for p, d in zip(parts, self.drive, strict=True)))
+
+        return 1.0 - weighed(self._split(left)) / weighed(self._split(self.left))
+
+    def _ceiling(self) -> float:
+        """Share that free curves over position or over speed explain on blocks left out; 0 where they run away."""
+        curves = ([_hats(r.q, KNOTS) for r in self.rows], [_over_speed(r.v) for r in self.rows])
+        return max(0.0, *(self._common(self._left_out(_stacked(c))) for c in curves))
+
+
+def _blocks(rows: TorqueRows) -> NDArray[np.intp]:
+    """Block of each row, from 0 on, those with few rows joined to the one before, shape (m,)."""
+    told = float(np.sum(np.minimum(np.diff(rows.times), 1.0))) if len(rows.times) else 0.0
+    length = min(BLOCK, max(told, 1e-3) / 10.0)
+    raw = ((rows.times - rows.times[0]) / length).astype(int)
+    found, now, count = np.zeros(len(raw), np.intp), 0, 0
+    for i in range(len(raw)):
+        if i and raw[i] != raw[i - 1] and count >= FEWEST_ROWS:
+            now, count = now + 1, 0
+        found[i], count = now, count + 1
+    return found
+
+
+def _by_block(before: Array, after: Array, blocks: NDArray[np.intp]) -> Array:
+    return np.array([[_rms(before[blocks == b]), _rms(after[blocks == b])] for b in np.unique(blocks)])
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _hats(x: Array, knots: int) -> Array:
+    """Linear interpolation between knots at quantiles, shape (m, knots)."""
+    at = np.unique(np.quantile(x, np.linspace(0.0, 1.0, knots)))
+    return np.column_stack([np.interp(x, at, unit) for unit in np.eye(len(at))])
+
+
+def _over_speed(v: Array) -> Array:
+    parts = [np.where((v > 0.0) == forward, 1.0, 0.0) for forward in (True, False)]
+    return np.hstack([part[:, None] * _hats(np.sqrt(np.abs(v)), SPEED_KNOTS) for part in parts])
+
+
+def _stacked(columns: Sequence[Array]) -> Array:
+    """Columns of their own for every equation, shape (m of all, k of all)."""
+    total, start = np.zeros((sum(len(c) for c in columns), sum(c.shape[1] for c in columns))), [0, 0]
+    for c in columns:
+        total[start[0] : start[0] + len(c), start[1] : start[1] + c.shape[1]] = c
+        start = [start[0] + len(c), start[1] + c.shape[1]]
+    return total

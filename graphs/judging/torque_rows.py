@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The equations of motion as rows of torques: what is missing, and what parameters and candidates would add to it.
+
+The defect of every step, stated as a torque, is averaged with a Hann window one period of the band wide and thinned.
+Rows whose window touches a standstill, a left-out stretch or the end of a recording are dropped: the window is finite,
+so nothing of these leaks into the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS
+from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.graphs.problem.standstill import near, slowest_speed
+from jointscope.graphs.scoring.columns.column import Column
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_system import Segment, rows_of
+
+Array = NDArray[np.float64]
+
+PER_WINDOW = 4  # rows per period of the band
+
+
+@dataclass(frozen=True)
+class TorqueRows:
+    """Rows of one equation, of all recordings one after the other.
+
+    Attributes:
+        joint: whose equation.
+        times: shape (m,) [s], each recording far from the one before.
+        missing: what the model lacks, shape (m,) [N m].
+        base: what it changes by with the base parameters, shape (m, p).
+        drive: torque of the drive without friction, shape (m,) [N m].
+        q, v: motion, shape (m,) [rad], [rad/s].
+        slowest: speed below which nothing is told [rad/s].
+    """
+
+    joint: str
+    times: Array
+    missing: Array
+    base: Array
+    drive: Array
+    q: Array
+    v: Array
+    slowest: float
+
+
+@dataclass(frozen=True)
+class Window:
+    """How steps of one segment become rows of one equation.
+
+    Attributes:
+        weights: of the Hann window, summing to one.
+        kept: middle step of every row.
+    """
+
+    weights: Array
+    kept: NDArray[np.intp]
+
+    def averaged(self, values: Array) -> Array:
+        """Rows from steps, shape (m, ...) to (rows, ...)."""
+        half = len(self.weights) // 2
+        return np.asarray(
+            sum(w * values[self.kept + i - half] for i, w in enumerate(self.weights)), dtype=np.float64
+        ).reshape(len(self.kept), *values.shape[1:])
+
+
+@dataclass(frozen=True)
+class TorqueEquations:
+    """All equations of all segments.
+
+    Attributes:
+        segments: linearised pieces of the recordings.
+        windows: by segment, by equation.
+        rows: one entry for each joint.
+    """
+
+    segments: Sequence[Segment]
+    windows: list[list[Window]]
+    rows: list[TorqueRows]
+
+    @staticmethod
+    def of(segments: Sequence[Segment], band: float) -> TorqueEquations:
+        """From segments of a robot whose joints are all rigid.
+
+        Args:
+            segments: linearised at the base model's solution.
+            band: frequency at which the window lets half of the amplitude pass [Hz].
+        """
+        robot = segments[0].problem.robot
+        windows = [[_window(s, j, band) for j in range(robot.n)] for s in segments]
+        driven = [
+            _steps(s, [Column(in_steps=np.einsum("krn,kn->kr", s.signals.response, s.signals.u))]) for s in segments
+        ]
+        found, start = [], np.cumsum([0.0, *(float(np.ptp(s.signals.ticks)) + 10.0 for s in segments)])
+        for j, joint in enumerate(robot.joints):
+            parts = []
+            for i, s in enumerate(segments):
+                window, x, layout = windows[i][j], s.signals.x, s.signals.model.layout
+                row, (missing, base, drive) = int(layout.joint_link[j]), driven[i]
+                parts.append(
+                    (
+                        start[i] + s.signals.ticks[window.kept] - s.signals.ticks[0],
+                        window.averaged(missing[:, row]),
+                        window.averaged(base[:, row]),
+                        window.averaged(drive[:, row, 0]),
+                        x[window.kept, layout.joint_q[j]],
+                        x[window.kept, layout.joint_v[j]],
+                    )
+                )
+            times, missing, base, drive, q, v = (np.concatenate(c) for c in zip(*parts, strict=True))
+            slowest = max(_slowest(s, j) for s in segments)
+            found.append(TorqueRows(joint, times, missing, base, drive, q, v, slowest))
+        return TorqueEquations(segments, windows, found)
+
+    def columns(self, hypothesis: EffectHypothesis) -> list[Array] | None:
+        """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for readings."""
+        by_segment = []
+        for s in self.segments:
+            columns = columns_of(hypothesis, s.signals)
+            if not columns or any(c.at_ticks is None and c.in_steps is None for c in columns):
+                return None
+            by_segment.append(_steps(s, columns)[2])
+        layout = self.segments[0].signals.model.layout
+        return [
+            np.concatenate(
+                [w[j].averaged(c[:, int(layout.joint_link[j])]) for w, c in zip(self.windows, by_segment, strict=True)]
+            )
+            for j in range(len(self.rows))
+        ]
+
+
+def _steps(segment: Segment, columns: Sequence[Column]) -> tuple[Array, Array, Array]:
+    """Missing torque, shape (m, r), and what base parameters and columns add, shape (m, r, p) and (m, r, k)."""
+    robot, r = segment.problem.robot, len(segment.signals.model.layout.velocities)
+    alone = robot.free_inertias()[None, :]
+    missing, base, by_size = [], [], []
+    dynamics = [f for f, _, _ in segment.linearized if isinstance(f, DynamicsFactor)]
+    # the first rows come from the dynamics, in the order of their pieces
+    for factor, part in zip(dynamics, rows_of(segment, columns), strict=False):
+        scale = np.broadcast_to(factor.sigmas, part.residual.shape)[:, :r] * alone / factor.steps.h[:, None]
+        missing.append(part.residual[:, :r] * scale)
+        base.append(-part.by_block[DYNAMICS][:, :r] * scale[:, :, None])
+        by_size.append(-part.by_size[:, :r] * scale[:, :, None])
+    return np.concatenate(missing), np.concatenate(base), np.concatenate(by_size)
+
+
+def _slowest(segment: Segment, j: int) -> float:
+    signals = segment.signals
+    v = signals.x[:, signals.model.layout.joint_v[j]]
+    return slowest_speed(v, signals.robot.sharpness_of(signals.robot.joints[j]))
+
+
+def _window(segment: Segment, j: int, band: float) -> Window:
+    signals, problem = segment.signals, segment.problem
+    h = float(np.median(np.diff(signals.ticks)))
+    half = max(round(0.5 / (band * h)), 1)
+    weights = np.hanning(2 * half + 3)[1:-1]
+    v = signals.x[:-1, signals.model.layout.joint_v[j]]
+    ticks = signals.ticks
+    wrong = (np.abs(v) < _slowest(segment, j)) | (np.diff(ticks) > 1.5 * h)
+    wrong |= ~problem.recording.are_judged(ticks[1:], problem.timeline.h)
+    wrong |= np.r_[False, v[1:] * v[:-1] < 0.0]
+    good = ~near(wrong, half)
+    good[: half + 1] = good[len(good) - half - 1 :] = False
+    every = max(2 * half // PER_WINDOW, 1)
+    kept = np.flatnonzero(good & (np.arange(len(good)) % every == 0))
+    return Window(weights / weights.sum(), kept)
