@@ -65,7 +65,7 @@ class BaseModel:
             recordings: training recordings.
             start: a model of the same recordings whose values are near; nothing is guessed anew.
         """
-        full = with_full_gyros(robot).without_accelerometers()
+        full = with_full_gyros(robot)
         near = [calibration for calibration in start.calibrations] if start is not None else None
         result = calibrate(full, recordings, near=near)
         return BaseModel(

@@ -123,11 +123,10 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     """Smoothed states and biases of a recording under a model whose parameters stay as they are.
 
     All three components of every gyro are predicted from the state, also where the robot calibrates with the forms of
-    the paper. A robot that was never calibrated gets process noise from the recording. Accelerometers are not asked:
-    what is compared are predictions of states.
+    the paper. A robot that was never calibrated gets process noise from the recording.
     """
     check_recordings(robot, [recording], every_joint=False)
-    robot = with_full_gyros(with_known_drive_signal(robot, [recording]).without_accelerometers())
+    robot = with_full_gyros(with_known_drive_signal(robot, [recording]))
     sigmas = [parameter.sigma for parameter in robot.parameters.values()]
     calibrated = "calibration" in robot.document or any(sigma is not None for sigma in sigmas)
     if robot.noise.estimate and not calibrated:

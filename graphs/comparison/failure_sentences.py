@@ -17,7 +17,7 @@ from jointscope.graphs.calibration.motion_regimes import AROUND_REVERSAL, NEAR, 
 from jointscope.graphs.comparison.channel_errors import ChannelErrors
 from jointscope.graphs.comparison.error_concentration import EVERYWHERE, Concentration, shares
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Gyro
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder
 
 NEAR_FLOOR = 1.2  # times the floor; a channel below has nothing to say
 ALMOST_NONE = 0.25  # of the error; a model that predicts less predicts almost nothing
@@ -26,6 +26,12 @@ ALIKE = 3.0  # largest ratio of errors over their floors that share a sentence
 SAME_MOTION = 0.7  # of a channel's own concentration that it must have in the motion of the channel it joins
 STRONG = 0.5  # correlation that is worth telling
 COLOURED = 1e-3  # p-value below which errors are called coloured
+KINDS: Mapping[type, str] = {
+    Gyro: "Gyro",
+    Accelerometer: "Accelerometer",
+    MotorEncoder: "The motor encoder of",
+    LinkEncoder: "The link encoder of",
+}
 
 
 @dataclass(frozen=True)
@@ -105,10 +111,12 @@ def _size(group: Sequence[Finding], robot: Robot) -> str:
     sizes = _listed([f"{e.rms:.2g}" for e in errors])
     highest = f"up to {abs(worst.error[peak]):.2g} at {worst.times[peak]:.2f} s"
     allowed = f"where noise and state uncertainty allow {_listed([f'{e.floor:.2g}' for e in errors])} {unit}"
-    gyro = isinstance(robot.sensors[errors[0].sensor], Gyro)
-    labels = _listed([e.channel.rsplit(".", 1)[1] if gyro else e.channel.rsplit(".", 1)[0] for e in errors])
-    axes = f" about its {labels} {'axes' if len(errors) > 1 else 'axis'}" if gyro else ""
-    name = f"Gyro {errors[0].sensor}" if gyro else f"The motor encoder of {labels}"
+    sensor = robot.sensors[errors[0].sensor]
+    of_axes = isinstance(sensor, Gyro | Accelerometer)
+    labels = _listed([e.channel.rsplit(".", 1)[1] if of_axes else e.channel.rsplit(".", 1)[0] for e in errors])
+    way = "along" if isinstance(sensor, Accelerometer) else "about"
+    axes = f" {way} its {labels} {'axes' if len(errors) > 1 else 'axis'}" if of_axes else ""
+    name = f"{KINDS[type(sensor)]} {errors[0].sensor if of_axes else labels}"
     if group[0].unpredicted:
         little = max(e.predicted_rms for e in errors)
         return (
@@ -117,7 +125,7 @@ def _size(group: Sequence[Finding], robot: Robot) -> str:
         )
     parts = [e.rms / float(np.std(e.predicted + e.error)) for e in errors]
     of_it = f" ({_listed([f'{100 * part:.0f}' for part in parts])} % of the motion that it measures there)"
-    axes += of_it if gyro and min(parts) > A_LOT else ""
+    axes += of_it if of_axes and min(parts) > A_LOT else ""
     return f"{name} differs by {sizes} {unit} (rms, {highest}) from the prediction 0.1 s ahead{axes}, {allowed}"
 
 

@@ -18,6 +18,7 @@ from jointscope.graphs.noise.white_noise import separate_noise
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.sensor_placement import factor_on_state
 from jointscope.robots.errors import SolveError
+from jointscope.robots.parts.sensors import Accelerometer
 
 Array = NDArray[np.float64]
 
@@ -70,7 +71,7 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
     P = filtered.covariance[start]
     for i in range(min(steps, len(x) - 2)):
         P = _advance(quiet, x, calibration, start + i, P)
-    floors = np.sqrt(np.mean(_channel_variances(quiet, x[start + steps], calibration, P), axis=0))
+    floors = np.sqrt(np.mean(_channel_variances(quiet, x, calibration, start + steps, P), axis=0))
     return dict(zip(problem.robot.channels, map(float, floors), strict=True))
 
 
@@ -84,11 +85,28 @@ def _advance(problem: BagProblem, x: Array, calibration: Calibration, ticks: NDA
     return F @ P @ F.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)
 
 
-def _channel_variances(problem: BagProblem, x: Array, calibration: Calibration, P: Array) -> Array:
+def _channel_variances(
+    problem: BagProblem, x: Array, calibration: Calibration, ticks: NDArray[np.intp], P: Array
+) -> Array:
     """Expected squared error of every channel in sigmas, shape (s, c)."""
+    robot, x, d = problem.robot, x[ticks], x.shape[1]
+    with_a, a_by_state = _with_accelerations(problem, x, calibration, ticks) if robot.accelerometers else (x, x)
     found = []
-    for name, sensor in problem.robot.sensors.items():
-        factor = factor_on_state(problem.robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
-        J = factor.linearize((x,), calibration).by_state[0] / sensor.sigmas[:, None]
+    for name, sensor in robot.sensors.items():
+        factor = factor_on_state(robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
+        feels = isinstance(sensor, Accelerometer)
+        J = factor.linearize((with_a if feels else x,), calibration).by_state[0] / sensor.sigmas[:, None]
+        if feels:
+            J = J[:, :, :d] + J[:, :, d:] @ a_by_state
         found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
     return np.hstack(found)
+
+
+def _with_accelerations(
+    problem: BagProblem, x: Array, calibration: Calibration, ticks: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """States with link accelerations behind them, and the derivatives of these by the states, (s, n_link, d)."""
+    model, parameters = problem.dynamics.model, calibration.values
+    u = problem.dynamics.select(ticks).command(parameters)
+    found, n = model.with_derivatives(x, u, parameters), model.layout.n_link
+    return np.hstack([x, found.value[:, :n]]), found.by_state[:, :n]

@@ -61,6 +61,17 @@ class Predictor:
                     after[some] = _advanced(rate, x[some], first[some], h[some], count)
             return after
 
+    def with_accelerations(self, x: Array, step: NDArray[np.intp]) -> Array:
+        """States with the link accelerations that the equations of motion give behind them, shape (s, d + n_link).
+
+        Args:
+            x: states, shape (s, d).
+            step: step whose command acts, shape (s,).
+        """
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            rates = self._model.rates(x, self._torque[step])
+        return np.hstack([x, rates[:, self._model.layout.v_link]])
+
     def paths(self, x: Array, start: NDArray[np.intp], steps: int) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
         """Steps, states before and after each of them, until `steps` are done or the recording ends.
 

@@ -2,6 +2,7 @@
 """What every sensor would read if the model ran on from a state, with the commands alone.
 
 Predictions ahead start from causal states, which use data up to their start only. Open loop starts from one state.
+Accelerometers read what the equations of motion say at the predicted state, not differences of predicted velocities.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from jointscope.graphs.comparison.noise_floor import are_judged, settled_from
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Accelerometer
 
 Array = NDArray[np.float64]
 
@@ -51,11 +54,24 @@ class _Group:
         sensor: name.
         channels: indices of the channels.
         taken: when the samples were really taken, shape (m,) [s].
+        accelerated: whether it feels the accelerations of the links, too.
     """
 
     sensor: str
     channels: NDArray[np.intp]
     taken: Array
+    accelerated: bool
+
+    def steps(self, timeline: Timeline, times: Array) -> NDArray[np.intp]:
+        """Steps in which samples at these times were taken."""
+        return (timeline.locate_ending(times) if self.accelerated else timeline.locate(times))[0]
+
+    def at(
+        self, problem: BagProblem, predictor: Predictor, step: NDArray[np.intp], times: Array, ends: tuple[Array, Array]
+    ) -> Array:
+        """What its factor asks for: states between two ticks, with accelerations behind them where it feels them."""
+        x = _between(problem, step, times, *ends)
+        return predictor.with_accelerations(x, step) if self.accelerated else x
 
 
 def predict_ahead(
@@ -79,13 +95,14 @@ def predict_ahead(
     judged = are_judged(problem, start, horizon)
     wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
     taken = [g.taken[wanted[g.sensor][0]] for g in groups]
-    steps = [timeline.locate(times)[0] for times in taken]
-    found = [np.full((len(start), causal.mean.shape[1]), np.nan) for _ in groups]
+    steps = [g.steps(timeline, times) for g, times in zip(groups, taken, strict=True)]
+    d = causal.mean.shape[1]
+    found = [np.full((len(start), d + g.accelerated * problem.robot.layout.n_link), np.nan) for g in groups]
     for step, before, after in predictor.paths(causal.mean[start], start, longest):
-        for states, times, ends in zip(found, taken, steps, strict=True):
+        for group, states, times, ends in zip(groups, found, taken, steps, strict=True):
             here = ends == step
             if np.any(here):
-                states[here] = _between(problem, step[here], times[here], before[here], after[here])
+                states[here] = group.at(problem, predictor, step[here], times[here], (before[here], after[here]))
     result = {}
     for name, (sample, near) in wanted.items():
         own = [(g, states) for g, states in zip(groups, found, strict=True) if g.sensor == name]
@@ -96,17 +113,18 @@ def predict_ahead(
         for group, states in own:
             all_channels = predict_sensor(problem.robot, name, states[good], calibration, stamps)
             predicted[:, group.channels] = all_channels[:, group.channels]
-        result[name] = Ahead(sample[good], predicted, own[0][1][good])
+        result[name] = Ahead(sample[good], predicted, own[0][1][good, :d])
     return result
 
 
 def _groups(problem: BagProblem) -> list[_Group]:
     """All channels of all sensors, by when they were sampled."""
     found = []
-    for name in problem.robot.sensors:
+    for name, sensor in problem.robot.sensors.items():
         stamps = problem.recording.streams[name].times
         for channels, late in late_channels(problem.robot, name):
-            found.append(_Group(name, channels, stamps - Lateness.of(problem.robot, late, stamps).anchor))
+            taken = stamps - Lateness.of(problem.robot, late, stamps).anchor
+            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer)))
     return found
 
 
@@ -133,7 +151,10 @@ def _between(problem: BagProblem, step: NDArray[np.intp], times: Array, before: 
 
 
 def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration, stamps: Array) -> Array:
-    """What a sensor would read at states of shape (s, d) with these stamps, shape (s,) [s]; shape (s, c)."""
+    """What a sensor would read at these states with these stamps, shape (s,) [s]; shape (s, c).
+
+    States have shape (s, d); for an accelerometer with link accelerations behind them, (s, d + n_link).
+    """
     nothing = np.zeros((len(x), len(robot.sensors[name].channels)))
     return factor_on_state(robot, name, nothing, stamps).residual((x,), calibration)
 
@@ -152,8 +173,8 @@ def predict_open_loop(
     found = {name: np.full(streams[name].values.shape, np.nan) for name in problem.robot.sensors}
     for group in _groups(problem):
         inside = (group.taken >= ticks[0]) & (group.taken <= ticks[-1])
-        step, _ = problem.timeline.locate(group.taken[inside])
-        x = _between(problem, step, group.taken[inside], path[step], path[step + 1])
+        step = group.steps(problem.timeline, group.taken[inside])
+        x = group.at(problem, predictor, step, group.taken[inside], (path[step], path[step + 1]))
         stamps = streams[group.sensor].times[inside]
         with np.errstate(invalid="ignore", over="ignore"):
             predicted = predict_sensor(problem.robot, group.sensor, x, calibration, stamps)

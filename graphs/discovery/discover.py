@@ -90,7 +90,7 @@ class _Search:
         for saved in resume:
             self._restore(saved)
         self.report("calibrating the base model", 0.0)
-        start = self.steps[-1].robot if self.steps else with_full_gyros(robot).without_accelerometers()
+        start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
         base = BaseModel.of(start, self.recordings)
         if not self.steps:
             self._add_step(None, None, base, "The base model.", self._training_errors(base))

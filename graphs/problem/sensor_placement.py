@@ -101,12 +101,9 @@ def _place_on_time(
 
 
 def _place_accelerometer(robot: Robot, recording: Recording, timeline: Timeline, name: str, stream: Stream) -> Placed:
-    """A sample at a tick belongs to the step before it, whose command has acted until then."""
-    ticks = timeline.ticks
-    step = np.clip(np.searchsorted(ticks, stream.times, side="left") - 1, 0, len(ticks) - 2)
-    h = timeline.h[step]
+    step, fraction = timeline.locate_ending(stream.times)
     inner = _sensor_factor(robot, recording, name, stream, np.ones(len(stream), bool))
-    return Placed(AcceleratedFactor(inner, (stream.times - ticks[step]) / h, h, robot.layout), step, stream.times)
+    return Placed(AcceleratedFactor(inner, fraction, timeline.h[step], robot.layout), step, stream.times)
 
 
 def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:

@@ -82,6 +82,11 @@ class Timeline:
         step = np.clip(np.searchsorted(self.ticks, times, side="right") - 1, 0, len(self.ticks) - 2)
         return step, (times - self.ticks[step]) / self.h[step]
 
+    def locate_ending(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+        """As `locate`, but a time at a tick belongs to the step before it, whose command has acted until then."""
+        step = np.clip(np.searchsorted(self.ticks, times, side="left") - 1, 0, len(self.ticks) - 2)
+        return step, (times - self.ticks[step]) / self.h[step]
+
 
 def _means(command: Stream, ticks: Array) -> Array:
     """Mean of a signal that is linear between samples over each step, shape (m, n); the last value goes on."""

@@ -20,6 +20,8 @@ from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.solving.normal_equations import states_of
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.sensors import Accelerometer
 from jointscope.robots.recordings.recording import Recording, Stream
 
 READY = load_robot("doggy")
@@ -42,11 +44,23 @@ def with_a_soft_bearing():
     return add_effect(DOGGY, "bearing_flexibility@joint1")
 
 
+def with_an_accelerometer():
+    """Beside its last gyro, some centimetres from the link's frame, feeling gravity."""
+    source = replace(DOGGY.sensors["imu2"].source, field="linear_acceleration", unit="m/s^2")
+    sensor = Accelerometer("acc", source, "imu2", 0.02, np.zeros(3), 0.5, gravity=np.array([0.0, 0.0, -9.81]))
+    place = {
+        name: Parameter(name, p, "m", p, 0.1, positive=False, published=p)
+        for name, p in zip(sensor.lever, (0.05, -0.03, 0.08), strict=True)
+    }
+    return replace(DOGGY, sensors={**DOGGY.sensors, "acc": sensor}, parameters={**DOGGY.parameters, **place})
+
+
 ROBOTS = {
     "doggy": DOGGY,
     "without Coriolis terms": without_coriolis(),
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
+    "accelerometer": with_an_accelerometer(),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of a soft bearing, by its compliance: a tilt rings, gyros see its rate, the joints its inertia.
+"""Columns of a soft bearing, by its compliance: a tilt rings, sensors see its motion, the joints its inertia.
 
-Only the ringing depends on the resonance that is tried; the rest is worked out once for each bearing.
+Gyros see its rate, accelerometers its acceleration and how gravity turns. Only the ringing depends on the
+resonance that is tried; the rest is worked out once for each bearing.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from scipy.signal import bilinear, lfilter
 from jointscope.graphs.scoring.columns.column import Column, SensorColumn, SensorPart
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.bodies.body_accelerations import specific_force
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 
 Array = NDArray[np.float64]
@@ -28,16 +31,17 @@ class _Hinge:
     Attributes:
         reaction: torque that the bearing carries about it, shape (m + 1,) [N m].
         coupling: rows of the mass matrix between the links and it, shape (m + 1, n_link) [kg m2].
-        seen: what every gyro sees of a tilt and of its speed, by name, shape (m + 1, 3) each.
+        seen: what every gyro and accelerometer sees of a tilt, of its speed and of its acceleration, by name, shape
+            (m + 1, 3) each.
     """
 
     reaction: Array
     coupling: Array
-    seen: Mapping[str, tuple[Array, Array]]
+    seen: Mapping[str, tuple[Array, Array, Array]]
 
 
 def bearing_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
-    """One column for the compliance of each hinge: accelerations and what gyros see."""
+    """One column for the compliance of each hinge: accelerations and what sensors see."""
     hinges = s.shared.get(hypothesis.label)
     if hinges is None:
         hinges = s.shared[hypothesis.label] = _hinges(hypothesis.here.owner, s)
@@ -46,10 +50,15 @@ def bearing_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Colum
     for hinge in hinges:
         tilt = -_resonance(hinge.reaction, s.ticks, omega, ratio)
         speed = np.gradient(tilt, s.ticks)
+        rise = np.gradient(speed, s.ticks)
         tau = np.zeros((len(s.ticks), s.model.layout.n_rates))
-        tau[:, :n] = -hinge.coupling * np.gradient(speed, s.ticks)[:, None]
-        rates = {name: by_q * tilt[:, None] + by_v * speed[:, None] for name, (by_q, by_v) in hinge.seen.items()}
-        found.append(Column(at_ticks=s.accelerations(tau), reading=_interpolated(rates, s.ticks)))
+        tau[:, :n] = -hinge.coupling * rise[:, None]
+        motion = (tilt, speed, rise)
+        seen = {
+            name: np.sum([by * part[:, None] for by, part in zip(slopes, motion, strict=True)], axis=0)
+            for name, slopes in hinge.seen.items()
+        }
+        found.append(Column(at_ticks=s.accelerations(tau), reading=_interpolated(seen, s.ticks)))
     return found
 
 
@@ -62,14 +71,26 @@ def _hinges(owner: str, s: ScoreSignals) -> list[_Hinge]:
     q, v, a = (np.zeros((len(s.ticks), len(names))) for _ in range(3))
     q[:, old], v[:, old], a[:, old] = s.x[:, layout.q_link], s.x[:, layout.v_link], s.a_link
     reaction, M = tree.torque(q, v, a), tree.mass_matrix(q)
-    rates = {gyro.name: tree.body_rate(gyro.body, q, v)[1:] for gyro in s.robot.gyros}
+    # accelerometers are compared with the acceleration of the smoothed motion, not with that of the model
+    slopes = _slopes(tree, s, q, v, np.asarray(np.gradient(v, s.ticks, axis=0)))
     found = []
     for b in map(names.index, bearing_names(owner)):
-        seen = {}
-        for gyro in s.robot.gyros:
-            by_q, by_v = rates[gyro.name]
-            seen[gyro.name] = by_q[:, :, b] @ gyro.R_imu_body.T, by_v[:, :, b] @ gyro.R_imu_body.T
+        seen = {name: (by_q[:, :, b], by_v[:, :, b], by_a[:, :, b]) for name, (by_q, by_v, by_a) in slopes.items()}
         found.append(_Hinge(reaction[:, b], M[:, old, b], seen))
+    return found
+
+
+def _slopes(tree: RigidTree, s: ScoreSignals, q: Array, v: Array, a: Array) -> dict[str, tuple[Array, Array, Array]]:
+    """Derivatives of what gyros and accelerometers see by q, v and a, in their own axes, shape (m + 1, 3, n) each."""
+    found = {}
+    gyros = {gyro.name: gyro for gyro in s.robot.gyros}
+    for gyro in gyros.values():
+        _, by_q, by_v = tree.body_rate(gyro.body, q, v)
+        found[gyro.name] = gyro.R_imu_body @ by_q, gyro.R_imu_body @ by_v, np.zeros_like(by_v)
+    for sensor in s.robot.accelerometers:
+        gyro, lever, gravity = gyros[sensor.gyro], sensor.place(s.robot.parameters), s.robot.gravity_at(sensor)
+        f = specific_force(tree, gyro.body, lever, q, v, a, gravity)
+        found[sensor.name] = gyro.R_imu_body @ f.by_q, gyro.R_imu_body @ f.by_v, gyro.R_imu_body @ f.by_a
     return found
 
 

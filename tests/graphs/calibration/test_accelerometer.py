@@ -72,10 +72,10 @@ def test_springs_and_dampers_are_known_better_with_it(result, robot, made):
     assert shares["joint2.stiffness"] < 0.97 and shares["joint2.damping"] < 0.97
 
 
-def test_states_to_compare_are_smoothed_without_it(result, made):
+def test_states_to_compare_are_smoothed_with_it(result, made):
     problem, states, calibration = smooth(result.robot, made.recording)
-    assert set(problem.robot.sensors) == {"motor_encoder", "imu1", "imu2"}
-    assert not any(name.startswith("acc.") for name in calibration.names)
+    assert set(problem.robot.sensors) == {"motor_encoder", "imu1", "imu2", "acc"}
+    assert np.all(np.abs(calibration.biases["acc"] - made.truth["parameters"]["acc.bias"]) < 0.01)  # [m/s^2]
     assert len(states) == len(problem.timeline.ticks)
 
 

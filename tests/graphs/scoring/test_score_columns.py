@@ -26,6 +26,7 @@ CASES += one_hypothesis_each("without Coriolis terms", ("coriolis",))
 OTHERS = ("motor_viscous", "torque_offset", "motor_lag", "link_viscous", "gravity_imbalance", "kinematic_coupling")
 OTHERS += ("inertia_error", "gyro_scale", "gyro_delay", "encoder_delay", "encoder_eccentricity")
 CASES += one_hypothesis_each("joint 2 rigid", OTHERS)
+CASES += one_hypothesis_each("accelerometer", ("motor_viscous", "link_viscous", "payload", "gyro_delay", "gyro_scale"))
 CASES += one_hypothesis_each(
     "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
 )
