@@ -15,7 +15,8 @@ ROOMS = """
 robots robots.bodies robots.parts robots.effect_kinds robots.model robots.effects robots.dynamics robots.recordings
 robots.files robots.ready
 factors
-graphs.kernels graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns graphs.scoring
+graphs.kernels graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns
+graphs.scoring
 graphs.calibration graphs.comparison graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.tidying tools.bags.messages tools.bags

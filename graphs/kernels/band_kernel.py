@@ -4,7 +4,7 @@
     A(k) = D(k) - X(k-1) X(k-1)',   L(k) L(k)' = A(k),   X(k) = E(k) L(k)^-T
     W(k) = L(k)^-1 (W(k) - X(k-1) W(k-1))
 
-The columns of the border are the innermost loop, so that it runs over neighbours in memory. What a tick needs of the one
+The columns of the border are the innermost loop: it runs over neighbours in memory. What a tick needs of the one
 before is still in the cache, unlike with one LAPACK call after the other.
 """
 

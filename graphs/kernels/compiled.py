@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Functions that numba compiles at their first call. To be imported where something is solved, not before: it costs time.
+"""Functions that numba compiles at their first call. Import this where something is solved, not before: it costs time.
 
 The machine code is kept on disk: beside the source, or in the user's folder for caches where the source cannot be
 written (or in NUMBA_CACHE_DIR). Where neither can be written it is compiled anew in each process.
