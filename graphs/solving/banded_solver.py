@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Eliminates all states of a recording at once: banded Cholesky factorisation by LAPACK.
+"""Eliminates all states of a recording at once: a Cholesky factorisation of their band.
 
 A chain of states of size d has a Hessian of bandwidth 2d - 1. With A = L L' the shared values see the Schur complement
 
@@ -79,7 +79,14 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
     m, d, p = system.B.shape
     if m == 0:
         return Elimination(np.zeros((2 * d, 0)), np.zeros((0, p)), np.zeros(0), system.C, system.g_p, d)
-    L, info = lapack.dpbtrf(_banded(system, damping), lower=1, overwrite_ab=1)
+    from jointscope.graphs.kernels.band_kernel import factorise  # numba takes half a second to import
+
+    right = np.empty((m, d, p + 1))
+    right[:, :, :p], right[:, :, p] = system.B, system.g_x
+    columns = np.zeros((m, d, 2 * d))
+    scale = np.broadcast_to(1.0 + np.asarray(damping, dtype=float), m)
+    D, E, scale = (np.ascontiguousarray(a, dtype=float) for a in (system.D, system.E, scale))
+    info = factorise(D, E, scale, columns, right)
     if info > 0:
         tick, component = divmod(info - 1, d)
         raise SolveError(
@@ -87,26 +94,10 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
             "its Hessian is not positive definite; either no sample sees it, or the estimate ran away because "
             "the model contradicts the recording (a wrong sign, axis or unit, a sensor that stopped)"
         )
-    _check(info)
-    right = np.empty((m * d, p + 1), order="F")
-    right[:, :p] = system.B.reshape(m * d, p)
-    right[:, p] = system.g_x.ravel()
-    Ww, info = lapack.dtbtrs(L, right, uplo="L", overwrite_b=1)
-    _check(info)
-    W, w = Ww[:, :p], Ww[:, p]
-    return Elimination(L, W, w, system.C - W.T @ W, system.g_p - W.T @ w, d)
-
-
-def _banded(system: NormalEquations, damping: float | Array) -> Array:
-    """Lower band of A, column by column, shape (2d, m d)."""
-    m, d = system.g_x.shape
-    columns = np.zeros((m, d, 2 * d))
-    for b in range(d):
-        columns[:, b, : d - b] = system.D[:, b:, b]
-        columns[:-1, b, d - b : 2 * d - b] = system.E[:, :, b]
-    if np.any(damping):
-        columns[:, :, 0] *= 1.0 + np.reshape(damping, (-1, 1))
-    return columns.reshape(m * d, 2 * d).T
+    Ww = right.reshape(m * d, p + 1)
+    square = Ww.T @ Ww
+    S, s = system.C - square[:p, :p], system.g_p - square[:p, p]
+    return Elimination(columns.reshape(m * d, 2 * d).T, Ww[:, :p], Ww[:, p], S, s, d)
 
 
 def _check(info: int) -> None:
