@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Linearized = tuple[Factor, NDArray[np.intp], Linearization]
 """Some samples of a factor, the first tick of each, and their linearization."""
 
+_NONE = np.zeros(0, dtype=np.intp)
 CHUNK = 1024  # samples linearised at once: large enough for numpy, small enough for the cache
 
 
@@ -159,16 +160,18 @@ def _accumulate(
     if J:
         add_at(system.costs, ticks, squares)
     _accumulate_shared(system, r, by_block, columns)
+    if not J:
+        return
+    from jointscope.graphs.kernels.accumulation import add_products  # numba takes half a second to import
+
+    right = np.concatenate([*by_block.values(), r[:, :, None]], axis=2)
+    places = np.concatenate([np.arange(columns[b].start, columns[b].stop) for b in by_block] + [_NONE])
     for i, J_i in enumerate(J):
-        transposed = J_i.transpose(0, 2, 1)
-        square, gradient = transposed @ J_i, (transposed @ r[:, :, None])[:, :, 0]
-        add_at(system.D, ticks + i, square)
-        add_at(system.g_x, ticks + i, gradient)
-        if len(J) == 2 and i == 0 and system.D_next is not None and system.g_next is not None:
-            add_at(system.D_next, ticks, square)
-            add_at(system.g_next, ticks, gradient)
-        for block, P in by_block.items():
-            add_at(system.B[:, :, columns[block]], ticks + i, transposed @ P)
+        add_products(np.ascontiguousarray(J_i), right, system.D, system.B, system.g_x, ticks + i, places)
+    if len(J) == 2 and system.D_next is not None and system.g_next is not None:
+        transposed = J[0].transpose(0, 2, 1)
+        add_at(system.D_next, ticks, transposed @ J[0])
+        add_at(system.g_next, ticks, (transposed @ r[:, :, None])[:, :, 0])
     if len(J) == 2:
         add_at(system.E, ticks, J[1].transpose(0, 2, 1) @ J[0])
 
