@@ -51,10 +51,14 @@ def _explains(c: Candidate, d: Diagnosis) -> str:
     values = ", ".join(
         f"{name} {p.value:.4g} +- {p.sigma:.2g} {p.unit}".removesuffix(" 1") for name, p in c.parameters.items()
     )
-    text = (
-        f"{title(c)} explains {100 * c.share:.0f} % of the squared error above the floor on validation blocks "
-        f"({d.validation_error:.3g} to {c.validation_error:.3g} sigma){': ' if values else ''}{values}."
-    )
+    sizes = f": {values}" if values else ""
+    if d.missing_torque_percent is not None:
+        text = f"{title(c)} explains {100 * c.share:.0f} % of the squared missing torque on blocks left out{sizes}."
+    else:
+        text = (
+            f"{title(c)} explains {100 * c.share:.0f} % of the squared error above the floor on validation blocks "
+            f"({d.validation_error:.3g} to {c.validation_error:.3g} sigma){sizes}."
+        )
     if c.heldout_error == c.heldout_error:
         text += f" On the held-out recording the error goes from {d.error:.3g} to {c.heldout_error:.3g} sigma."
     if c.look_alikes:
