@@ -139,7 +139,11 @@ class TorqueEquations:
 def _steps(segment: Segment, columns: Sequence[Column]) -> tuple[Array, Array, Array]:
     """Missing torque, shape (m, r), and what base parameters and columns add, shape (m, r, p) and (m, r, k)."""
     robot, r = segment.problem.robot, len(segment.signals.model.layout.velocities)
-    alone = robot.free_inertias()[None, :]
+    # rows weigh the links alone; what a rigid joint moves is its motor, too
+    alone = robot.free_inertias()[None, :].copy()
+    for j, joint in enumerate(robot.joints):
+        if joint not in robot.tree.massless:
+            alone[0, int(segment.signals.model.layout.joint_link[j])] += segment.signals.inertia[j]
     missing, base, by_size = [], [], []
     dynamics = [f for f, _, _ in segment.linearized if isinstance(f, DynamicsFactor)]
     # the first rows come from the dynamics, in the order of their pieces
