@@ -21,6 +21,8 @@ EXPLAINED = 0.99  # of the mean square of the driving torque, below which the mo
 def regressed_values(robot: Robot, recordings: Sequence[Recording]) -> dict[str, Value]:
     """Values with sigmas by the name of the parameter; empty where regression does not apply.
 
+    Where commands are torques "J.torque_constant" says how many N m one of them makes; it should be 1.
+
     Args:
         robot: the calibrated robot; a delay of its commands is taken from it.
         recordings: those of the calibration.
@@ -32,7 +34,7 @@ def regressed_values(robot: Robot, recordings: Sequence[Recording]) -> dict[str,
     delay = robot.parameter("robot.command_delay.delay").value if labels else 0.0
     found: dict[str, Value] = {}
     for joint, equation in zip(robot.joints, equations_of(robot, recordings, delay), strict=True):
-        found |= _of_joint(robot, joint, equation)
+        found |= _of_joint(robot, joint, equation) | _made_by_one(robot, joint, equation)
     return found
 
 
@@ -56,6 +58,15 @@ def _of_joint(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Va
             parameter, factor = free[0]
             found[parameter.name] = Value((value.value - held) / factor, value.sigma / abs(factor))
     return found
+
+
+def _made_by_one(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:
+    """Torque of one unit of a command that should be a torque; empty where it is none, or nothing can be told."""
+    values = equation.solve() if robot.drive_gain is None else {}
+    made = values.get(GAIN)
+    if made is None or not _explains(equation, {law: value.value for law, value in values.items()}):
+        return {}
+    return {f"{joint}.torque_constant": made}
 
 
 def _explains(equation: DriveEquation, values: dict[str, float]) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.presentation.plausible_torques import plausible_torques
 from jointscope.tools.presentation.torque_constants import suspicious_constants
 from jointscope.tools.presentation.whiteness import LAGS, autocorrelation, strength
 
@@ -53,6 +54,7 @@ class Judgement:
 
 def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
+    plausible = plausible_torques(result)
     checks = (
         _noise_as_stated(result),
         _white(result),
@@ -63,6 +65,7 @@ def judge(result: CalibrationResult) -> Judgement:
         _same_time(result),
         _two_ways(result),
         _constants(result),
+        Check(plausible[0], "Masses and torques that go together", plausible[1]),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"

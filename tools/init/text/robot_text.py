@@ -149,7 +149,7 @@ def _command(guess: RobotGuess) -> list[str]:
     lines = [
         _line("command:", command.reason, command.sure),
         *source_lines(command.signal, unit, 2)[:3],
-        _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=False, indent=2),
+        _line(f"unit: {unit}", f"{why}; duty | V | A | N m", sure=why == TYPED, indent=2),
         *([_line("confirmed: true", "you named the unit", True, 2)] if why == TYPED else []),
         *_names(command, joints, 2),
         *_signs(signs, "moves against its command", 2),

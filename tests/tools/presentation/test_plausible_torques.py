@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A common factor on masses and torques leaves no residual; two other things tell it."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arm_bags import ArmMotion, write_arm_bag, write_urdf
+from fake_results import fake_calibration
+
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.starts.second_opinion import regressed_values
+from jointscope.robots.bodies.possible_masses import impossible_masses
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags import read_recording
+from jointscope.tools.command_line import main
+from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.presentation.plausible_torques import plausible_torques
+
+JOINTS = ("shoulder", "elbow")
+QUESTION = "Masses and torques that go together"
+
+
+def times_factor(urdf: Path, out: Path, masses: float, moments: float) -> Path:
+    def scaled(factor):
+        return lambda m: f'{m[1]}="{float(m[2]) * factor:.12g}"'
+
+    text = re.sub(r'(mass value)="([^"]+)"', scaled(masses), urdf.read_text())
+    out.write_text(re.sub(r'\b(i[xyz]{2})="([^"]+)"', scaled(moments), text))
+    return out
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    urdf = write_urdf(folder / "arm.urdf", {"shoulder": None, "elbow": "shoulder"})
+    motion = ArmMotion(urdf, JOINTS, seconds=8.0)
+    topics = {"/joint_states": motion.states(JOINTS), "/motor_command": motion.commands(JOINTS)}
+    return urdf, write_arm_bag(folder / "arm.mcap", motion.times, topics)
+
+
+def begun(arm, tmp_path, masses, moments=None, *options):
+    """The robot file that `init` writes from a URDF with other masses."""
+    urdf = times_factor(arm[0], tmp_path / "other.urdf", masses, masses if moments is None else moments)
+    assert main(["init", str(urdf), str(arm[1]), "-o", str(tmp_path / "own.yaml"), *options]) == 0
+    return load_robot(tmp_path / "own.yaml")
+
+
+def asked(robot, constants=(), recordings=()):
+    """The answer for a calibration in which all else is good."""
+    result = dataclasses.replace(
+        fake_calibration(0.2),
+        robot=robot,
+        start=robot,
+        parameters=tuple(
+            ParameterEstimate(f"{joint}.torque_constant", k, 1e-3 * k, "N m/A", k, k, 2 * k)
+            for joint, k in zip(robot.joints, constants, strict=False)
+        ),
+        regressed=regressed_values(robot, recordings) if recordings else {},
+    )
+    return plausible_torques(result)
+
+
+@pytest.mark.parametrize(("masses", "moments"), [(1000.0, 1000.0), (1000.0, 1.0)])
+def test_masses_in_grams_cannot_exist(arm, tmp_path, masses, moments):
+    level, text = asked(begun(arm, tmp_path, masses, moments), (1000.0, 1000.0))
+    assert level == "bad"
+    assert "link shoulder_link of other.urdf has 2000 kg" in text or "link elbow_link of other.urdf has 2000 kg" in text
+    assert "constants 1.00, 1.00 instead of 1000, 1000" in text and "jointscope init other.urdf" in text
+
+
+def test_masses_of_arms_that_exist_are_not_doubted(arm):
+    assert impossible_masses(RigidTree(arm[0], JOINTS, np.array([0.0, 0.0, -9.81])).model) is None
+    for name in ("doggy", "hebi_2r", "hebi_3r", "hebi_5r", "kr300", "xl330_pendulum"):
+        assert impossible_masses(load_robot(name).tree.model) is None, name
+
+
+def test_torques_that_are_said_must_move_the_masses_as_torques_do(arm, tmp_path):
+    robot = begun(arm, tmp_path, 0.5, None, "--unit", "Nm")
+    level, text = asked(robot, (), [read_recording(arm[1], robot)])
+    assert level == "bad" and "one moves as 0.5" in text and "masses times 2" in text
+    right = begun(arm, tmp_path, 1.0)
+    assert right.command.unit == "N m"
+    recording = read_recording(arm[1], right)
+    assert asked(right, (), [recording])[0] == "good"
+    found = regressed_values(right, [recording])
+    assert found["elbow.torque_constant"].value == pytest.approx(1.0, abs=0.02)
+
+
+def test_no_drive_makes_a_thousand_newton_metres_per_ampere(arm, tmp_path):
+    level, text = asked(begun(arm, tmp_path, 3.0), (900.0, 5.0))
+    assert level == "bad" and "shoulder.torque_constant is 900 N m/A, more than any drive makes" in text
+
+
+def test_the_verdict_asks_for_it(tmp_path):
+    good = fake_calibration(0.2)
+    assert next(c.level for c in judge(good).checks if c.name == QUESTION) == "good"
+    robot = good.robot
+    heavy = times_factor(robot.tree.urdf, tmp_path / "grams.urdf", 1e5, 1e5)
+    tree = RigidTree(heavy, robot.joints, robot.tree.gravity)
+    found = judge(dataclasses.replace(good, robot=dataclasses.replace(robot, tree=tree)))
+    assert next(c.level for c in found.checks if c.name == QUESTION) == "bad" == found.level
