@@ -65,12 +65,9 @@ class NoiseEvidence:
         """Takes in some residuals; those of other factors are ignored."""
         if isinstance(part.factor, DynamicsFactor):
             half, slack = len(self.squares), part.factor.steps.slack
-            told = np.ones(part.residual[:, :half].shape)
-            if slack is not None:
-                rows = slack if slack.ndim == 2 else np.repeat(slack[:, None], half, axis=1)
-                told[:, : rows.shape[1]] = rows == 1.0
-            self.squares += np.sum(told * part.residual[:, :half] ** 2, axis=0)
-            self.freedom += np.sum(told * (1.0 - part.leverage[:, :half]), axis=0)
+            own = slice(None) if slack is None else slack == 1.0
+            self.squares += np.sum(part.residual[own, :half] ** 2, axis=0)
+            self.freedom += np.sum(1.0 - part.leverage[own, :half], axis=0)
 
     def __add__(self, other: NoiseEvidence) -> NoiseEvidence:
         """Both together."""

@@ -24,7 +24,6 @@ from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
-from jointscope.graphs.problem.standstill import sticks
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
@@ -76,7 +75,7 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        acting, slack = path if path.changes else None, _slack(robot, recording, timeline)
+        acting, slack = path if path.changes else None, _slack(recording, timeline)
         steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
@@ -125,16 +124,11 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     return tree.weighing_inertia(q) / tree.free_inertias()[:, None]
 
 
-def _slack(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
-    """Factor on the noise of each velocity in each step, shape (m, k); None where all bind the motion.
-
-    Steps that touch a stretch that is left out bind the motion no more, nor does the equation of a rigid joint where
-    it sticks.
-    """
-    found = sticks(robot, recording, timeline)
-    if recording.left_out:
-        found |= ~recording.are_judged(timeline.ticks[1:], timeline.h)[:, None]
-    return np.where(found, SLACK, 1.0) if np.any(found) else None
+def _slack(recording: Recording, timeline: Timeline) -> Array | None:
+    """Steps that touch a stretch that is left out bind the motion no more; None where there are none."""
+    if not recording.left_out:
+        return None
+    return np.where(recording.are_judged(timeline.ticks[1:], timeline.h), 1.0, SLACK)
 
 
 def first_command_time(recording: Recording) -> float:

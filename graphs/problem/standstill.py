@@ -6,10 +6,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.problem.timeline import Timeline
-from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -24,33 +20,6 @@ EDGE = 0.003  # [s] around a standstill
 def slowest_speed(v: Array, sharpness: float) -> float:
     """Speed below which friction is not known [rad/s, m/s]; v of shape (m,)."""
     return max(SATURATED / sharpness, SLOW * float(np.quantile(np.abs(v), 0.95)))
-
-
-def sticks(robot: Robot, recording: Recording, timeline: Timeline) -> Mask:
-    """Steps in which a rigid joint sticks, by velocity of the state, shape (m, k).
-
-    Only where its encoder tells standing from creeping: elsewhere the slowest speed that friction knows is no more
-    than noise.
-    """
-    encoder, layout = robot.motor_encoder, robot.layout
-    stream, h = recording.streams[encoder.name], float(np.median(timeline.h))
-    found = np.zeros((len(timeline.h), len(layout.velocities)), dtype=bool)
-    if robot.transmission is not None:
-        return found
-    for j, joint in enumerate(robot.joints):
-        if joint in layout.motors:
-            continue
-        q = np.interp(timeline.ticks, stream.times, stream.values[:, j])
-        steps = max(round(0.5 * LOOK / h), 1)
-        ahead = np.minimum(np.arange(len(q)) + steps, len(q) - 1)
-        behind = np.maximum(np.arange(len(q)) - steps, 0)
-        v = (q[ahead] - q[behind]) / (timeline.ticks[ahead] - timeline.ticks[behind])
-        limit = slowest_speed(v, robot.sharpness_of(joint))
-        if RESOLVED * np.sqrt(2.0) * float(encoder.sigmas[j]) / (2.0 * steps * h) > limit:
-            continue
-        slow = lasting(np.abs(v[:-1]) < limit, max(round(LASTING / h), 1))
-        found[:, int(layout.joint_link[j])] = near(slow, round(EDGE / h) + 1)
-    return found
 
 
 def lasting(mask: Mask, steps: int) -> Mask:

@@ -24,14 +24,3 @@ def test_steps_that_are_left_out_are_free_and_all_others_as_they_were(doggy, sha
     np.testing.assert_array_equal(free[[0, 3]], steps.sigmas[[0, 3]])
     wanted = np.maximum(1e3 * steps.sigmas[1, :k], FREE * np.sqrt(2.5e-3))
     np.testing.assert_allclose(free[1:3, :k], np.tile(wanted, (2, 1)))
-
-
-def test_one_equation_of_a_step_may_be_free_while_the_others_bind(doggy):
-    steps = Steps(np.full(2, 2.5e-3), np.zeros((2, doggy.n)), doggy.noise, doggy.layout)
-    slack = np.ones((2, len(doggy.layout.velocities)))
-    slack[1, 2] = 1e3
-    free = replace(steps, slack=slack).sigmas
-    changed = free != steps.sigmas
-    assert changed[1, 2]
-    assert not np.any(np.delete(changed[:, : slack.shape[1]], 2, axis=1))
-    assert not np.any(changed[0])

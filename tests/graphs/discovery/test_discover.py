@@ -89,7 +89,12 @@ class MadeUp:
             candidates.append(Candidate(effect, owner, 100.0, 1, 1e-9, parameters, "missing"))
             refits[label] = add_effect(robot, label)
         return SimpleNamespace(
-            candidates=candidates, refits=refits, adequate=not candidates, unexplained_share=0.25, robot=robot
+            candidates=candidates,
+            refits=refits,
+            adequate=not candidates,
+            unexplained_share=0.25,
+            robot=robot,
+            missing_torque_percent=None,
         )
 
 
