@@ -175,8 +175,8 @@ def _sentence(robot: Robot, judge: TorqueJudge, missing: Mapping[str, float], pe
     parts = []
     if not missing:
         return (
-            "The missing torque is not given in N m: on blocks left out the fit of the others asks for more than the drive "
-            "has, so only shares of it tell."
+            "The missing torque is not given in N m: on blocks left out the fit of the others asks for more than the "
+            "drive has, so only shares of it tell."
         )
     for noise, (joint, value) in zip(judge.noise, missing.items(), strict=True):
         unit = of_slide("N m") if joint in robot.tree.slides else "N m"
