@@ -59,7 +59,7 @@ class DynamicsPrior(_Prior):
         """The prior of a robot's free parameters."""
         free = [p for p in robot.parameters.values() if not p.fixed]
         mean = [np.log(p.prior) if p.positive else p.prior for p in free]
-        sigma = [p.prior_sigma / p.prior if p.positive else p.prior_sigma for p in free]
+        sigma = [p.coordinate_sigma for p in free]
         return DynamicsPrior(tuple(p.name for p in free), np.array(mean), np.array(sigma))
 
     @property

@@ -207,10 +207,9 @@ def _parameters(
     for i, name in enumerate(calibration.names):
         p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
         note = ""
-        relative_prior = p.prior_sigma / p.prior if p.positive else p.prior_sigma
         if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
             note = "at its bound: compatible with zero"
-        elif sigmas[i] > HELD_BY_PRIOR * relative_prior:
+        elif sigmas[i] > HELD_BY_PRIOR * p.coordinate_sigma:
             note = "held by its prior"
         found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
     for gyro in robot.gyros:

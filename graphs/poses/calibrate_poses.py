@@ -203,14 +203,9 @@ def _chi2(problems: Sequence[PoseSet], solution: Solution, distances: Sequence[A
     rows = sum(problem.measured for problem in problems)
     _, covariance = posteriors(problems, solution)
     robot, index = problems[0].robot, solution.estimate.calibrations[0].columns[DYNAMICS]
-    prior = np.array([_prior_sigma(robot, name) for name in solution.estimate.calibrations[0].names])
+    prior = np.array([robot.parameters[name].coordinate_sigma for name in solution.estimate.calibrations[0].names])
     used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
-
-
-def _prior_sigma(robot: Robot, name: str) -> float:
-    p = robot.parameters[name]
-    return p.prior_sigma / p.prior if p.positive else p.prior_sigma
 
 
 def _without_outliers(

@@ -59,7 +59,7 @@ class LinearPoses:
         names = [group for *_, groups in pieces for group in groups]
         number = {name: i for i, name in enumerate(dict.fromkeys(names))}
         prior = np.zeros(total)
-        prior[:size] = [1.0 / _sigma(result.robot.parameters[name]) for name in result.names]
+        prior[:size] = [1.0 / result.robot.parameters[name].coordinate_sigma for name in result.names]
         return LinearPoses(
             np.concatenate([r for r, *_ in pieces]),
             np.concatenate([J for _, J, *_ in pieces]),
@@ -127,8 +127,3 @@ def _whitened(problem: PoseSet, calibration: Calibration) -> tuple[Array, Array,
     r = (W @ problem.misses(point, calibration)[:, :, None])[:, :, 0]
     columns = W @ problem.columns(point, calibration)
     return W, r.reshape(-1), columns.reshape(-1, calibration.size)
-
-
-def _sigma(p: Parameter) -> float:
-    """Prior sigma of a parameter's coordinate."""
-    return p.prior_sigma / p.prior if p.positive else p.prior_sigma

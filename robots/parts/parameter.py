@@ -43,3 +43,8 @@ class Parameter:
     def owner(self) -> str:
         """What the parameter belongs to: "motor", "joint1", "imu2"."""
         return self.name.split(".", 1)[0]
+
+    @property
+    def coordinate_sigma(self) -> float:
+        """Prior sigma of what is estimated: relative where that is the logarithm."""
+        return self.prior_sigma / self.prior if self.positive else self.prior_sigma
