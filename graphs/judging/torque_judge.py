@@ -8,7 +8,8 @@ others its share is the part of the squared missing torque that went. What is si
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +139,7 @@ class TorqueJudge:
             harm,
             removed,
         )
-        return TorqueJudgement(**{**found.__dict__, "refused": self._refusal(found)})
+        return replace(found, refused=self._refusal(found))
 
     def _refusal(self, found: TorqueJudgement) -> str:
         needed = HELPED_BY_COMMAND if found.hypothesis.here.effect.id in DRIVEN else HELPED
@@ -156,12 +157,18 @@ class TorqueJudge:
             )
         return ""
 
+    @cached_property
+    def _beside_base(self) -> tuple[Array, Array]:
+        """Orthonormal base columns, shape (m, p), and what they leave of the missing torque, shape (m,), whitened."""
+        X, y = self._white(self._everything), self._white(self._target)[:, 0]
+        Q, _ = np.linalg.qr(independent(X)) if X.shape[1] else (np.zeros((len(X), 0)), None)
+        return Q, y - Q @ (Q.T @ y)
+
     def _score(self, C: Array, hypothesis: EffectHypothesis) -> tuple[float, Array, Array]:
         """Score, sizes and their sigmas beside the base parameters; score 0 for gauges and impossible signs."""
         k, none = C.shape[1], (0.0, np.zeros(C.shape[1]), np.full(C.shape[1], np.inf))
-        X, Z, y = self._white(self._everything), self._white(C), self._white(self._target)[:, 0]
-        Q, _ = np.linalg.qr(independent(X)) if X.shape[1] else (np.zeros((len(X), 0)), None)
-        rest, r = Z - Q @ (Q.T @ Z), y - Q @ (Q.T @ y)
+        Z, (Q, r) = self._white(C), self._beside_base
+        rest = Z - Q @ (Q.T @ Z)
         if np.any(np.sum(rest**2, axis=0) <= GAUGE * np.sum(Z**2, axis=0)):
             return none
         S = rest.T @ rest + np.diag([1.0 / p.prior_sigma**2 for p in hypothesis.sizes])

@@ -119,11 +119,10 @@ def discover_poses(
         candidates = pose_candidates(result)
         steps.append(PoseStep(added, result, _heldout(result.robot, holdout), tuple(candidates)))
         found = [c for c in candidates if c.verdict == "missing"]
-        if not found:
-            why = "no effect is significant and meets left-out poses better"
-            return PoseDiscovery(tuple(steps), why, tuple(placed(result.robot, holdout)[1]))
-        if len(steps) > MOST_STEPS:
+        if not found or len(steps) > MOST_STEPS:
             why = f"{MOST_STEPS} effects were added, the largest number allowed"
+            if not found:
+                why = "no effect is significant and meets left-out poses better"
             return PoseDiscovery(tuple(steps), why, tuple(placed(result.robot, holdout)[1]))
         added = max(found, key=lambda c: c.gain)
         result = calibrate_poses(_with(result.robot, added), sessions)
@@ -145,7 +144,7 @@ def pose_candidates(result: PoseCalibration) -> list[PoseCandidate]:
             if j != i and candidate.score > 0.0 and _overlap(left[i], left[j]) > ALIKE
         ]
         names = tuple(label for _, label in sorted(alike, reverse=True)[:3])
-        named.append(PoseCandidate(**{**vars(candidate), "look_alikes": names}))
+        named.append(replace(candidate, look_alikes=names))
     return sorted(named, key=lambda c: -c.gain)
 
 
