@@ -198,14 +198,8 @@ class TorqueJudge:
         return left
 
     def _white(self, values: Array) -> Array:
-        found = np.empty_like(values)
-        start = 0
-        for rows, blocks, noise in zip(self.rows, self.blocks, self.noise, strict=True):
-            for block in np.unique(blocks):
-                own = np.flatnonzero(blocks == block)
-                found[start + own] = noise.whitened(rows.times[own], values[start + own])
-            start += len(blocks)
-        return found
+        parts = zip(self.noise, self.rows, self._split(values), self.blocks, strict=True)
+        return np.vstack([noise.whitened(rows.times, own, blocks) for noise, rows, own, blocks in parts])
 
     @property
     def _target(self) -> Array:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from jointscope.graphs.judging.torque_rows import TorqueRows
 
@@ -39,24 +38,23 @@ class Yardstick:
     memory: float
     white: float
 
-    def whitened(self, times: Array, values: Array) -> Array:
-        """Values of one block, shape (m, k), with independent errors of variance one."""
-        return _whitened(times, values, self.memory, self.white)[0] / self.size
+    def whitened(self, times: Array, values: Array, blocks: NDArray[np.intp]) -> Array:
+        """Values, shape (m, k), with independent errors of variance one; nothing is remembered between blocks."""
+        from jointscope.graphs.kernels.innovations import innovations
+
+        return np.asarray(innovations(times, values, blocks, self.memory, self.white)[0] / self.size)
 
 
 def yardstick_of(rows: TorqueRows, blocks: NDArray[np.intp]) -> Yardstick:
     """The likeliest noise beside base parameters and smooth laws; blocks by row, shape (m,)."""
+    from jointscope.graphs.kernels.innovations import innovations
+
     X = independent(np.hstack([rows.base, saturated(rows)]))
+    values = np.column_stack([X, rows.missing])
     best: tuple[float, Yardstick] | None = None
     for memory in MEMORIES:
         for white in WHITE:
-            parts, log_determinant = [], 0.0
-            for block in np.unique(blocks):
-                own = blocks == block
-                y, log = _whitened(rows.times[own], np.column_stack([X[own], rows.missing[own]]), memory, white)
-                parts.append(y)
-                log_determinant += log
-            Y = np.vstack(parts)
+            Y, log_determinant = innovations(rows.times, values, blocks, memory, white)
             R: Array = np.linalg.qr(Y)[1]
             freedom = len(Y) - X.shape[1]
             s2 = max(float(R[-1, -1] ** 2) / freedom, 1e-300)
@@ -100,10 +98,3 @@ def independent(X: Array) -> Array:
         kept.append(column / norm)
         basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
     return np.column_stack(kept) if kept else np.zeros((len(X), 0))
-
-
-def _whitened(times: Array, values: Array, memory: float, white: float) -> tuple[Array, float]:
-    covariance = np.exp(-np.abs(times[:, None] - times[None, :]) / memory)
-    covariance += white**2 * np.eye(len(times))
-    L = np.linalg.cholesky(covariance)
-    return solve_triangular(L, values, lower=True), float(np.sum(np.log(np.diag(L))))
