@@ -21,7 +21,7 @@ from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "doggy" / "clean"
 

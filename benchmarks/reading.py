@@ -14,7 +14,8 @@ from tables import Section
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording, write_bag
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.write_bag import write_bag
 
 SECONDS = 5.0  # [s] for 260,000 messages
 FORMATS = ("bag", "db3", "mcap")

@@ -10,7 +10,7 @@ from tables import Table
 from jointscope.graphs.transmission.transmission_result import TransmissionDiscovery
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "real"
 MILLI = 1e3

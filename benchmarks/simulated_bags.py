@@ -14,7 +14,7 @@ from patience import say
 
 import jointscope.tools.simulator as simulator
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import write_bag
+from jointscope.tools.bags.write_bag import write_bag
 
 SEED = 1
 

@@ -23,7 +23,7 @@ from tables import Section, Table
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 SHARE = 0.5  # of the recording's own duration
 MEMORY = 6.0  # [GiB]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 
 def main(path: str) -> None:

@@ -9,7 +9,6 @@ viewer. Each is asked once, where it is first needed, for what this project uses
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -119,12 +118,14 @@ def _way(name: str) -> str:
 @cache
 def _packages_with(name: str) -> tuple[tuple[str, str], ...]:
     """Installed packages that may have brought a module, with their versions: by their files, and by their names."""
-    names = list(importlib.metadata.packages_distributions().get(name, ()))
+    from importlib import metadata
+
+    names = list(metadata.packages_distributions().get(name, ()))
     names += [name, MODULES[name].package]
     found = {}
     for package in names:
         try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
             continue
     return tuple(sorted(found.items()))

@@ -92,7 +92,8 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"jointscope {jointscope.__version__}")
+    version = f"jointscope {jointscope.__version__}" if "--version" in arguments else ""  # to look it up costs time
+    parser.add_argument("--version", action="version", version=version)
     subparsers = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     asked_for = next((argument for argument in arguments if not argument.startswith("-")), None)
     for name, summary in verbs().items():

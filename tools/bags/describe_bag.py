@@ -1,36 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Looks at a bag without needing to know the robot, and at how it fits one if it is known."""
+"""Looks at a bag without needing to know the robot."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.resting_joints import must_move
-from jointscope.robots.recordings.screening import screen
-from jointscope.robots.units import joined
-from jointscope.tools.bags.bag_description import (
-    BagDescription,
-    FieldDescription,
-    NeedDescription,
-    TopicDescription,
-)
+from jointscope.tools.bags.bag_description import BagDescription, FieldDescription, TopicDescription
 from jointscope.tools.bags.clocks.clock_steps import on_one_clock
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.clocks.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.fitting_messages import left_out_notices, read_columns
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType, inner_type
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
-from jointscope.tools.bags.needed_streams import check_topic, full_type_name, needed_streams
-from jointscope.tools.bags.read_recording import left_out_notices, read_columns, read_recording
 from jointscope.tools.bags.tidying.not_finite import numbers_only
 from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing
+
+if TYPE_CHECKING:
+    from jointscope.robots.model.robot import Robot
 
 FLOATS = ("float32", "float64")
 NOT_SHOWN = "covariance"
@@ -58,30 +50,23 @@ def describe_bag(path: str | Path, robot: Robot | None = None, progress: Progres
         topics = tuple(_topic(bag, name, types[name], raw.get(name)) for name in bag.topics)
         times = [t.received_ns for t in raw.values() if t.received]
         duration = (max(t.max() for t in times) - min(t.min() for t in times)) / 1e9 if times else 0.0
-        needs = _needs(bag, robot, {topic.topic: topic for topic in topics}) if robot else ()
-        kind = "ROS 2" if bag.ros2 else "ROS 1"
-    size = sum(file.stat().st_size for file in storage_files(path))
-    problem, notices = _judge(path, robot, needs) if robot else (None, ())
-    return BagDescription(
-        path=str(path),
-        sha256=bag_sha256(path),
-        kind=kind,
-        size=size,
-        duration=float(duration),
-        topics=topics,
-        robot=robot.name if robot else None,
-        needs=needs,
-        usable=problem is None if robot else None,
-        problem=problem,
-        notices=notices,
-        transmission=_transmission(robot) if robot else None,
-    )
+        described = BagDescription(
+            path=str(path),
+            sha256=bag_sha256(path),
+            kind="ROS 2" if bag.ros2 else "ROS 1",
+            size=sum(file.stat().st_size for file in storage_files(path)),
+            duration=float(duration),
+            topics=topics,
+            robot=None,
+            needs=(),
+            usable=None,
+            problem=None,
+        )
+        if robot is None:
+            return described
+        from jointscope.tools.bags.bag_for_robot import for_robot  # the equations of motion behind it cost time
 
-
-def _transmission(robot: Robot) -> tuple[tuple[float, ...], ...] | None:
-    """Joint angles per motor angle; None where every motor moves its own joint alone."""
-    T = joint_angles(robot, np.eye(robot.n)).T
-    return None if np.array_equal(T, np.eye(robot.n)) else tuple(map(tuple, T.tolist()))
+        return for_robot(described, bag, robot)
 
 
 def _type_with_floats(bag: Bag, topic: str) -> MessageType | str | None:
@@ -176,51 +161,3 @@ def _field(field: str, columns: Columns) -> FieldDescription:
         not_finite=int(np.count_nonzero(~finite)),
         clipping=tuple(notice.text for notice in clipping),
     )
-
-
-def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple[NeedDescription, ...]:
-    needs = []
-    for need in needed_streams(robot):
-        source = need.source
-        msgtype = full_type_name(source.msgtype)
-        problem = None
-        try:
-            check_topic(bag, source)
-            names = topics[source.topic].names if source.topic in topics else ()
-            missing = [name for name in source.names if names and name not in names]
-            if missing:
-                problem = f"no joint {missing[0]!r} on {source.topic}, which names {', '.join(names)}"
-        except RecordingError as err:
-            problem = str(err)
-        candidates = tuple(topic for topic in bag.topics if bag.type_names(topic) == (msgtype,))
-        needs.append(
-            NeedDescription(
-                need.name,
-                source.topic,
-                msgtype,
-                source.field,
-                joined(source.bag_units(1)),
-                problem,
-                candidates,
-            )
-        )
-    return tuple(needs)
-
-
-def _judge(path: Path, robot: Robot, needs: tuple[NeedDescription, ...]) -> tuple[str | None, tuple[str, ...]]:
-    """Why the recording cannot be used for a robot, and what was odd."""
-    missing = [need.stream for need in needs if need.problem is not None]
-    if missing:
-        return f"{', '.join(missing)} cannot be read", ()
-    try:
-        recording = read_recording(path, robot)
-    except RecordingError as err:
-        return str(err), ()
-    notices = recording.notices
-    try:
-        notices = [*notices, *screen(recording, robot)]
-        problem = None
-        must_move(robot, [recording])
-    except RecordingError as err:
-        problem = str(err)
-    return problem, tuple(notice.text for notice in notices)

@@ -14,10 +14,37 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.recordings.recording import Notice
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.messages.columns import Columns, LeftOut
-from jointscope.tools.bags.messages.message_parts import MessageParts
+from jointscope.tools.bags.messages.message_parts import MessageParts, message_parts
+from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.messages.open_bag import RawTopic
 
 NAMES_SAID = 6
+
+
+def read_columns(
+    topic: RawTopic,
+    message_type: MessageType,
+    field: str,
+    decode_all: bool = False,
+    first: int = 0,
+    wanted: Sequence[str] = (),
+    width: int | None = None,
+) -> Columns:
+    """One field of the messages of a topic that belong together.
+
+    Args:
+        topic: the messages.
+        message_type: their type.
+        field: dotted path of the numbers.
+        decode_all: decode every message in full, as a reference for the fast path.
+        first: number of the first message in its topic.
+        wanted: names that a message must have; empty for those that most messages share.
+        width: number of values of messages without names; None for what most have.
+    """
+    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
 
 
 def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int | None = None) -> Columns:
@@ -53,6 +80,14 @@ def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int
     names = (*core, *common) if wanted else tuple(name for name in first if name in {*core, *common})
     used = {id(part) for part in chosen}
     return _together(chosen, names, [part for part in parts if id(part) not in used], found.broken)
+
+
+def left_out_notices(name: str, columns: Columns) -> list[Notice]:
+    """What was left out because it does not fit the other messages."""
+    if not columns.left_out:
+        return []
+    said = ", ".join(f"{counted(part.count, 'message')} {part.what}" for part in columns.left_out)
+    return [Notice(name, "foreign", sum(part.count for part in columns.left_out), f"{name}: left out {said}")]
 
 
 def remaining(found: MessageParts, used: Columns) -> MessageParts:

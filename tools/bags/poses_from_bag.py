@@ -17,9 +17,9 @@ from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.poses import Poses
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.bags.fitting_messages import read_columns
 from jointscope.tools.bags.messages.open_bag import Bag, bag_sha256, open_bag
 from jointscope.tools.bags.needed_streams import StreamSource, check_topic, column_order, in_si
-from jointscope.tools.bags.read_recording import read_columns
 
 Array = NDArray[np.float64]
 STILL = 2e-3  # [rad/s] a joint at rest is slower, or slower than its noise

@@ -25,6 +25,7 @@ from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.clocks.two_clocks import brought_together
 from jointscope.tools.bags.clocks.unstamped import sent_earlier
+from jointscope.tools.bags.fitting_messages import read_columns
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Progress, RawTopic, bag_sha256, open_bag
@@ -36,7 +37,6 @@ from jointscope.tools.bags.needed_streams import (
     needed_streams,
     wanted_of,
 )
-from jointscope.tools.bags.read_recording import read_columns
 
 BLOCK = 20_000  # messages
 ONE_SECOND = 1_000_000_000  # [ns]

@@ -16,12 +16,11 @@ from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.units import joined
-from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.own_stamps import at_message_stamps
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
-from jointscope.tools.bags.fitting_messages import fitting_messages
+from jointscope.tools.bags.fitting_messages import fitting_messages, left_out_notices
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_parts import message_parts
@@ -159,29 +158,6 @@ def _goal(
     return (need, samples), notices + found
 
 
-def read_columns(
-    topic: RawTopic,
-    message_type: MessageType,
-    field: str,
-    decode_all: bool = False,
-    first: int = 0,
-    wanted: Sequence[str] = (),
-    width: int | None = None,
-) -> Columns:
-    """One field of the messages of a topic that belong together.
-
-    Args:
-        topic: the messages.
-        message_type: their type.
-        field: dotted path of the numbers.
-        decode_all: decode every message in full, as a reference for the fast path.
-        first: number of the first message in its topic.
-        wanted: names that a message must have; empty for those that most messages share.
-        width: number of values of messages without names; None for what most have.
-    """
-    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
-
-
 def _samples(
     need: StreamSource,
     topic: RawTopic,
@@ -207,14 +183,6 @@ def _samples(
         return samples, notices
     samples, found = without_gibberish(need.name, need.channels, samples)
     return samples, notices + found
-
-
-def left_out_notices(name: str, columns: Columns) -> list[Notice]:
-    """What was left out because it does not fit the other messages."""
-    if not columns.left_out:
-        return []
-    said = ", ".join(f"{counted(part.count, 'message')} {part.what}" for part in columns.left_out)
-    return [Notice(name, "foreign", sum(part.count for part in columns.left_out), f"{name}: left out {said}")]
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:

@@ -7,7 +7,6 @@ The names below are what programs build on; modules may move. They are imported 
 from __future__ import annotations
 
 import importlib
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from jointscope.robots.files.robot_writer import robot_text
     from jointscope.tools.bags.read_recording import read_recording
 
-__version__ = version("jointscope")
+__version__: str
 __all__ = [
     "CalibrationGraph",
     "FixedLagEstimator",
@@ -48,6 +47,10 @@ _MODULES = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # brings a parser of mails along
+
+        return version("jointscope")
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"jointscope.{_MODULES[name]}"), name)

@@ -74,7 +74,7 @@ def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tup
 
 def _read(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
     """What the arguments name; arguments as in `read_bags`."""
-    from jointscope.tools.bags import read_recording
+    from jointscope.tools.bags.read_recording import read_recording
 
     recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
     if args.holdout_share is not None:

@@ -51,7 +51,7 @@ class DemoStory:
 
     def _simulate(self, name: str, motion: str, seconds: float) -> dict[str, Any]:
         """Writes a bag and the truth beside it; returns the true parameters."""
-        from jointscope.tools.bags import write_bag
+        from jointscope.tools.bags.write_bag import write_bag
         from jointscope.tools.simulator import simulate
 
         options = f"--effect {EFFECT} --motion {motion} --seconds {seconds:g} --seed {self.seed} --friction {FRICTION}"
@@ -114,7 +114,7 @@ class DemoStory:
                 file.write_text(picture(svg), encoding="utf-8")
 
     def _read(self, name: str, progress: Progress) -> Recording:
-        from jointscope.tools.bags import read_recording
+        from jointscope.tools.bags.read_recording import read_recording
 
         bag = f"{name}.mcap"
         recording = read_recording(self.hidden / bag, self.robot, reading(Path(bag), progress))

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.effects])
     from jointscope.graphs.calibration.calibrate import calibrate
     from jointscope.robots.files.robot_file import load_robot
-    from jointscope.tools.bags import read_recording
+    from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.presentation.judgement import judge
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look

@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(files.all, inputs=[*([] if poses else [args.bag]), *poses, *robot_files, *args.effects])
     from jointscope.graphs.comparison.compare import compare
     from jointscope.robots.files.robot_file import load_robot
-    from jointscope.tools.bags import read_recording
+    from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.terminal.comparison_text import comparison_text
 
     load_user_effects(args.effects)

@@ -38,7 +38,6 @@ def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
     check_outputs([args.json], inputs=[args.bag, *args.effects])
     from jointscope.robots.errors import RecordingError
-    from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.describe_bag import describe_bag
     from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
@@ -49,7 +48,11 @@ def run(args: argparse.Namespace) -> int:
             f"jointscope info {other} --robot {args.bag}"
         )
     load_user_effects(args.effects)
-    robot = load_robot(args.robot) if args.robot else None
+    robot = None
+    if args.robot:
+        from jointscope.robots.files.robot_file import load_robot  # the equations of motion behind it cost time
+
+        robot = load_robot(args.robot)
     with progress_bar() as progress:
         description = describe_bag(args.bag, robot, reading(args.bag, progress))
     if args.json is not None:

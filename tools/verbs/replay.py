@@ -19,7 +19,7 @@ from jointscope.tools.writing.whole_file import check_outputs
 if TYPE_CHECKING:
     from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
     from jointscope.robots.model.robot import Robot
-    from jointscope.tools.bags import ArrivalReader
+    from jointscope.tools.bags.read_arrivals import ArrivalReader
     from jointscope.tools.terminal.progress import Progress
 
 BATCH_SECONDS = 120.0  # longer recordings are compared with the batch smoother only on request
@@ -110,7 +110,7 @@ def _replayed(
 ) -> tuple[ReplayResult, list[str]]:
     """The replay with all that listens to it, and what was left out; the table is complete when `stack` closes."""
     from jointscope.graphs.fixed_lag.replay.replay import replay
-    from jointscope.tools.bags import ArrivalReader
+    from jointscope.tools.bags.read_arrivals import ArrivalReader
     from jointscope.tools.verb_parts.replay_listeners import Listeners, Pace
 
     adapt = dict(args.adapt)
@@ -146,7 +146,7 @@ def _with_source(
     if not wanted or not len(result.lagged.times):
         return result
     from jointscope.graphs.fixed_lag.replay.batch_agreement import batch_agreement
-    from jointscope.tools.bags import read_recording
+    from jointscope.tools.bags.read_recording import read_recording
 
     progress("batch smoother", 0.5)
     lagged, robot = result.lagged, result.robot

@@ -15,7 +15,7 @@ from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 
 def _truth(folder):

@@ -9,7 +9,7 @@ import pytest
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
 TRUTH = {"shoulder.torque_constant": 2.0, "shoulder.coulomb_torque": 0.5, "shoulder.motor_viscous.coefficient": 0.4}

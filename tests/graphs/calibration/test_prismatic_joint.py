@@ -11,7 +11,8 @@ from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.units import of_slide
-from jointscope.tools.bags import read_recording, write_bag
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.init.robot_guess import guess_robot
 from jointscope.tools.init.streams.other_joints import Typed
 from jointscope.tools.init.text.robot_text import robot_text

@@ -231,7 +231,7 @@ def test_an_error_in_the_motion_of_two_joints_names_both_and_one_spread_evenly_n
 def test_a_soft_bearing_shows_in_the_gyro_behind_it(doggy_data, doggy):
     """Recordings made elsewhere; the published parameters stand for a calibration, which would take long."""
     from jointscope.graphs.comparison.compare import compare_model
-    from jointscope.tools.bags import read_recording
+    from jointscope.tools.bags.read_recording import read_recording
 
     published = {p.name: p.published for p in doggy.parameters.values() if p.published is not None}
     recording = read_recording(doggy_data / "bearing_flexibility" / "test.bag", doggy).between(1.0, 5.0)

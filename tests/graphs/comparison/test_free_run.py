@@ -13,7 +13,7 @@ from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"

@@ -16,7 +16,7 @@ from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.terminal.comparison_text import comparison_text
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"

@@ -21,7 +21,7 @@ from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.starts.initial_guess import initial_states
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
 

@@ -13,7 +13,7 @@ from jointscope.graphs.transmission.transmission_search import _fails_elsewhere,
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
 COMPLIANCE = np.array([0.012, 0.008])  # [rad/(N m)]

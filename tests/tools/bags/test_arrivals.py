@@ -9,8 +9,10 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.arrivals import Arrivals
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import ArrivalReader, read_recording, write_bag
 from jointscope.tools.bags.needed_streams import needed_streams
+from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.write_bag import write_bag
 
 START = 1_700_000_000_000_000_000
 

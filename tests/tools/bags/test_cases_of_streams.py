@@ -11,8 +11,8 @@ import pytest
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.screening import screen
-from jointscope.tools.bags import ArrivalReader
 from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"

@@ -11,11 +11,11 @@ import pytest
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
 from jointscope.tools.bags.messages.fast_columns import fast_columns
 from jointscope.tools.bags.messages.field_path import field_path
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.slow_columns import slow_columns
+from jointscope.tools.bags.read_recording import read_recording
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
 POINT = "float64[] positions\nfloat64[] effort"

@@ -16,8 +16,8 @@ from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.recordings.screening import screen
-from jointscope.tools.bags import read_recording
 from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.init.robot_guess import guess_robot
 from jointscope.tools.init.streams.other_joints import Typed

@@ -10,7 +10,7 @@ import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import ArrivalReader
+from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.command_line import main
 
 ARM = {"shoulder": None, "elbow": "shoulder"}

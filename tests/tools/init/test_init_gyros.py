@@ -12,7 +12,7 @@ from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.screening import screen
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
 
 ARM = {"shoulder": None, "elbow": "shoulder", "wrist": "elbow"}

@@ -13,7 +13,8 @@ from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import ArrivalReader, read_recording
+from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
 
 ARM = {"shoulder": None, "elbow": "shoulder", "wrist": "elbow"}

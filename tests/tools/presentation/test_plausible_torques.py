@@ -17,7 +17,7 @@ from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.robots.bodies.possible_masses import impossible_masses
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
 from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.plausible_torques import plausible_torques

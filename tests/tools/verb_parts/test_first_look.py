@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.bags import write_bag
+from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
 from jointscope.tools.verb_parts.first_look import first_look
 

@@ -10,7 +10,7 @@ from result_page import ResultPage
 
 from jointscope.graphs.fixed_lag import estimator as estimator_module
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main, verbs
 from jointscope.tools.report.sections.closed_loop.loop_answer import loop_judgement
 

@@ -18,8 +18,9 @@ from jointscope.graphs.calibration import calibrate as calibrate_module
 from jointscope.graphs.comparison import compare as compare_module
 from jointscope.robots.files.robot_file import load_robot, ready_robots
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools import bags
+from jointscope.tools.bags import read_recording as read_module
 from jointscope.tools.bags.needed_streams import needed_streams
+from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main, verbs
 from jointscope.tools.presentation.judgement import judge
 
@@ -36,7 +37,7 @@ def in_own_folder(tmp_path, monkeypatch):
 @pytest.fixture
 def no_solving(monkeypatch):
     """Reading, calibrating and comparing give made-up results at once."""
-    monkeypatch.setattr(bags, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
+    monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
     monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress, solver: fake_calibration())
     monkeypatch.setattr(compare_module, "compare", lambda *args, progress: fake_comparison())
 
@@ -212,7 +213,7 @@ def test_values_that_are_not_finite_are_one_line_and_nothing_is_written(capsys):
         for need in needed_streams(robot)
     }
     streams["imu1"].values[:600, 0] = np.nan
-    bags.write_bag("a.mcap", Recording("", "", 10**18, streams), robot)
+    write_bag("a.mcap", Recording("", "", 10**18, streams), robot)
     text = complaint(capsys, "calibrate", "doggy", "a.mcap", "-o", "out.yaml", "--report", "r.html")
     assert "imu1.x is no number (NaN or infinite) in 600 of 1000 messages (60 %), the first at 0.000 s" in text
     assert files() == {"a.mcap"}
@@ -239,7 +240,7 @@ BAD_OUTPUTS = [
 
 @pytest.mark.parametrize(("outputs", "told"), BAD_OUTPUTS, ids=[told[:50] for _, told in BAD_OUTPUTS])
 def test_outputs_are_checked_before_anything_is_computed(outputs, told, capsys, monkeypatch):
-    monkeypatch.setattr(bags, "read_recording", raising(AssertionError("too early")))
+    monkeypatch.setattr(read_module, "read_recording", raising(AssertionError("too early")))
     Path("folder").mkdir()
     assert complaint(capsys, "calibrate", "doggy", "a.mcap", *outputs) == told
 

@@ -14,7 +14,7 @@ from fake_diagnosis import BEARING, fake_diagnosis, fake_inputs, fake_steps
 
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools import bags
+from jointscope.tools.bags import read_recording as read_module
 from jointscope.tools.command_line import main
 from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
@@ -46,7 +46,7 @@ def quick(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, _, _, train, test, _ = fake_inputs(0.5)
     known = {"a.mcap": train, "b.mcap": test}
-    monkeypatch.setattr(bags, "read_recording", lambda path, robot, progress=None: known[Path(path).name])
+    monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: known[Path(path).name])
     fake = SimpleNamespace(diagnose=lambda robot, recordings, holdout, **_: fake_diagnosis(0.5, held_out=False))
     monkeypatch.setitem(sys.modules, "jointscope.graphs.discovery.diagnose", fake)
 

@@ -3,6 +3,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +48,16 @@ def run(*arguments):
     info.add_parser(parser.add_subparsers())
     args = parser.parse_args(["info", *map(str, arguments)])
     return args.run(args)
+
+
+def test_a_bag_alone_is_described_without_what_only_robots_need(bag):
+    program = (
+        f"import sys\nfrom jointscope.tools.command_line import main\nassert main(['info', {str(bag)!r}]) == 0\n"
+        "assert not {'gtsam', 'pinocchio', 'scipy', 'numba', 'mujoco', 'rerun'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "/joint_states" in done.stdout
 
 
 def test_topics_are_described_with_rates_gaps_names_and_ranges(bag):

@@ -98,7 +98,7 @@ def test_what_does_not_go_together_is_one_line(tmp_path, monkeypatch, capsys, ar
     monkeypatch.chdir(tmp_path)
     (tmp_path / "p.csv").write_text("pose,q1\n0,1\n")
     if "info" in arguments:
-        from jointscope.tools.bags import write_bag
+        from jointscope.tools.bags.write_bag import write_bag
         from jointscope.tools.simulator import simulate
 
         doggy = load_robot("doggy")

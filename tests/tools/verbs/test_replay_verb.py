@@ -17,7 +17,7 @@ import jointscope.graphs.fixed_lag.replay.replay as replay_module
 from jointscope.graphs.fixed_lag.replay.batch_agreement import batch_agreement
 from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.errors import RecordingError
-from jointscope.tools.bags import write_bag
+from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
 from jointscope.tools.presentation.replay_judgement import judge_replay
 from jointscope.tools.report.replay_report import replay_report
@@ -51,7 +51,7 @@ def bag(doggy, tmp_path):
 
 @pytest.fixture
 def result(doggy, bag):
-    from jointscope.tools.bags import ArrivalReader
+    from jointscope.tools.bags.read_arrivals import ArrivalReader
 
     arrivals = ArrivalReader(bag, doggy)
     found = replay_module.replay(doggy, arrivals, 0.1, adapt={"joint1.stiffness": 0.5})
@@ -235,7 +235,7 @@ def test_the_file_of_the_viewer_has_all_parts(result, tmp_path):
 def test_live_sends_the_same_parts_piece_by_piece(doggy, bag, tmp_path, monkeypatch):
     import rerun as rr
 
-    from jointscope.tools.bags import ArrivalReader
+    from jointscope.tools.bags.read_arrivals import ArrivalReader
     from jointscope.tools.rerun_log import live_replay as module
 
     monkeypatch.setattr(module, "PAUSE", 0.0)

@@ -255,8 +255,6 @@ def _storage(path: Path) -> Path:
 
 
 def _reader(storage: Path, path: Path) -> tuple[Any, bool]:
-    from rosbags import rosbag1, rosbag2
-
     if storage.is_file() and storage.suffix not in BAG_SUFFIXES:
         raise RecordingError(
             f"{path} is not a bag: unknown suffix {storage.suffix!r}; expected .bag, .mcap, .db3 or a ROS 2 bag folder"
@@ -264,6 +262,12 @@ def _reader(storage: Path, path: Path) -> tuple[Any, bool]:
     try:
         if storage.stat().st_size == 0:
             raise RecordingError(f"the bag {path} is empty (0 bytes); record it again")
-        return (rosbag1.Reader(storage), False) if storage.suffix == ".bag" else (rosbag2.Reader(storage), True)
+        if storage.suffix == ".bag":
+            from rosbags import rosbag1
+
+            return rosbag1.Reader(storage), False
+        from rosbags import rosbag2
+
+        return rosbag2.Reader(storage), True
     except OSError as err:
         raise RecordingError(f"cannot read the bag {path}: {one_line(err)}") from err

@@ -16,10 +16,10 @@ from jointscope.robots.recordings.recording import Stream
 from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.fitting_messages import read_columns
 from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, joined_message_type
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
-from jointscope.tools.bags.read_recording import read_columns
 from jointscope.tools.bags.tidying.long_holes import LongHoles
 from jointscope.tools.bags.tidying.stream_notices import Timing, timing
 from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples

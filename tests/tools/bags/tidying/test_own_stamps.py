@@ -11,9 +11,9 @@ import pytest
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording
 from jointscope.tools.bags.clocks.own_stamps import at_message_stamps
 from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 
 STEP = 10_000_000  # [ns]
