@@ -28,7 +28,6 @@ from jointscope.robots.units import of_slide
 BANDS = (30.0, 15.0, 8.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FINE = 30.0  # [sensor sigma] error from which the model, not the sensor, limits the prediction
-WHOLE = 100.0  # [%] of the drive's torque; a robot cannot have moved as it did with more missing
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -39,7 +38,7 @@ class TorqueVerdicts:
     Attributes:
         candidates: best first.
         refits: robots with those that are missing, at their sizes.
-        missing: root mean square torque on blocks left out by joint [N m]; empty where it exceeds the drive's.
+        missing: root mean square torque on blocks left out by joint [N m].
         percent: the same in percent of the drive's.
         unexplained: share of its square that smooth laws would explain.
         sentence: all that in plain words.
@@ -77,8 +76,6 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: Model
     names, drive = [rows.joint for rows in judge.rows], judge.drive
     missing = dict(zip(names, map(float, judge.missing), strict=True))
     percent = {name: 100.0 * missing[name] / float(d) for name, d in zip(names, drive, strict=True)}
-    if max(percent.values()) > WHOLE:
-        missing, percent = {}, {}
     order = {"missing": 0, "stand_in": 1, "possible": 2, "absent": 3, "untestable": 4}
     shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
     scores = {label: j.score for label, j in found.items()}
@@ -173,11 +170,6 @@ def _with(robot: Robot, j: TorqueJudgement) -> Robot:
 
 def _sentence(robot: Robot, judge: TorqueJudge, missing: Mapping[str, float], percent: Mapping[str, float]) -> str:
     parts = []
-    if not missing:
-        return (
-            "The missing torque is not given in N m: on blocks left out the fit of the others asks for more than the "
-            "drive has, so only shares of it tell."
-        )
     for noise, (joint, value) in zip(judge.noise, missing.items(), strict=True):
         unit = of_slide("N m") if joint in robot.tree.slides else "N m"
         parts.append(

@@ -159,15 +159,26 @@ class TorqueJudge:
 
     @cached_property
     def _beside_base(self) -> tuple[Array, Array]:
-        """Orthonormal base columns, shape (m, p), and what they leave of the missing torque, shape (m,), whitened."""
-        X, y = self._white(self._everything), self._white(self._target)[:, 0]
-        Q, _ = np.linalg.qr(independent(X)) if X.shape[1] else (np.zeros((len(X), 0)), None)
+        """Orthonormal base columns, shape (m + p, p), and what they leave of the missing torque, shape (m + p,).
+
+        Both whitened, with the p priors of base parameters below: rows outside standstill leave some to them alone.
+        """
+        X, y = self._fitted
+        Q = np.linalg.qr(X)[0]
         return Q, y - Q @ (Q.T @ y)
+
+    @cached_property
+    def _fitted(self) -> tuple[Array, Array]:
+        """Base columns, shape (m + p, p), and missing torque, shape (m + p,), whitened, in prior sigmas."""
+        expected, sigma = self.equations.expected, self.equations.sigma
+        X, y = self._white(self._everything), self._white(self._target)[:, 0]
+        return np.vstack([X * sigma, np.eye(len(sigma))]), np.concatenate([y, expected / sigma])
 
     def _score(self, C: Array, hypothesis: EffectHypothesis) -> tuple[float, Array, Array]:
         """Score, sizes and their sigmas beside the base parameters; score 0 for gauges and impossible signs."""
         k, none = C.shape[1], (0.0, np.zeros(C.shape[1]), np.full(C.shape[1], np.inf))
-        Z, (Q, r) = self._white(C), self._beside_base
+        (Q, r), priors = self._beside_base, len(self.equations.sigma)
+        Z = np.vstack([self._white(C), np.zeros((priors, k))])
         rest = Z - Q @ (Q.T @ Z)
         if np.any(np.sum(rest**2, axis=0) <= GAUGE * np.sum(Z**2, axis=0)):
             return none
@@ -184,17 +195,15 @@ class TorqueJudge:
 
     def _left_out(self, C: Array) -> Array:
         """Missing torque with base parameters and columns fitted on the other folds, shape (m,)."""
-        X = np.hstack([independent(self._everything), C])
-        Xw, yw, folds = (
-            self._white(X),
-            self._white(self._target)[:, 0],
-            np.concatenate([b % FOLDS for b in self.blocks]),
-        )
-        left = np.empty(len(X))
+        (X, y), m = self._fitted, len(C)
+        fitted = np.hstack([X, np.vstack([self._white(C), np.zeros((len(X) - m, C.shape[1]))])])
+        columns = np.hstack([self._everything * self.equations.sigma, C])
+        folds = np.concatenate([*(b % FOLDS for b in self.blocks), np.full(len(X) - m, FOLDS)])
+        left = np.empty(m)
         for fold in range(FOLDS):
-            fit, judged = folds != fold, folds == fold
-            beta = np.linalg.lstsq(Xw[fit], yw[fit], rcond=1e-10)[0]
-            left[judged] = self._target[judged, 0] - X[judged] @ beta
+            judged = folds[:m] == fold
+            beta = np.linalg.lstsq(fitted[folds != fold], y[folds != fold], rcond=1e-10)[0]
+            left[judged] = self._target[judged, 0] - columns[judged] @ beta
         return left
 
     def _white(self, values: Array) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.factors.priors import DynamicsPrior
 from jointscope.graphs.problem.standstill import near, slowest_speed
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
@@ -79,11 +80,14 @@ class TorqueEquations:
         segments: linearised pieces of the recordings.
         windows: by segment, by equation.
         rows: one entry for each joint.
+        expected, sigma: change of the base parameters that their prior expects, and its standard deviation, shape (p,).
     """
 
     segments: Sequence[Segment]
     windows: list[list[Window]]
     rows: list[TorqueRows]
+    expected: Array
+    sigma: Array
 
     @staticmethod
     def of(segments: Sequence[Segment], band: float) -> TorqueEquations:
@@ -117,7 +121,9 @@ class TorqueEquations:
             times, missing, base, drive, q, v = (np.concatenate(c) for c in zip(*parts, strict=True))
             slowest = max(_slowest(s, j) for s in segments)
             found.append(TorqueRows(joint, times, missing, base, drive, q, v, slowest))
-        return TorqueEquations(segments, windows, found)
+        prior = DynamicsPrior.of(robot)
+        expected = -prior.residual((), segments[0].calibration)[0]
+        return TorqueEquations(segments, windows, found, expected, prior.sigma)
 
     def columns(self, hypothesis: EffectHypothesis) -> list[Array] | None:
         """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for readings."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Missing torque of one axis, made by hand: what is significant, what is large, and how large the noise is."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,6 +47,8 @@ class Equations:
 
     def __init__(self, rows):
         self.rows = rows
+        count = rows[0].base.shape[1]
+        self.expected, self.sigma = np.zeros(count), np.full(count, 100.0)
 
     def columns(self, hypothesis):
         return [hypothesis.column(self.rows[0].q, self.rows[0].v)[:, None]]
@@ -65,6 +68,18 @@ def test_a_constant_force_is_let_in_with_its_size():
     assert found.refused == ""
     assert found.share > 0.9
     assert abs(found.sizes[0] - 3.2) < 3.0 * found.sigmas[0] < 0.4
+
+
+@pytest.mark.parametrize("force", (3.2, 0.0))
+def test_what_is_missing_is_told_in_newtons_although_a_base_parameter_is_told_by_its_prior_alone(force):
+    judge = axis(1, lambda q, v: force + 0.0 * v)
+    (rows,) = judge.rows
+    # by the logarithm of k of 20 N tanh(k v), which is a sign long before the slowest of these rows
+    sharp = 2e4
+    base = np.column_stack([rows.base, 20.0 * sharp * rows.v / np.cosh(np.minimum(sharp * np.abs(rows.v), 300.0)) ** 2])
+    judge = TorqueJudge(Equations([replace(rows, base=base)]))
+    assert judge.missing[0] == pytest.approx(np.hypot(force, SIZE), rel=0.25)
+    assert judge.missing[0] < 0.1 * judge.drive[0]
 
 
 def test_what_is_there_but_small_is_said_and_not_let_in():
