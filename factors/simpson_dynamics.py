@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
-from jointscope.factors.step import selectors
 from jointscope.robots.dynamics.accelerations import Accelerations, RigidDerivatives
 
 Array = NDArray[np.float64]
@@ -74,29 +73,22 @@ class SimpsonDynamics(DynamicsFactor):
         calibration: Calibration,
         rigid: RigidDerivatives | None = None,
     ) -> Linearization:
-        layout, h = self.model.layout, self.steps.h[:, None, None]
-        Q, V = selectors(layout)
-        k = len(Q)
+        from jointscope.factors.step_kernel import step_derivatives  # numba takes half a second to import
+
+        layout, values = self.model.layout, calibration.values
         middle = self._middle(x0, x1, a0.value, a1.value)
-        values = calibration.values
         mid = self.model.with_derivatives(middle, self.command(values), values, rigid)
-        by_q_mid, by_v_mid = mid.by_state[:, :, layout.positions], h / 8.0 * mid.by_state[:, :, layout.rates]
-        # how a_mid follows x0 and x1 through the middle state
-        mid_by_x0 = 0.5 * mid.by_state + by_v_mid @ a0.by_state
-        mid_by_x1 = 0.5 * mid.by_state - by_v_mid @ a1.by_state
-        mid_by_x0[:, :, layout.velocities] += h / 8.0 * by_q_mid
-        mid_by_x1[:, :, layout.velocities] -= h / 8.0 * by_q_mid
-        mid_by_parameter = mid.by_parameter + by_v_mid @ (a0.by_parameter - a1.by_parameter)
-        sixth, twelfth = h / 6.0, h**2 / 12.0
-        half = 0.5 * h * V[:k]
+        m, r, d = mid.by_state.shape
+        k, p = len(layout.positions), mid.by_parameter.shape[2]
+        by_x0, by_x1, by_p = ((np.empty((m, r, c)), np.empty((m, k, c))) for c in (d, d, p))
+        ends = [np.ascontiguousarray(part) for part in (a0.by_state, mid.by_state, a1.by_state)]
+        ends += [np.ascontiguousarray(part) for part in (a0.by_parameter, mid.by_parameter, a1.by_parameter)]
+        step_derivatives(self.steps.h, layout.positions, layout.rates, *ends, *by_x0, *by_x1, *by_p)
         return self.assemble(
             self._defects(x0, x1, a0.value, mid.value, a1.value),
-            (-V - sixth * (a0.by_state + 4.0 * mid_by_x0), -Q - half - twelfth * a0.by_state[:, :k]),
-            (V - sixth * (a1.by_state + 4.0 * mid_by_x1), Q - half + twelfth * a1.by_state[:, :k]),
-            (
-                -sixth * (a0.by_parameter + 4.0 * mid_by_parameter + a1.by_parameter),
-                -twelfth * (a0.by_parameter - a1.by_parameter)[:, :k],
-            ),
+            by_x0,
+            by_x1,
+            by_p,
             calibration,
             mid,
         )

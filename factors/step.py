@@ -92,20 +92,20 @@ class Steps:
         return np.hstack([rates, positions])
 
     def combine(self, d_v: Array, d_q: Array) -> Array:
-        """Stacks rate and position defects (axis 1) into the rows whose noise is independent."""
+        """Stacks rate and position defects (axis 1) into the rows whose noise is independent.
+
+        Where W is given, link rows become impulses on the mean inertia.
+        """
         if not self.integrated:
             return np.concatenate([d_v, d_q], axis=1)
-        half = (0.5 * self.h).reshape(-1, *([1] * (d_v.ndim - 1)))
-        return np.concatenate([self._weighted(d_v), self._weighted(d_q - half * d_v[:, : d_q.shape[1]])], axis=1)
+        from jointscope.factors.step_kernel import combine  # numba takes half a second to import
 
-    def _weighted(self, defect: Array) -> Array:
-        """Link rows as impulses on the mean inertia, motor rows as they are."""
-        if self.weight is None:
-            return defect
-        n = self.weight.shape[1]
-        columns = defect[:, :n].reshape(len(defect), n, -1)
-        link = (self.weight @ columns).reshape(defect[:, :n].shape)
-        return np.concatenate([link, defect[:, n:]], axis=1)
+        shape = (len(d_v), d_v.shape[1] + d_q.shape[1], *d_v.shape[2:])
+        weight = np.zeros((len(d_v), 0, 0)) if self.weight is None else self.weight
+        found = np.empty((*shape[:2], d_v[:1, 0].size))
+        parts = (np.ascontiguousarray(d.reshape(*d.shape[:2], -1)) for d in (d_v, d_q))
+        combine(np.ascontiguousarray(weight), 0.5 * self.h, *parts, found)
+        return found.reshape(shape)
 
 
 def rate_sigmas(noise: ProcessNoise, h: Array) -> Array:

@@ -154,37 +154,29 @@ def _accumulate(
     linear: Linearization,
     columns: dict[str, slice],
 ) -> None:
-    r, J, by_block = whitened(factor, linear)
-    squares = 0.5 * np.einsum("kr,kr->k", r, r)
-    system.cost += float(np.sum(squares))
-    if J:
-        add_at(system.costs, ticks, squares)
-    _accumulate_shared(system, r, by_block, columns)
-    if not J:
-        return
-    from jointscope.graphs.kernels.accumulation import add_products  # numba takes half a second to import
+    from jointscope.graphs.kernels.accumulation import add_squares  # numba takes half a second to import
 
-    right = np.concatenate([*by_block.values(), r[:, :, None]], axis=2)
-    places = np.concatenate([np.arange(columns[b].start, columns[b].stop) for b in by_block] + [_NONE])
-    for i, J_i in enumerate(J):
-        add_products(np.ascontiguousarray(J_i), right, system.D, system.B, system.g_x, ticks + i, places)
-    if len(J) == 2 and system.D_next is not None and system.g_next is not None:
-        transposed = J[0].transpose(0, 2, 1)
-        add_at(system.D_next, ticks, transposed @ J[0])
-        add_at(system.g_next, ticks, (transposed @ r[:, :, None])[:, :, 0])
-    if len(J) == 2:
-        add_at(system.E, ticks, J[1].transpose(0, 2, 1) @ J[0])
-
-
-def _accumulate_shared(
-    system: NormalEquations, r: Array, by_block: dict[str, Array], columns: dict[str, slice]
-) -> None:
-    """Corner and gradient of the shared values."""
-    flat = {block: P.reshape(P.shape[0] * P.shape[1], P.shape[2]) for block, P in by_block.items()}
-    for a, P_a in flat.items():
-        system.g_p[columns[a]] += P_a.T @ r.ravel()
-        for b, P_b in flat.items():
-            system.C[columns[a], columns[b]] += P_a.T @ P_b
+    m, rows = linear.residual.shape
+    d, p = system.D.shape[1], [*linear.by_block.values(), np.zeros((m, rows, 0))]
+    places = np.concatenate([np.arange(columns[b].start, columns[b].stop) for b in linear.by_block] + [_NONE])
+    none, nothing = np.zeros((0, rows, d)), np.zeros((0, d))
+    J = (*linear.by_state, none, none)[:2]
+    weights = 1.0 / np.broadcast_to(factor.sigmas, (m, rows))
+    parts = (weights, linear.residual, p[0] if len(p) == 2 else np.concatenate(p, axis=2), *J)
+    system.cost += add_squares(
+        *(np.ascontiguousarray(part) for part in parts),
+        np.asarray(ticks, dtype=np.intp),
+        places,
+        system.D,
+        system.E,
+        system.B,
+        system.C,
+        system.g_x,
+        system.g_p,
+        system.costs,
+        nothing[:, :, None] if system.D_next is None else system.D_next,
+        nothing if system.g_next is None else system.g_next,
+    )
 
 
 def add_at(target: Array, index: NDArray[np.intp], values: Array) -> None:

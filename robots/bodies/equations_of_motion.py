@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""M(q) a + c(q, v) + g(q) = tau of a tree of bodies, by pinocchio: for many samples, and for one at a time.
+"""M(q) a + c(q, v) + g(q) = tau of a tree of bodies: for many samples, and for one at a time.
 
-Where every coordinate of the model is a joint of its own, pinocchio does all of it. Where coordinates are coupled,
+Accelerations of many samples and their derivatives are those of tree_recursion.py, all else is pinocchio's. Where
+coordinates are coupled,
 q_model = G q + offset, the same laws hold for what is left,
 
     M = G' M_model G,    tau = G' tau_model,    a = M^-1 (tau - c - g),
@@ -12,10 +13,13 @@ pinocchio returns windows into its `data`, which its next call overwrites: every
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.body_rates import unit_motion
 from jointscope.robots.bodies.coupling import Coupling
 
 Array = NDArray[np.float64]
@@ -36,24 +40,28 @@ class FreeEquations:
         """Pinocchio cannot pickle a pool; a copy makes its own."""
         return FreeEquations, (self._model,)
 
+    @cached_property
+    def _tree(self) -> tuple[NDArray[np.intp], Array, Array]:
+        return joint_table(self._model)
+
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Accelerations of many samples; arguments and result of shape (m, n)."""
         if len(q) == 1:
             return self.acceleration_at(q[0], v[0], tau[0])[None]
-        a = np.empty(q.shape[::-1], order="F")
-        columns = (np.asfortranarray(part.T) for part in (q, v, tau))
-        pin.abaInParallel(1, self._pool, *columns, a)
-        return np.ascontiguousarray(a.T)
+        return self._recursion(q, v, tau, wanted=0)[0]
 
     def derivatives(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """Accelerations, shape (m, n), and their derivatives by q, v and tau, each of shape (m, n, n)."""
+        return self._recursion(q, v, tau, wanted=len(q))
+
+    def _recursion(self, q: Array, v: Array, tau: Array, wanted: int) -> Derivatives:
+        from jointscope.robots.bodies.tree_recursion import accelerations  # numba takes half a second to import
+
         m, n = q.shape
-        a, da_dq, da_dv, M_inverse = np.empty((m, n)), np.empty((m, n, n)), np.empty((m, n, n)), np.empty((m, n, n))
-        model, data, derivatives = self._model, self._data, pin.computeABADerivatives
-        for k in range(m):
-            da_dq[k], da_dv[k], M_inverse[k] = derivatives(model, data, q[k], v[k], tau[k])
-            a[k] = data.ddq
-        return a, da_dq, da_dv, M_inverse
+        a, by_q, by_v, M_inverse = np.empty((m, n)), *np.empty((3, wanted, n, n))
+        motion = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, v, tau))
+        accelerations(*self._tree, *motion, a, by_q, by_v, M_inverse)
+        return a, by_q, by_v, M_inverse
 
     def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
         """Accelerations at one state, shape (n,)."""
@@ -151,3 +159,27 @@ Equations = FreeEquations | CoupledEquations
 def equations_of(model: pin.Model, coupling: Coupling | None) -> Equations:
     """The equations of a model."""
     return FreeEquations(model) if coupling is None else CoupledEquations(model, coupling)
+
+
+def joint_table(model: pin.Model) -> tuple[NDArray[np.intp], Array, Array]:
+    """Parents, table of the joints and gravity, as `tree_recursion.accelerations` wants them."""
+    rows, R_joint_axes = [], [np.eye(3)]  # frames with the joint's axis for their z axis
+    for joint in range(1, model.njoints):
+        motion, parent = unit_motion(model, joint), model.parents[joint]
+        turns = bool(np.any(motion.angular))
+        z = motion.angular if turns else motion.linear
+        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+        x /= np.linalg.norm(x)
+        R, R_before = np.column_stack([x, np.cross(z, x), z]), R_joint_axes[parent]
+        placement = model.jointPlacements[joint]
+        R_joint_axes.append(R)
+        mass, *h = (parameters := model.inertias[joint].toDynamicParameters())[:4]
+        xx, xy, yy, xz, yz, zz = parameters[4:]
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        sigma = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        rotation, origin = R_before.T @ placement.rotation @ R, R_before.T @ placement.translation
+        second = R.T @ sigma @ R
+        rows.append(np.concatenate([rotation.ravel(), origin, [turns, mass], R.T @ h, second.ravel(), [0.0]]))
+    table = np.array(rows).reshape(model.nv, -1)
+    table[:, -1] = model.armature
+    return np.array(model.parents)[1:] - 1, table, np.array(model.gravity.linear)

@@ -14,11 +14,12 @@ import numba
 
 # sums may be reordered and products fused; NaN and infinity keep their meaning, since callers ask for them
 ARITHMETIC = {"contract", "reassoc", "nsz", "arcp"}
+OPTIONS: dict[str, Any] = {"fastmath": ARITHMETIC, "nogil": True, "error_model": "numpy"}  # 1 / 0 is infinite
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """The function in machine code; it lets other threads run beside it."""
     try:
-        return numba.njit(fastmath=ARITHMETIC, nogil=True, cache=True)(function)
+        return numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # there is no folder that can be written
-        return numba.njit(fastmath=ARITHMETIC, nogil=True)(function)
+        return numba.njit(**OPTIONS)(function)
