@@ -18,9 +18,9 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
-from jointscope.graphs.poses.tip_errors import TipErrors
+from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import base_from_tracker
-from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
+from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -104,41 +104,39 @@ def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress 
     report("looking at the poses", 0.0)
     robot, problems = placed(robot, sessions)
     screen_poses(problems)
-    before = tuple(_errors(problems, _starts(problems)))
+    before = tuple(tip_errors(problem) for problem in problems)
     out: list[tuple[str, str, float]] = []
-    scale, iterations, solution = 1.0, 0, None
-    from_before: Sequence[Calibration] = ()
+    scale, iterations = 1.0, 0
+    known: Sequence[Calibration] = ()
     for i in range(PASSES):
         problems = [replace(problem, repeatability=scale) for problem in problems]
-        start = _estimate(problems, solution, from_before)
-        solution = solve(problems, start, max_iterations=MOST_ITERATIONS, progress=None)
-        iterations += len(solution.iterations)
+        solution = solve(problems, _estimate(problems, known), max_iterations=MOST_ITERATIONS, progress=None)
+        iterations, known = iterations + len(solution.iterations), solution.estimate.calibrations
         report(f"pass {i + 1}, cost {solution.cost:.6g}", (i + 1) / PASSES)
         if not (solution.converged or solution.flat):
             raise SolveError(
                 f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
-        distances = [squared_distances(p, c) for p, c in zip(problems, solution.estimate.calibrations, strict=True)]
+        distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=True)]
         worst = max(float(d.max()) for d in distances)
-        if i and worst > OUTLYING:
+        if 0 < i < PASSES - 1 and worst > OUTLYING:
             problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
             out += found
-            from_before = solution.estimate.calibrations
-            solution = None
             if len(out) > MOST_OUT * sum(map(len, sessions)):
                 raise SolveError(
                     f"{len(out)} poses fit no arm, as {out[0][1]} of {out[0][0]} by {out[0][2]:.0f} sigma: check joint "
                     "angles that had not settled, targets that were lost, and names and units of columns"
                 )
             continue
-        ratio = _chi2(problems, solution, distances)
+        covariance = posteriors(problems, solution)[1]
+        ratio = _chi2(problems, known[0], covariance, distances)
         wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
         if abs(np.log(wanted / scale)) < AGREES:
             break
         scale = float(wanted)
-    assert solution is not None
-    return _result(robot, problems, solution, before, scale, ratio, out, iterations, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    return _result(robot, problems, known, covariance, before, scale, ratio, out, iterations, seconds)
 
 
 def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:
@@ -154,22 +152,16 @@ def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet
         return robot, problems
     placed = []
     for problem in problems:
-        e, calibration = problem.start(Calibration.of(robot))
-        targets = problem.arm.at(problem.q, e, problem.values(calibration)).target
+        values = problem.values(Calibration.of(robot))
+        targets = problem.arm.at(problem.q, np.zeros_like(problem.q), values).target
         assert problem.poses.target is not None
         placed.append(replace(problem, tracker=base_from_tracker(targets, problem.poses.target)[0]))
     robot = replace(robot, poses=replace(setup, tracker=placed[0].tracker))
     return robot, [problem.of_robot(robot) for problem in placed]
 
 
-def _starts(problems: Sequence[PoseSet]) -> list[Calibration]:
-    return [problem.start(Calibration.of(problem.robot))[1] for problem in problems]
-
-
-def _estimate(problems: Sequence[PoseSet], before: Solution | None, known: Sequence[Calibration]) -> Estimate:
-    """Where to go on: at the last solution, at values that were known with other poses, or at the start values."""
-    if before is not None:
-        return before.estimate
+def _estimate(problems: Sequence[PoseSet], known: Sequence[Calibration]) -> Estimate:
+    """Where to go on: at values that were found before, perhaps with other poses, or at the start values."""
     starts = [problem.start(Calibration.of(problem.robot)) for problem in problems]
     found = [start for _, start in starts]
     if known:
@@ -178,32 +170,17 @@ def _estimate(problems: Sequence[PoseSet], before: Solution | None, known: Seque
     return Estimate(tuple(x for x, _ in starts), tuple(found))
 
 
-def _errors(problems: Sequence[PoseSet], calibrations: Sequence[Calibration]) -> list[TipErrors]:
-    """Errors with transmissions that do nothing unseen."""
-    found = []
-    for problem, calibration in zip(problems, calibrations, strict=True):
-        e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
-        found.append(TipErrors(problem.misses(problem.point(e, calibration), calibration)))
-    return found
-
-
 def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
     """Squared distance of each pose in sigmas, transmissions and noise of the target together, shape (m,)."""
-    assert problem.robot.poses is not None
-    e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
-    point = problem.point(e, calibration)
-    J = point.by_joint * problem.sigmas
-    V = J @ np.swapaxes(J, 1, 2) + problem.robot.poses.target_sigma**2 * np.eye(3)
+    point = problem.point(calibration)
     r = problem.misses(point, calibration)
-    return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(V, r[:, :, None])[:, :, 0]))
+    return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(problem.covariances(point), r[:, :, None])[:, :, 0]))
 
 
-def _chi2(problems: Sequence[PoseSet], solution: Solution, distances: Sequence[Array]) -> float:
+def _chi2(problems: Sequence[PoseSet], first: Calibration, covariance: Array, distances: Sequence[Array]) -> float:
     """Squared distances per degree of freedom that the fit has left."""
-    rows = sum(problem.measured for problem in problems)
-    _, covariance = posteriors(problems, solution)
-    robot, index = problems[0].robot, solution.estimate.calibrations[0].columns[DYNAMICS]
-    prior = np.array([robot.parameters[name].coordinate_sigma for name in solution.estimate.calibrations[0].names])
+    rows, index = sum(problem.measured for problem in problems), first.columns[DYNAMICS]
+    prior = np.array([problems[0].robot.parameters[name].coordinate_sigma for name in first.names])
     used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
 
@@ -224,7 +201,8 @@ def _without_outliers(
 def _result(
     robot: Robot,
     problems: Sequence[PoseSet],
-    solution: Solution,
+    calibrations: Sequence[Calibration],
+    covariance: Array,
     before: tuple[TipErrors, ...],
     scale: float,
     chi2: float,
@@ -232,8 +210,6 @@ def _result(
     iterations: int,
     seconds: float,
 ) -> PoseCalibration:
-    _, covariance = posteriors(list(problems), solution)
-    calibrations = solution.estimate.calibrations
     first, index = calibrations[0], calibrations[0].columns[DYNAMICS]
     own = covariance[index, index]
     sigmas = np.sqrt(np.diag(own)) * first.value_by_coordinate
@@ -246,15 +222,14 @@ def _result(
     found = replace(found, parameters=parameters, poses=setup)
     columns: dict[str, list[Array]] = {}
     for problem, calibration in zip(problems, calibrations, strict=True):
-        e = np.zeros((len(problem.poses), len(problem.arm.chain.joints)))
-        for name, column in problem.point(e, calibration).by_value.items():
+        for name, column in problem.point(calibration).by_value.items():
             columns.setdefault(name, []).append(column)
     order = [n for n in (*error_names(problems[0].arm.chain.joints), *_gaps(first)) if n in columns]
     told = determined({name: np.concatenate(columns[name]) for name in order}, order)
-    errors = tuple(_errors(problems, calibrations))
+    errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
-        found, robot, tuple(problems), calibrations, first.names, own, errors, before, told, scale, chi2, tuple(out),
-        iterations, seconds,
+        found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, chi2,
+        tuple(out), iterations, seconds,
     )  # fmt: skip
 
 

@@ -16,9 +16,16 @@ from numpy.typing import NDArray
 from scipy.special import gammaincc
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, placed, squared_distances
+from jointscope.graphs.poses.calibrate_poses import (
+    TOUCHED,
+    PoseCalibration,
+    calibrate_poses,
+    placed,
+    squared_distances,
+)
 from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, with_effect
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
 from jointscope.robots.geometry.pose_effects import PoseHypothesis, hypotheses
 from jointscope.robots.model.robot import Robot
@@ -40,7 +47,7 @@ class PoseCandidate:
     Attributes:
         hypothesis: effect and owner.
         score: fall of chi2 on all poses.
-        p_value: of that fall by chance.
+        p_value: of that fall by chance, of the best one of as many orders as were looked at.
         gain: share of the squared distances of left-out poses that it takes away.
         helped: share of the folds that it helps.
         sizes, sigmas: of its parameters; of stiffnesses their compliances.
@@ -132,10 +139,11 @@ def pose_candidates(result: PoseCalibration) -> list[PoseCandidate]:
     """All effects that a calibrated arm lacks, best first."""
     linear, chain = LinearPoses.of(result), result.problems[0].arm.chain
     tracked = any(problem.poses.target is not None for problem in result.problems)
-    looked_at = hypotheses(chain.joints, result.robot.parameters, tracked)
+    looked_at = [with_best_order(linear, result, h) for h in hypotheses(chain.joints, result.robot.parameters, tracked)]
     columns = [linear.whitened(columns_of(result, h)) for h in looked_at]
-    found = [_judged(linear, h, extra, len(looked_at)) for h, extra in zip(looked_at, columns, strict=True)]
-    left = [_beside(linear, extra) for extra in columns]
+    judge = _Judge(linear, len(looked_at))
+    found = [judge.candidate(h, extra) for h, extra in zip(looked_at, columns, strict=True)]
+    left = [_space(linear.beside(extra)) for extra in columns]
     named = []
     for i, candidate in enumerate(found):
         alike = [
@@ -148,32 +156,53 @@ def pose_candidates(result: PoseCalibration) -> list[PoseCandidate]:
     return sorted(named, key=lambda c: -c.gain)
 
 
-def _judged(linear: LinearPoses, hypothesis: PoseHypothesis, extra: Array, count: int) -> PoseCandidate:
-    sigmas = np.full(extra.shape[1], hypothesis.kind.size)
-    nothing = np.zeros((len(linear.r), 0))
-    base, _ = linear.fitted(nothing, np.zeros(0))
-    step, covariance = linear.fitted(extra, sigmas)
-    score = float(linear.left(nothing, base).sum() - linear.left(extra, step).sum())
-    p_value = float(gammaincc(0.5 * extra.shape[1], max(score, 0.0) / 2.0))
-    before, after = [], []
-    folds = _folds(linear.groups)
-    for fold in range(int(folds.max()) + 1):
-        held = folds == fold
-        without, _ = linear.fitted(nothing, np.zeros(0), ~held)
-        tried, _ = linear.fitted(extra, sigmas, ~held)
-        before.append(float(linear.left(nothing, without)[held].sum()))
-        after.append(float(linear.left(extra, tried)[held].sum()))
-    gain = 1.0 - sum(after) / max(sum(before), 1e-300)
-    helped = float(np.mean(np.array(after) < np.array(before)))
-    sizes, own = step[len(linear.prior) :], np.sqrt(np.diag(covariance))[len(linear.prior) :]
-    possible = not hypothesis.kind.soft or (bool(np.all(sizes > -own)) and bool(np.any(sizes > own)))
-    significant = p_value * count < CHANCE
-    verdict = "missing" if significant and gain > GAIN and helped >= MOST and possible else "absent"
-    if verdict == "absent" and p_value < 1e-3 and gain > 0.0 and possible:
-        verdict = "possible"
-    return PoseCandidate(
-        hypothesis, score, p_value, gain, helped, tuple(sizes.tolist()), tuple(own.tolist()), (), verdict
-    )
+class _Judge:
+    """What effects are worth on poses that they were not fitted to.
+
+    Args:
+        linear: the poses.
+        count: number of effects that are looked at.
+    """
+
+    def __init__(self, linear: LinearPoses, count: int):
+        self._linear, self._count = linear, count
+        self._folds = _folds(linear.groups)
+        nothing = np.zeros((len(linear.r), 0))
+        base, _ = linear.fitted(nothing, np.zeros(0))
+        self._left = float(linear.left(nothing, base).sum())
+        self._before = self._left_out(nothing, np.zeros(0))
+
+    def candidate(self, hypothesis: PoseHypothesis, extra: Array) -> PoseCandidate:
+        """An effect with whitened columns of shape (3 m, k)."""
+        linear, kind = self._linear, hypothesis.kind
+        sigmas = np.full(extra.shape[1], kind.size)
+        step, covariance = linear.fitted(extra, sigmas)
+        score = self._left - float(linear.left(extra, step).sum())
+        p_value = min(max(len(kind.orders), 1) * float(gammaincc(0.5 * extra.shape[1], max(score, 0.0) / 2.0)), 1.0)
+        after = self._left_out(extra, sigmas)
+        gain = 1.0 - after.sum() / max(self._before.sum(), 1e-300)
+        helped = float(np.mean(after < self._before))
+        p = len(linear.pull)
+        sizes, own = step[p:], np.sqrt(np.diag(covariance))[p:]
+        possible = not kind.soft or (bool(np.all(sizes > -own)) and bool(np.any(sizes > own)))
+        significant = p_value * self._count < CHANCE
+        verdict = "missing" if significant and gain > GAIN and helped >= MOST and possible else "absent"
+        if verdict == "absent" and p_value < 1e-3 and gain > 0.0 and possible:
+            verdict = "possible"
+        if np.all(own > TOUCHED * sigmas):
+            verdict = "untestable"
+        return PoseCandidate(
+            hypothesis, score, p_value, float(gain), helped, tuple(sizes.tolist()), tuple(own.tolist()), (), verdict
+        )
+
+    def _left_out(self, extra: Array, sigmas: Array) -> Array:
+        """Squared distances of each fold, fitted to all others."""
+        found = []
+        for fold in range(int(self._folds.max()) + 1):
+            held = self._folds == fold
+            step, _ = self._linear.fitted(extra, sigmas, ~held)
+            found.append(self._linear.left_out(extra, step, held))
+        return np.array(found)
 
 
 def _folds(groups: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -182,12 +211,9 @@ def _folds(groups: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.asarray(groups % min(FOLDS, count))
 
 
-def _beside(linear: LinearPoses, extra: Array) -> Array:
-    """What is left of columns when everything else may explain them, orthonormal, shape (3 m, k)."""
-    A = np.vstack([linear.J, np.diag(linear.prior)])
-    wide = np.vstack([extra, np.zeros((len(linear.prior), extra.shape[1]))])
-    rest = wide - A @ np.linalg.lstsq(A, wide, rcond=1e-12)[0]
-    U, s, _ = np.linalg.svd(rest, full_matrices=False)
+def _space(columns: Array) -> Array:
+    """Orthonormal basis of what is left of columns."""
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(U[:, s > 1e-9 * max(float(s.max(initial=0.0)), 1e-300)])
 
 

@@ -84,10 +84,9 @@ class PoseSet:
 
     def start(self, common: Calibration) -> tuple[Array, Calibration]:
         """No transmission error; contacts where the start values have the target on average."""
-        e = np.zeros((len(self.poses), len(self.arm.chain.joints)))
         calibration = common.only([DYNAMICS])
         if self.contacts:
-            target = self.point(e, calibration).target
+            target = self.point(calibration).target
             named = np.array(self.poses.contacts)
             calibration = calibration.with_blocks(
                 [
@@ -95,20 +94,25 @@ class PoseSet:
                     for i, c in enumerate(self.contacts)
                 ]
             )
-        return e, calibration
+        return np.zeros_like(self.q), calibration
 
     def values(self, calibration: Calibration) -> dict[str, float]:
         """Values of all parameters, those that are held included."""
         held = {name: p.value for name, p in self.robot.parameters.items() if p.fixed}
         return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
 
-    def point(self, e: Array, calibration: Calibration) -> SaggingPoint:
-        """Where the target is: in the axes of the tracker, or in those of the base where contacts hold it."""
-        return self.seen(e, self.values(calibration))
+    def point(self, calibration: Calibration, e: Array | None = None) -> SaggingPoint:
+        """Where the target is: in the axes of the tracker, or in those of the base where contacts hold it.
 
-    def seen(self, e: Array, values: Mapping[str, float]) -> SaggingPoint:
+        Args:
+            calibration: the values.
+            e: what transmissions do unseen, shape (m, n) [rad]; None for nothing.
+        """
+        return self.seen(self.values(calibration), e)
+
+    def seen(self, values: Mapping[str, float], e: Array | None = None) -> SaggingPoint:
         """The same for values of all parameters by name."""
-        found = self.arm.at(self.q, e, values)
+        found = self.arm.at(self.q, np.zeros_like(self.q) if e is None else e, values)
         return found if self.poses.contacts else in_tracker(found, self.tracker, values, self.poses.shares)
 
     def columns(self, point: SaggingPoint, calibration: Calibration) -> Array:
@@ -129,10 +133,24 @@ class PoseSet:
             return point.target - self.poses.target
         return point.target - np.array([calibration[contact_block(c)] for c in self.poses.contacts])
 
+    def covariances(self, point: SaggingPoint) -> Array:
+        """Of what is missed: transmissions and noise of the target, shape (m, 3, 3) [m^2]."""
+        assert self.robot.poses is not None
+        J = point.by_joint * self.sigmas
+        return np.asarray(J @ np.swapaxes(J, 1, 2) + self.robot.poses.target_sigma**2 * np.eye(3))
+
+    @cached_property
+    def pairs(self) -> dict[str, tuple[str, str]]:
+        """The two contacts of each place that has two."""
+        by_place: dict[str, list[str]] = {}
+        for contact, place in self.poses.places:
+            by_place.setdefault(place, []).append(contact)
+        return {place: (found[0], found[1]) for place, found in by_place.items() if len(found) == 2}
+
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations at transmission errors of shape (m, n)."""
         assert self.robot.poses is not None
-        point, sigma = self.point(x, calibration), self.robot.poses.target_sigma
+        point, sigma = self.point(calibration, x), self.robot.poses.target_sigma
         r, J, P = (
             self.misses(point, calibration) / sigma,
             point.by_joint / sigma,
@@ -151,21 +169,22 @@ class PoseSet:
 
     def _add_distances(self, system: NormalEquations, calibration: Calibration) -> None:
         """Contacts of one place are a known distance apart."""
+        r, J = self.distances(calibration)
+        system.C += J.T @ J
+        system.g_p += J.T @ r
+        system.cost += 0.5 * float(r @ r)
+
+    def distances(self, calibration: Calibration) -> tuple[Array, Array]:
+        """Whitened residuals of the known distances, shape (d,), and their derivatives, shape (d, p)."""
         setup = self.robot.poses
         assert setup is not None
-        if setup.contact_distance is None:
-            return
-        by_place: dict[str, list[str]] = {}
-        for contact, place in self.poses.places:
-            by_place.setdefault(place, []).append(contact)
-        for pair in (contacts for contacts in by_place.values() if len(contacts) == 2):
-            a, b = (calibration[contact_block(contact)] for contact in pair)
-            distance = float(np.linalg.norm(a - b))
-            row = np.zeros(calibration.size)
-            along = (a - b) / max(distance, 1e-12) / setup.target_sigma
-            row[calibration.columns[contact_block(pair[0])]] = along
-            row[calibration.columns[contact_block(pair[1])]] = -along
-            r = (distance - setup.contact_distance) / setup.target_sigma
-            system.C += np.outer(row, row)
-            system.g_p += row * r
-            system.cost += 0.5 * r * r
+        pairs = [] if setup.contact_distance is None else list(self.pairs.values())
+        r, J = np.zeros(len(pairs)), np.zeros((len(pairs), calibration.size))
+        for i, pair in enumerate(pairs):
+            apart = calibration[contact_block(pair[0])] - calibration[contact_block(pair[1])]
+            distance = float(np.linalg.norm(apart))
+            along = apart / max(distance, 1e-12) / setup.target_sigma
+            for contact, sign in zip(pair, (1.0, -1.0), strict=True):
+                J[i, calibration.columns[contact_block(contact)]] = sign * along
+            r[i] = (distance - (setup.contact_distance or 0.0)) / setup.target_sigma
+        return r, J

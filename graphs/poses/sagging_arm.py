@@ -2,7 +2,7 @@
 """An arm that sags: where its target is for given angles of the motors, and how that depends on every value.
 
 Gravity is taken where the arm has sagged; a second look changes the target by nanometres (Neubauer et al. 2015, eq. 12
-to 14).
+to 14). Derivatives are those of the equilibrium: what moves the arm moves its weight, too.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from jointscope.graphs.poses.what_gives_way import WhatGivesWay
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.pose_section import no_poses
-from jointscope.robots.geometry.arm_chain import ArmChain
+from jointscope.robots.geometry.arm_chain import ArmChain, ChainPoint
 from jointscope.robots.geometry.error_parameters import LENGTHS, TRACKER
+from jointscope.robots.geometry.gravity_slopes import gravity_slopes
 from jointscope.robots.geometry.pose_effects import DRIFT
 from jointscope.robots.model.robot import Robot
 
@@ -62,14 +63,35 @@ class SaggingArm:
 
     def at(self, q: Array, e: Array, values: Mapping[str, float]) -> SaggingPoint:
         """The target for angles and transmission errors of the chain's joints, shape (m, n) each [rad]."""
-        chain, parts = self.chain, WhatGivesWay(self.chain.joints, self.chain.gravity_vector, values)
+        chain, parts = self.chain, WhatGivesWay(self.chain.joints, values)
         read = q + e + parts.waves(q)
         rigid = point = chain.at(read, values)
         for _ in range(LOOKS if parts.some else 0):
             turn, tilt = parts.deflections(point)
             point = chain.at(read + turn, values, tilt)
-        columns = dict(point.by_error) | parts.columns(q, point)
-        return SaggingPoint(point.target, point.by_joint, columns, point.target - rigid.target)
+        columns, by_yield = _following(chain, point, parts) if parts.some else (point.by_error, _by_yield(point))
+        by_value = {**columns, **parts.columns(q, point, by_yield)}
+        return SaggingPoint(point.target, by_yield[:, :, : len(chain.joints)], by_value, point.target - rigid.target)
+
+
+def _by_yield(point: ChainPoint) -> Array:
+    """Derivative of the target by turns of the joints, then by tilts of the bearings about x' and y', (m, 3, 3 n)."""
+    return np.concatenate([point.by_joint, point.by_bearing[..., 0], point.by_bearing[..., 1]], axis=2)
+
+
+def _following(chain: ArmChain, point: ChainPoint, parts: WhatGivesWay) -> tuple[dict[str, Array], Array]:
+    """Derivatives by geometry and masses, and by what gives way, when everything soft follows gravity.
+
+    Deflections x = C tau(x, v) make the target move by T (1 - C H)^-1 C dtau/dv beside what it does itself.
+    """
+    slopes, soft = gravity_slopes(chain.joints, point, chain.gravity_vector), parts.softness(point)
+    kept = np.eye(soft.shape[1]) - soft[:, :, None] * slopes.by_turn
+    by_yield = np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(_by_yield(point), 1, 2)), 1, 2)
+    by_load = by_yield * soft[:, None]
+    found = {name: np.einsum("mka,ma->mk", by_load, slope) for name, slope in slopes.by_value.items()}
+    still = np.zeros_like(point.target)
+    names = dict.fromkeys([*point.by_error, *found])
+    return {name: point.by_error.get(name, still) + found.get(name, still) for name in names}, by_yield
 
 
 def in_tracker(

@@ -66,8 +66,7 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         )
     if len(poses) < FEWEST:
         return
-    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
-    predicted = problem.point(e, calibration).target
+    predicted = problem.point(Calibration.of(problem.robot).only([DYNAMICS])).target
     misses = float(np.sqrt(np.mean(np.sum((predicted - target) ** 2, axis=1))))
     if misses < LARGEST_ERROR:
         return

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.pose_set import PoseSet, contact_block
 from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, STIFFNESS
 from jointscope.robots.model.robot import Robot
@@ -43,11 +43,16 @@ class TipErrors:
         }
 
 
-def tip_errors(problem: PoseSet) -> TipErrors:
-    """Errors of a robot's own values, nothing fitted; the points of contacts alone are those that fit best."""
-    e, calibration = problem.start(Calibration.of(problem.robot))
-    point = problem.point(e, calibration.only([DYNAMICS]) if not problem.contacts else calibration)
-    return TipErrors(problem.misses(point, calibration))
+def tip_errors(problem: PoseSet, calibration: Calibration | None = None) -> TipErrors:
+    """Errors with transmissions that do nothing unseen.
+
+    Args:
+        problem: the poses.
+        calibration: values, points of contacts included; None for the robot's own values and the points that fit best.
+    """
+    if calibration is None:
+        calibration = problem.start(Calibration.of(problem.robot))[1]
+    return TipErrors(problem.misses(problem.point(calibration), calibration))
 
 
 def without_sag(robot: Robot) -> Robot:
@@ -83,11 +88,8 @@ def parts_of(problem: PoseSet) -> dict[str, TipErrors]:
 
 def contact_distances(problem: PoseSet, calibration: Calibration) -> dict[str, float]:
     """Distance of the two contacts of each place that has two [m]."""
-    by_place: dict[str, list[Array]] = {}
-    for contact, place in problem.poses.places:
-        if contact in problem.contacts:
-            by_place.setdefault(place, []).append(calibration[contact_block(contact)])
-    return {place: float(np.linalg.norm(pair[0] - pair[1])) for place, pair in by_place.items() if len(pair) == 2}
+    points = {place: [calibration[contact_block(c)] for c in pair] for place, pair in problem.pairs.items()}
+    return {place: float(np.linalg.norm(a - b)) for place, (a, b) in points.items()}
 
 
 def summary(errors: Sequence[TipErrors]) -> TipErrors:

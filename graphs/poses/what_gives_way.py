@@ -1,23 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What makes an arm at rest differ from a rigid one with perfect encoders, joint by joint.
 
-    q_j = q_motor_j + c cos(q_motor_j) + s sin(q_motor_j) + e_j + x_j - sign(g_j) w_j,    k x + k3 x^3 = g
-    beta = g_beta / k_beta
+    q_j = q_motor_j + sum_o (c_o cos(o q_motor_j) + s_o sin(o q_motor_j)) + e_j + x_j - sign(g_j) w_j
+    k x + k3 x^3 = g,    beta = g_beta / k_beta
 
-c and s are the eccentricity of an encoder, e is what the transmission does unseen, g the torque of gravity and
-of a payload at the target, w the backlash as Neubauer et al. (2015, eq. 18) have it.
+c and s are the eccentricity of an encoder (o = 1) and the ripple of a gear (o waves per turn), e is what the
+transmission does unseen, g the torque of gravity, w the backlash as Neubauer et al. (2015, eq. 18) have it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.geometry.arm_chain import ChainPoint
-from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, STIFFNESS, WAVES
-from jointscope.robots.geometry.pose_effects import CUBIC, PAYLOAD
+from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, CUBIC, RIPPLE, STIFFNESS, WAVES
 
 Array = NDArray[np.float64]
 ROOTS = 12  # Newton steps to the deflection of a spring that hardens
@@ -28,12 +27,11 @@ class WhatGivesWay:
 
     Args:
         joints: of the chain.
-        gravity: acceleration in the base frame, shape (3,) [m/s^2].
         values: of all parameters; those that are not there do not act.
     """
 
-    def __init__(self, joints: Sequence[str], gravity: Array, values: Mapping[str, float]):
-        self._joints, self._gravity, self._values = tuple(joints), gravity, values
+    def __init__(self, joints: Sequence[str], values: Mapping[str, float]):
+        self._joints, self._values = tuple(joints), values
         self._drives = self._there(STIFFNESS)
         self._gaps = self._there(BACKLASH)
         self._bearings = {(j, axis): name for axis, part in enumerate(BEARING) for j, name in self._there(part).items()}
@@ -44,62 +42,71 @@ class WhatGivesWay:
         return bool(self._drives or self._gaps or self._bearings)
 
     def waves(self, q: Array) -> Array:
-        """What encoders are off at angles of shape (m, n) [rad]."""
+        """What encoders and gears are off at angles of shape (m, n) [rad]."""
         off = np.zeros_like(q)
-        for part, wave in zip(WAVES, (np.cos, np.sin), strict=True):
-            for j, name in self._there(part).items():
-                off[:, j] += self._values[name] * wave(q[:, j])
+        for j, (cos, sin), order in self._waves():
+            off[:, j] += self._values[cos] * np.cos(order * q[:, j]) + self._values[sin] * np.sin(order * q[:, j])
         return off
 
     def deflections(self, point: ChainPoint) -> tuple[Array, Array]:
         """Turns of the joints, shape (m, n), and tilts of their bearings, shape (m, n, 2), under gravity [rad]."""
-        pull, across = self._pull(point)
-        turn, tilt = np.zeros_like(pull), np.zeros_like(across)
+        turn, tilt = np.zeros_like(point.gravity), np.zeros_like(point.bearing_gravity)
         for j in self._drives:
-            turn[:, j] = self._stretch(j, pull[:, j])[0]
+            turn[:, j] = self._stretch(j, point.gravity[:, j])[0]
         for j, name in self._gaps.items():
-            turn[:, j] -= np.sign(pull[:, j]) * self._values[name]
+            turn[:, j] -= np.sign(point.gravity[:, j]) * self._values[name]
         for (j, axis), name in self._bearings.items():
-            tilt[:, j, axis] = across[:, j, axis] / self._values[name]
+            tilt[:, j, axis] = point.bearing_gravity[:, j, axis] / self._values[name]
         return turn, tilt
 
-    def columns(self, q: Array, point: ChainPoint) -> dict[str, Array]:
-        """Derivative of the target by every value of these, by name, shape (m, 3); gravity is taken as it is."""
-        pull, across = self._pull(point)
-        found: dict[str, Array] = {}
-        for part, wave in zip(WAVES, (np.cos, np.sin), strict=True):
-            for j, name in self._there(part).items():
-                found[name] = point.by_joint[:, :, j] * wave(q[:, j])[:, None]
-        cubic, payload = self._there(CUBIC), np.zeros_like(point.target)
-        by_mass, across_by_mass = self._by_payload(point)
-        for j, name in self._drives.items():
-            x, slope = self._stretch(j, pull[:, j])
-            found[name] = -point.by_joint[:, :, j] * (x * slope)[:, None]
-            if j in cubic:
-                found[cubic[j]] = -point.by_joint[:, :, j] * (x**3 * slope)[:, None]
-            payload += point.by_joint[:, :, j] * (by_mass[:, j] * slope)[:, None]
-        for j, name in self._gaps.items():
-            found[name] = -point.by_joint[:, :, j] * np.sign(pull[:, j])[:, None]
+    def softness(self, point: ChainPoint) -> Array:
+        """How far joints turn, then bearings tilt about x' and then y', per torque, shape (m, 3 n) [rad/(N m)]."""
+        m, n = point.gravity.shape
+        soft = np.zeros((m, 3 * n))
+        for j in self._drives:
+            soft[:, j] = self._stretch(j, point.gravity[:, j])[1]
         for (j, axis), name in self._bearings.items():
-            k = self._values[name]
-            found[name] = -point.by_bearing[:, :, j, axis] * (across[:, j, axis] / k**2)[:, None]
-            payload += point.by_bearing[:, :, j, axis] * (across_by_mass[:, j, axis] / k)[:, None]
-        if PAYLOAD in self._values:
-            found[PAYLOAD] = payload
+            soft[:, n * (1 + axis) + j] = 1.0 / self._values[name]
+        return soft
+
+    def columns(self, q: Array, point: ChainPoint, by_yield: Array) -> dict[str, Array]:
+        """Derivative of the target by every value of these at a given gravity, by name, shape (m, 3).
+
+        Args:
+            q: angles of the motors, shape (m, n) [rad].
+            point: the arm at rest.
+            by_yield: derivative of the target by what joints and bearings give way, in the order of `softness`, shape
+                (m, 3, 3 n), gravity's answer included.
+        """
+        found: dict[str, Array] = {}
+        n = len(self._joints)
+        for j, (cos, sin), order in self._waves():
+            c, s = np.cos(order * q[:, j]), np.sin(order * q[:, j])
+            parts = {cos: c, sin: s}
+            if cos.endswith(RIPPLE[0]):
+                slope = self._values[sin] * c - self._values[cos] * s
+                parts[f"{self._joints[j]}.{RIPPLE[2]}"] = q[:, j] * slope
+            found |= {name: by_yield[:, :, j] * part[:, None] for name, part in parts.items()}
+        cubic = self._there(CUBIC)
+        for j, name in self._drives.items():
+            x, slope = self._stretch(j, point.gravity[:, j])
+            found[name] = -by_yield[:, :, j] * (x * slope)[:, None]
+            if j in cubic:
+                found[cubic[j]] = -by_yield[:, :, j] * (x**3 * slope)[:, None]
+        for j, name in self._gaps.items():
+            found[name] = -by_yield[:, :, j] * np.sign(point.gravity[:, j])[:, None]
+        for (j, axis), name in self._bearings.items():
+            tilt = point.bearing_gravity[:, j, axis] / self._values[name] ** 2
+            found[name] = -by_yield[:, :, n * (1 + axis) + j] * tilt[:, None]
         return found
 
-    def _pull(self, point: ChainPoint) -> tuple[Array, Array]:
-        """Torques about joints and bearings, those of a payload included [N m]."""
-        mass = self._values.get(PAYLOAD, 0.0)
-        if not mass:
-            return point.gravity, point.bearing_gravity
-        by_mass, across = self._by_payload(point)
-        return point.gravity + mass * by_mass, point.bearing_gravity + mass * across
-
-    def _by_payload(self, point: ChainPoint) -> tuple[Array, Array]:
-        """The same per kilogram at the target [m^2/s^2]."""
-        across = np.einsum("mkjb,k->mjb", point.by_bearing, self._gravity)
-        return np.einsum("mkj,k->mj", point.by_joint, self._gravity), across
+    def _waves(self) -> Iterator[tuple[int, tuple[str, str], float]]:
+        """Joint, names of both amplitudes, and waves per turn."""
+        for (cos, sin), order in ((WAVES, None), (RIPPLE[:2], RIPPLE[2])):
+            there = self._there(sin)
+            for j, name in self._there(cos).items():
+                times = 1.0 if order is None else self._values[f"{self._joints[j]}.{order}"]
+                yield j, (name, there[j]), times
 
     def _stretch(self, j: int, pull: Array) -> tuple[Array, Array]:
         """Deflection of a drive under torques, shape (m,) [rad], and its slope [rad/(N m)]."""

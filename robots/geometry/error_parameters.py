@@ -17,8 +17,12 @@ LENGTHS = ("lx", "ly", "lz")
 ANGLES = ("mis_y", "mis_x", "offset")  # in the order in which they turn
 BACKLASH = "backlash"
 WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of an encoder's error, once per turn
+RIPPLE = ("gear_ripple.cos", "gear_ripple.sin", "gear_ripple.order")  # of a gear's error, `order` times per turn
 STIFFNESS = "stiffness"  # of a drive
+CUBIC = "spring_cubic.stiffness"  # of a drive that hardens
 BEARING = ("bearing.stiffness_x", "bearing.stiffness_y")
+PAYLOAD = "robot.payload.mass"  # a point at the target, which the URDF does not know
+LINK_MASS = "link_mass.mass"  # what the link behind a joint weighs more than in the URDF, at its centre of mass
 
 
 def error_names(joints: Sequence[str]) -> tuple[str, ...]:

@@ -10,9 +10,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, STIFFNESS, WAVES
+from jointscope.robots.geometry.error_parameters import (
+    BACKLASH,
+    BEARING,
+    CUBIC,
+    LINK_MASS,
+    PAYLOAD,
+    RIPPLE,
+    STIFFNESS,
+    WAVES,
+)
 
-CUBIC, PAYLOAD = "spring_cubic.stiffness", "robot.payload.mass"
 DRIFT = tuple(f"tracker.tracker_drift.{axis}" for axis in "xyz")
 
 
@@ -28,6 +36,7 @@ class PoseEffectKind:
         size: what it may be, 1 sigma, in that unit; of stiffnesses the largest compliance [rad/(N m)].
         soft: whether its parameter is a stiffness, estimated as a compliance where it is looked for.
         needs_spring: whether it acts in a spring that must be there.
+        orders: waves per turn that are looked at; the best one counts, as one of so many.
     """
 
     id: str
@@ -37,6 +46,7 @@ class PoseEffectKind:
     names: tuple[str, ...] = ()
     soft: bool = False
     needs_spring: bool = False
+    orders: tuple[int, ...] = ()
 
     def parameters(self, owner: str) -> tuple[str, ...]:
         """Full names of its parameters."""
@@ -45,21 +55,24 @@ class PoseEffectKind:
 
 KINDS = (
     PoseEffectKind("encoder_eccentricity", WAVES, "rad", 1e-3),
+    PoseEffectKind("gear_ripple", RIPPLE[:2], "rad", 1e-3, orders=tuple(range(2, 201))),
     PoseEffectKind("joint_elasticity", (STIFFNESS,), "N m/rad", 1e-4, soft=True),
     PoseEffectKind("bearing_flexibility", BEARING, "N m/rad", 3e-5, soft=True),
     PoseEffectKind("backlash", (BACKLASH,), "rad", 5e-4),
     PoseEffectKind("spring_cubic", (CUBIC,), "N m/rad^3", 1e11, needs_spring=True),
     PoseEffectKind("payload", (), "kg", 3.0, (PAYLOAD,), needs_spring=True),
+    PoseEffectKind("link_mass", (LINK_MASS,), "kg", 3.0, needs_spring=True),
     PoseEffectKind("tracker_drift", (), "m", 1e-3, DRIFT),
 )
 
 
 @dataclass(frozen=True)
 class PoseHypothesis:
-    """An effect at its owner, as ID@OWNER."""
+    """An effect at its owner, as ID@OWNER, and its waves per turn where it has any."""
 
     kind: PoseEffectKind
     owner: str
+    order: int | None = None
 
     @property
     def label(self) -> str:
@@ -80,18 +93,23 @@ def hypotheses(joints: Sequence[str], known: Mapping[str, object], tracked: bool
         known: names of the parameters that it has.
         tracked: whether a tracker measures; contacts do not drift.
     """
-    springs = [joint for joint in joints if f"{joint}.{STIFFNESS}" in known]
+    springs = [i for i, joint in enumerate(joints) if f"{joint}.{STIFFNESS}" in known]
+    soft = springs + [i for i, j in enumerate(joints) if any(f"{j}.{part}" in known for part in BEARING)]
     found = []
     for kind in KINDS:
-        if kind.names:
-            fits = springs if kind.needs_spring else joints
-            owners: Sequence[str] = ("robot",) if fits and (tracked or kind.id != "tracker_drift") else ()
+        if kind.id == "tracker_drift":
+            owners: Sequence[str] = ("robot",) if tracked else ()
+        elif kind.names:
+            owners = ("robot",) if soft else ()
+        elif kind.id == "link_mass":
+            owners = joints[min(soft) :] if soft else ()
         else:
-            owners = springs if kind.needs_spring else joints
+            owners = [joints[i] for i in springs] if kind.needs_spring else joints
         found += [PoseHypothesis(kind, owner) for owner in owners]
     return [h for h in found if not any(name in known for name in h.names)]
 
 
 def effect_units(joints: Sequence[str]) -> dict[str, str]:
     """Unit of every parameter of every effect, by full name."""
-    return {n: kind.unit for kind in KINDS for joint in joints for n in kind.parameters(joint)}
+    units = {n: kind.unit for kind in KINDS for joint in joints for n in kind.parameters(joint)}
+    return units | {f"{joint}.{RIPPLE[2]}": "1" for joint in joints}

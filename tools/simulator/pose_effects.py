@@ -16,6 +16,7 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "joint_elasticity": {"compliance": 4.0e-5},  # [rad/(N m)] of a joint without a stiffness in the robot file
     "bearing_flexibility": {"compliance_x": 5.0e-6, "compliance_y": 5.0e-6},  # [rad/(N m)] beside the robot file's
     "payload": {"mass": 2.0},  # [kg] at the target
+    "link_mass": {"mass": 2.0},  # [kg] more than in the URDF, at the centre of mass of the link behind the joint
     "tracker_drift": {"x": 1.0e-4, "y": 0.0, "z": 5.0e-5},  # [m] from the first pose to the last
 }
 OF_ROBOT = ("payload", "tracker_drift")

@@ -198,7 +198,7 @@ class _Arm:
                 pos=place.translation + shift,
                 quat=[qw, qx, qy, qz],
                 explicitinertial=True,
-                mass=max(inertia.mass, 1e-9),
+                mass=max(inertia.mass + self._of.get(("link_mass", name), {}).get("mass", 0.0), 1e-9),
                 ipos=inertia.lever,
                 fullinertia=full_inertia(inertia.inertia + 1e-9 * np.eye(3)),
             )

@@ -17,6 +17,7 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors, without_sag
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.parameter import Parameter
 
 pytestmark = pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")
 
@@ -132,6 +133,25 @@ def test_a_tracker_that_stands_anywhere_is_found(tx90l):
     assert tip_errors(problem).to_json()["p90_mm"] <= 0.055
 
 
+EVERYTHING = {
+    "joint4.stiffness": 2.5e4,
+    "joint5.stiffness": 2.0e4,
+    "joint5.bearing.stiffness_x": 4.0e4,
+    "joint5.bearing.stiffness_y": 3.0e4,
+    "joint3.spring_cubic.stiffness": 5.0e10,
+    "robot.payload.mass": 3.0,
+    "joint4.link_mass.mass": 2.0,
+    "joint2.encoder_eccentricity.cos": 1e-4,
+    "joint2.encoder_eccentricity.sin": 2e-4,
+    "joint3.gear_ripple.cos": 5e-5,
+    "joint3.gear_ripple.sin": -5e-5,
+    "joint3.gear_ripple.order": 41.2,
+    "tracker.tracker_drift.x": 1e-4,
+    "tracker.tracker_drift.y": 0.0,
+    "tracker.tracker_drift.z": 0.0,
+}
+
+
 def changed(poses, **what):
     return replace(poses, **{name: change(getattr(poses, name)) for name, change in what.items()})
 
@@ -160,16 +180,26 @@ def test_too_few_poses_are_told_with_how_many_more(tx90l):
         calibrate_poses(tx90l, [few])
 
 
-def test_the_set_is_a_problem_of_the_solver_like_any_other(tx90l):
-    """Its gradient is the slope of its cost, in states and in every column."""
-    problem = PoseSet(tx90l, table("poses_backlash"), tx90l.poses.tracker)
-    x, calibration = problem.start(Calibration.of(tx90l.with_values(true_values())))
+@pytest.mark.parametrize("more", [{}, EVERYTHING], ids=["rigid wrist", "everything gives way"])
+def test_the_set_is_a_problem_of_the_solver_like_any_other(tx90l, more):
+    """Its gradient is the slope of its cost, in states and in every column: what moves an arm moves its weight."""
+    robot = tx90l.with_values(true_values())
+    soft = [n for n in more if n.endswith(("stiffness_x", "stiffness_y", "5.stiffness", "4.stiffness"))]
+    added = {n: Parameter(n, v, "1", v, abs(v) or 1e-4, positive=n in soft) for n, v in more.items()}
+    robot = replace(robot, parameters={**robot.parameters, **added})
+    problem = PoseSet(robot, table("poses_backlash"), tx90l.poses.tracker)
+    x, calibration = problem.start(Calibration.of(robot))
     x = x + 1e-5 * np.random.default_rng(0).standard_normal(x.shape)
-    system, h = problem.linearize(x, calibration), 1e-7
+    system = problem.linearize(x, calibration)
+    assert set(more) <= set(calibration.names)
     for i, name in enumerate(calibration.names):
-        step = np.zeros(calibration.size)
+        step, h = np.zeros(calibration.size), 1e-4 * robot.parameters[name].coordinate_sigma
         step[i] = h
         ends = [problem.linearize(x, calibration.retract({"dynamics": s * step})).cost for s in (1.0, -1.0)]
-        slope = (ends[0] - ends[1]) / (2 * h)
-        # gravity is taken as it is, so that what errors of geometry do to the sag is left out
-        assert system.g_p[i] == pytest.approx(slope, rel=0.02, abs=0.02 * float(np.abs(system.g_p).max())), name
+        slope, size = (ends[0] - ends[1]) / (2 * h), float(np.abs(system.C[i, i])) ** 0.5
+        assert system.g_p[i] == pytest.approx(slope, rel=1e-4, abs=2e-2 * size), name
+    for k, j in ((3, 1), (17, 4)):
+        step = np.zeros_like(x)
+        step[k, j] = 1e-7
+        ends = [problem.linearize(x + s * step, calibration).cost for s in (1.0, -1.0)]
+        assert system.g_x[k, j] == pytest.approx((ends[0] - ends[1]) / 2e-7, rel=1e-4, abs=1.0)

@@ -56,16 +56,13 @@ def around_sockets(robot, rng):
     sockets = {f"{p}/{s}": (np.array(at) + 0.05 * s * np.eye(3)[0], p) for p, at in PLACES.items() for s in (0, 1)}
     q, contacts = [], []
     for contact, (point, _) in sockets.items():
-        found = 0
-        while found < 12:
-            angles = rng.uniform([-2, -1, -2, -2.4, -2, 0.5, -2], [2, 1, 2, -1, 2, 3, 2])
-            for _ in range(60):
-                here = arm.at(angles[None], np.zeros((1, 7)), values)
-                angles = angles - np.linalg.pinv(here.by_joint[0]) @ (here.target[0] - point)
-            if np.all(np.abs(angles) < 2.8) and np.linalg.norm(here.target[0] - point) < 1e-9:
-                q.append(angles)
-                contacts.append(contact)
-                found += 1
+        angles = rng.uniform([-2, -1, -2, -2.4, -2, 0.5, -2], [2, 1, 2, -1, 2, 3, 2], (60, 7))
+        for _ in range(60):
+            here = arm.at(angles, np.zeros_like(angles), values)
+            angles = angles - (np.linalg.pinv(here.by_joint) @ (here.target - point)[:, :, None])[:, :, 0]
+        there = np.all(np.abs(angles) < 2.8, axis=1) & (np.linalg.norm(here.target - point, axis=1) < 1e-9)
+        q += list(angles[there][:12])
+        contacts += [contact] * 12
     places = tuple((contact, place) for contact, (_, place) in sockets.items())
     q = np.array(q) - 5e-5 * rng.standard_normal((len(q), 7))
     return Poses("made", "", tuple(map(str, range(len(q)))), q, None, tuple(contacts), places)

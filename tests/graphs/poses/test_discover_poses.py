@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
@@ -22,6 +23,8 @@ FAULTS = {
     "tracker_drift@robot:x=2e-4": ("tracker.tracker_drift.x", 2e-4),
     "backlash@joint5:half_gap=3e-4": ("joint5.backlash", -3e-4),
     "spring_cubic@joint3:stiffness=1e11": ("joint3.spring_cubic.stiffness", 1e11),
+    "gear_ripple@joint2:order=84": ("joint2.gear_ripple.cos", 8e-5 * np.cos(0.3)),
+    "link_mass@joint4:mass=6": ("joint4.link_mass.mass", 6.0),
 }
 
 
