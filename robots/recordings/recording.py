@@ -54,7 +54,7 @@ class Stream:
     @property
     def whole(self) -> Stream:
         """The samples of which every channel was measured."""
-        return self if self.filled is None else self._some(~self.filled.any(axis=1))
+        return self if self.filled is None else self._some(np.asarray(~self.filled.any(axis=1)))
 
     def between(self, t0: float, t1: float) -> Stream:
         """The samples with t0 <= time < t1 [s]."""

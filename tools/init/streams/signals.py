@@ -91,7 +91,7 @@ class Signal:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)
-        filled = None if self.filled is None else self.filled[np.ix_(good, self._places(names))]
+        filled = None if self.filled is None else self.filled[good][:, self._places(names)]
         return Stream(self.topic, self.times[good], values[good], names, "", filled=filled)
 
 
