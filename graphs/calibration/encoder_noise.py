@@ -110,7 +110,7 @@ def _alternates(differences: Array) -> bool:
 
 def _rounding(stream: Stream, sigmas: Array) -> Array:
     """Standard deviation of the rounding of a quantized encoder, shape (n,); zero for others."""
-    step = encoder_steps(stream.values)
+    step = encoder_steps(stream.measured)
     return np.asarray(np.where(step > COARSE * sigmas, step, 0.0) / np.sqrt(12.0), dtype=np.float64)
 
 

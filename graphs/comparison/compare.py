@@ -173,7 +173,7 @@ def _channels(
 ) -> dict[str, ChannelComparison]:
     found = {}
     for name, sensor in robot.sensors.items():
-        measured = recording.streams[name].values
+        measured = recording.streams[name].measured
         for j, channel in enumerate(sensor.channels):
             horizons = {}
             for horizon, predictions in ahead.items():
@@ -181,9 +181,10 @@ def _channels(
                 horizons[str(horizon)] = _rms(measured[p.sample, j] - p.predicted[:, j])
             horizons[OPEN_LOOP] = _rms(measured[:, j] - open_loop[name][:, j])
             p = ahead[HORIZON][name]
-            y = measured[p.sample, j]
+            seen = ~np.isnan(p.predicted[:, j])
+            y, predicted = measured[p.sample[seen], j], p.predicted[seen, j]
             spread = float(np.linalg.norm(y - y.mean())) if len(y) else 0.0
-            fit = 100.0 * (1.0 - float(np.linalg.norm(y - p.predicted[:, j])) / spread) if spread > 0 else float("nan")
+            fit = 100.0 * (1.0 - float(np.linalg.norm(y - predicted)) / spread) if spread > 0 else float("nan")
             found[channel] = ChannelComparison(horizons, fit, float(sensor.sigmas[j]), sensor.units[j])
     return found
 

@@ -37,7 +37,7 @@ class FreeRun:
     Attributes:
         channels: names of the motor encoder's channels.
         times: stamps of the motor encoder without those that are left out, shape (m,) [s].
-        simulated, measured: shape (m, n) [rad].
+        simulated, measured: shape (m, n) [rad]; NaN where a channel was not measured.
     """
 
     channels: tuple[str, ...]
@@ -48,12 +48,12 @@ class FreeRun:
     @property
     def mean_abs(self) -> dict[str, float]:
         """Mean absolute error of every channel [rad]."""
-        return self._by_channel(np.mean(np.abs(self.simulated - self.measured), axis=0))
+        return self._by_channel(np.nanmean(np.abs(self.simulated - self.measured), axis=0))
 
     @property
     def rms(self) -> dict[str, float]:
         """Root mean square error of every channel [rad]."""
-        return self._by_channel(np.sqrt(np.mean((self.simulated - self.measured) ** 2, axis=0)))
+        return self._by_channel(np.sqrt(np.nanmean((self.simulated - self.measured) ** 2, axis=0)))
 
     def _by_channel(self, values: Array) -> dict[str, float]:
         return dict(zip(self.channels, values.tolist(), strict=True))
@@ -101,7 +101,7 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         # one bridge for all joints that are off: their back-EMF goes together
         x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
     judged = recording.are_judged(encoder.times)
-    stamps, measured = encoder.times[judged], encoder.values[judged]
+    stamps, measured = encoder.times[judged], encoder.measured[judged]
     simulated = np.column_stack([np.interp(stamps, times, column) for column in positions.T])
     return FreeRun(encoder.channels, stamps, simulated, measured)
 

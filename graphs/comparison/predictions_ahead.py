@@ -113,6 +113,9 @@ def predict_ahead(
         for group, states in own:
             all_channels = predict_sensor(problem.robot, name, states[good], calibration, stamps)
             predicted[:, group.channels] = all_channels[:, group.channels]
+        nothing_to_compare = problem.recording.streams[name].filled
+        if nothing_to_compare is not None:
+            predicted[nothing_to_compare[sample[good]]] = np.nan
         result[name] = Ahead(sample[good], predicted, own[0][1][good, :d])
     return result
 

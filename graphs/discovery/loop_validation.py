@@ -47,4 +47,4 @@ def loop_squares(robot: Robot, recordings: Sequence[Recording], spans: Sequence[
 def _squares(run: FreeRun, robot: Robot, span: Span) -> Array:
     inside = (run.times >= span.t0) & (run.times <= span.t1)
     error = (run.simulated[inside] - run.measured[inside]) / robot.motor_encoder.sigmas
-    return np.array([np.sum(error**2, axis=0), np.full(error.shape[1], float(len(error)))])
+    return np.array([np.nansum(error**2, axis=0), np.sum(~np.isnan(error), axis=0)])

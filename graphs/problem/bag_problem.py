@@ -92,7 +92,7 @@ class BagProblem:
         for gyro in robot.gyros:
             placed.append(_without_states(BiasPrior(gyro), 1))
             if robot.choices.bias_at_rest and rests:
-                resting = recording.streams[gyro.name].between(-np.inf, first_command_time(recording))
+                resting = recording.streams[gyro.name].whole.between(-np.inf, first_command_time(recording))
                 values = resting.values[recording.are_judged(resting.times)]
                 if len(values):
                     placed.append(_without_states(BiasAtRestFactor(gyro, values), len(values)))

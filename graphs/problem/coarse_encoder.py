@@ -30,7 +30,7 @@ def shared_error(stream: Stream, sigmas: Array) -> Array | None:
         stream: of the encoder.
         sigmas: standard deviation of each channel, shape (c,).
     """
-    step = encoder_steps(stream.values)
+    step = encoder_steps(stream.measured)
     coarse = step > COARSE * sigmas
     if len(stream) < SMOOTHING or not np.any(coarse):
         return None
@@ -43,7 +43,7 @@ def shared_error(stream: Stream, sigmas: Array) -> Array | None:
 
 
 def encoder_steps(values: Array) -> Array:
-    """Smallest change between two samples of each channel, shape (c,); zero where nothing changes."""
+    """Smallest change between two samples of each channel, shape (c,); zero where nothing does."""
     changes = np.abs(np.diff(values, axis=0))
     smallest = np.min(np.where(changes > SMALLEST_CHANGE, changes, np.inf), axis=0, initial=np.inf)
     return np.where(np.isfinite(smallest), smallest, 0.0)

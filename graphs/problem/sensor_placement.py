@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the samples of a sensor sit on the chain of states: at a tick, or between two, whatever their stamps say."""
+"""Where the samples of a sensor sit on the chain of states: at a tick, or between two, whatever their stamps say.
+
+Of a sample that lacks some channels the others are used.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +32,8 @@ from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, Mo
 from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Channels = NDArray[np.intp]
 
 ALIGNED = 1.0 / 3.0  # [sigma] a sample may be taken at a tick if the signal moves less than this in between
 
@@ -65,48 +70,74 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
         stream = recording.streams[name]
         lateness = Lateness.of(robot, late, stream.times)
         taken = stream.times - lateness.anchor
-        inside = (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
-        step, fraction = timeline.locate(taken[inside])
-        inner = _some(_sensor_factor(robot, recording, name, stream, inside), channels, robot.sensors[name])
-        here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
         kind = AcceleratedFactor if isinstance(robot.sensors[name], Accelerometer) else InterpolatedFactor
-        factor = kind(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
-        placed.append(Placed(factor, step, stream.times[inside]))
+        for rows, some in _as_measured(robot, recording, stream, name, channels):
+            inside = rows & (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
+            step, fraction = timeline.locate(taken[inside])
+            inner = _some(_sensor_factor(robot, recording, name, stream, inside), some, robot.sensors[name])
+            here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
+            factor = kind(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
+            placed.append(Placed(factor, step, stream.times[inside]))
     return placed
 
 
+def _as_measured(
+    robot: Robot, recording: Recording, stream: Stream, name: str, channels: Channels
+) -> list[tuple[Flags, Channels]]:
+    """Samples that measured the same of some channels, shape (m,) each, and which these are.
+
+    The paper's forms of a gyro need all its components, and those of the gyro that they are relative to.
+    """
+    every = np.ones(len(stream), bool)
+    if stream.filled is None:
+        return [(every, channels)]
+    seen = ~stream.filled[:, channels]
+    sensor = robot.sensors[name]
+    if isinstance(sensor, Gyro) and sensor.form != "full":
+        return [(np.asarray(seen.all(axis=1)), channels)]
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    parts = [(which.reshape(-1) == k, channels[pattern]) for k, pattern in enumerate(patterns) if pattern.any()]
+    return sorted(parts, key=lambda part: -int(np.count_nonzero(part[0])))
+
+
 def _place_on_time(
-    robot: Robot, recording: Recording, timeline: Timeline, name: str, channels: NDArray[np.intp]
+    robot: Robot, recording: Recording, timeline: Timeline, name: str, channels: Channels
 ) -> list[Placed]:
     """Channels with right stamps."""
     sensor = robot.sensors[name]
     stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
+    parts = _as_measured(robot, recording, stream, name, channels)
     if isinstance(sensor, Accelerometer):
-        return [_place_accelerometer(robot, recording, timeline, name, stream)]
+        return [_place_accelerometer(robot, recording, timeline, stream, rows, some) for rows, some in parts]
     step, fraction = timeline.locate(stream.times)
     h = timeline.h[step]
     nearest = step + (fraction > 0.5)
     distance = np.abs(stream.times - timeline.ticks[nearest])
     aligned = np.all(distance[:, None] * _rate_of_change(stream) < ALIGNED * sensor.sigmas, axis=1)
     placed = []
-    if np.any(aligned):
-        factor = _some(_sensor_factor(robot, recording, name, stream, aligned), channels, sensor)
-        placed.append(Placed(factor, nearest[aligned], stream.times[aligned]))
-    if not np.all(aligned):
-        between = ~aligned
-        inner = _some(_sensor_factor(robot, recording, name, stream, between), channels, sensor)
-        factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
-        placed.append(Placed(factor, step[between], stream.times[between]))
+    for rows, some in parts:
+        at_tick, between = rows & aligned, rows & ~aligned
+        if np.any(at_tick):
+            factor = _some(_sensor_factor(robot, recording, name, stream, at_tick), some, sensor)
+            placed.append(Placed(factor, nearest[at_tick], stream.times[at_tick]))
+        if np.any(between):
+            inner = _some(_sensor_factor(robot, recording, name, stream, between), some, sensor)
+            factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
+            placed.append(Placed(factor, step[between], stream.times[between]))
     return placed
 
 
-def _place_accelerometer(robot: Robot, recording: Recording, timeline: Timeline, name: str, stream: Stream) -> Placed:
-    step, fraction = timeline.locate_ending(stream.times)
-    inner = _sensor_factor(robot, recording, name, stream, np.ones(len(stream), bool))
-    return Placed(AcceleratedFactor(inner, fraction, timeline.h[step], robot.layout), step, stream.times)
+def _place_accelerometer(
+    robot: Robot, recording: Recording, timeline: Timeline, stream: Stream, rows: Flags, channels: Channels
+) -> Placed:
+    times = stream.times[rows]
+    step, fraction = timeline.locate_ending(times)
+    sensor = robot.sensors[stream.name]
+    inner = _some(_sensor_factor(robot, recording, stream.name, stream, rows), channels, sensor)
+    return Placed(AcceleratedFactor(inner, fraction, timeline.h[step], robot.layout), step, times)
 
 
-def _some(factor: Factor, channels: NDArray[np.intp], sensor: Sensor) -> Factor:
+def _some(factor: Factor, channels: Channels, sensor: Sensor) -> Factor:
     """The factor for some of a sensor's channels; the paper's forms of a gyro are never divided."""
     return factor if len(channels) == len(sensor.channels) else SomeChannels(factor, channels)
 
@@ -123,7 +154,7 @@ def _rate_of_change(stream: Stream) -> Array:
     return np.abs(np.gradient(stream.values, stream.times, axis=0))
 
 
-def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: NDArray[np.bool_]) -> Factor:
+def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream, chosen: Flags) -> Factor:
     sensor, values, times = robot.sensors[name], stream.values[chosen], stream.times[chosen]
     if isinstance(sensor, MotorEncoder | LinkEncoder):
         factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)

@@ -104,7 +104,8 @@ def motion_cells(
     resting = np.abs(v_smooth) < slow
     rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
     fewest = np.maximum(DWELL + REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
-    usable = ~_missing(encoder.times, middle)
+    measured = np.isfinite(encoder.measured)  # one joint's motion moves the others, too
+    usable = ~np.any([_missing(encoder.times[good], middle, period) for good in measured.T], axis=0)
     for begin, end in left_out:
         usable &= (middle < begin - h) | (middle > end + h)
     known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
@@ -156,8 +157,9 @@ def _dwelling(slow: Flags, fewest: Array) -> Flags:
     return found
 
 
-def _missing(times: Array, instants: Array) -> Flags:
-    """Instants in gaps between samples, shape (m,)."""
+def _missing(times: Array, instants: Array, period: float) -> Flags:
+    """Instants in gaps between samples that usually come so often [s], or farther outside of them, shape (m,)."""
     steps = np.diff(times)
     i = np.clip(np.searchsorted(times, instants) - 1, 0, len(steps) - 1)
-    return np.asarray(steps[i] > GAP * np.median(steps))
+    outside = (instants < times[0] - period) | (instants > times[-1] + period)
+    return np.asarray(outside | (steps[i] > GAP * period))

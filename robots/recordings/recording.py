@@ -32,6 +32,7 @@ class Stream:
         channels: name of each column ("joint1.motor_position", "imu1.x", "joint1.command").
         unit: SI unit of the values ("rad", "rad/s", "1" for a duty cycle, "V", "A", "N m").
         received: time at which the message was written to the bag, shape (n,) [s].
+        filled: where a value only stands for one that was no number, shape (n, m); None where all were measured.
     """
 
     name: str
@@ -40,15 +41,29 @@ class Stream:
     channels: tuple[str, ...]
     unit: str
     received: Array | None = None
+    filled: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.times)
 
+    @property
+    def measured(self) -> Array:
+        """The values with NaN where nothing was measured, shape (n, m)."""
+        return self.values if self.filled is None else np.where(self.filled, np.nan, self.values)
+
+    @property
+    def whole(self) -> Stream:
+        """The samples of which every channel was measured."""
+        return self if self.filled is None else self._some(np.asarray(~self.filled.any(axis=1)))
+
     def between(self, t0: float, t1: float) -> Stream:
         """The samples with t0 <= time < t1 [s]."""
-        i0, i1 = np.searchsorted(self.times, [t0, t1])
-        received = None if self.received is None else self.received[i0:i1]
-        return Stream(self.name, self.times[i0:i1], self.values[i0:i1], self.channels, self.unit, received)
+        return self._some(slice(*np.searchsorted(self.times, [t0, t1])))
+
+    def _some(self, index: slice | NDArray[np.bool_]) -> Stream:
+        received = None if self.received is None else self.received[index]
+        filled = None if self.filled is None else self.filled[index]
+        return replace(self, times=self.times[index], values=self.values[index], received=received, filled=filled)
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ def read_recording(
     samples, seams, found = on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
     notices += found
     for need in needed:
-        samples[need.name], found = _cleaned(need, samples[need.name])
+        samples[need.name], found = _cleaned(need, samples[need.name], robot.command_held)
         notices += found
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
@@ -130,9 +130,11 @@ def _in_bag_order(
     return samples, notices
 
 
-def _cleaned(need: StreamSource, samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
+def _cleaned(need: StreamSource, samples: TimedSamples, held: bool) -> tuple[TimedSamples, list[Notice]]:
     """The samples of one stream in the order of their stamps and in SI units, without those that are none."""
     samples, notices = in_time_order(need.name, samples)
+    samples, found = without_gibberish(need.name, need.channels, samples, need.source.wraps, held)
+    notices += found
     if need.name != "command":  # commands jump and repeat themselves as they like
         samples, found = cleaned_sensor(need.name, need.channels, samples, need.source.wraps)
         notices += found
@@ -150,7 +152,7 @@ def _goal(
         message_type = check_topic(bag, need.source)
         topic = raw[need.source.topic]
         parts = message_parts(topic, message_type, need.source.field, decode_all)
-        samples, notices = _samples(need, topic, message_type, fitting_messages(parts, *wanted_of(need)), {}, nan=True)
+        samples, notices = _samples(need, topic, message_type, fitting_messages(parts, *wanted_of(need)), {})
         samples, found = in_time_order(need.name, samples)
         samples = replace(samples, values=in_si(need.source, samples.values))
     except RecordingError as err:
@@ -164,10 +166,9 @@ def _samples(
     message_type: MessageType,
     columns: Columns,
     others: Mapping[str, NDArray[np.int64] | None],
-    nan: bool = False,
     known: Container[str] = (),
 ) -> tuple[TimedSamples, list[Notice]]:
-    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors; NaN may stay."""
+    """The channels of one stream in the order of the bag; `others` has the stamps of all sensors."""
     order, notices = column_order(need, columns, known)
     notices += left_out_notices(need.name, columns)
     received, stamps = columns.of(topic.received_ns), columns.stamps
@@ -178,11 +179,7 @@ def _samples(
         whole = continued(values, need.source.wraps) if need.source.wraps else values
         values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)
         notices += found
-    samples = TimedSamples(stamps, received, values)
-    if nan:
-        return samples, notices
-    samples, found = without_gibberish(need.name, need.channels, samples)
-    return samples, notices + found
+    return TimedSamples(stamps, received, values), notices
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:
@@ -200,4 +197,5 @@ def _stream(need: StreamSource, samples: TimedSamples, start_ns: int) -> Stream:
         channels=need.channels,
         unit=joined(need.source.si_units(len(need.channels))),
         received=(samples.received - start_ns) / 1e9,
+        filled=samples.filled,
     )

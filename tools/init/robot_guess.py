@@ -231,7 +231,7 @@ def _gyros(
             left_out.append(f"{signal.topic}: stands still, or no link turns like it")
             continue
         name = _sensor_name(signal.topic, [gyro.name for gyro in found])
-        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.times, stream.values, mount.unit)))
+        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.whole.times, stream.whole.values, mount.unit)))
     return found, left_out
 
 

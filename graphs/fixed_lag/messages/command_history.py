@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of the last while, whatever the order in which they came, and what acts of them in a step.
 
-A command acts from its stamp until the next one. Effects on commands (delays, lags, dead bands) need the history; a
-history of half a second holds all that a delay or a lag of the catalogue reaches back to.
+A command acts from its stamp until the next one; a drive signal that was measured is linear between its samples. Effects
+on commands (delays, lags, dead bands) need the history; a history of half a second holds all that a delay or a lag of
+the catalogue reaches back to.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class CommandHistory:
     """
 
     def __init__(self, robot: Robot, lag: float):
-        self._robot, self._effects = robot, robot.effects
+        self._robot, self._effects, self._held = robot, robot.effects, robot.command_held
         probe = CommandPath(np.array([0.0, 1.0]), np.zeros((1, robot.n)), robot.effects, robot.joints)
         self._changes = probe.changes
         self._kept = lag + KEPT
@@ -83,6 +84,9 @@ class CommandHistory:
         last = bisect_left(self._times, t1)  # first command that acts only later
         if self._changes:
             return self._after_effects(t0, t1, last)
+        if not self._held:
+            knots = np.array([t0, *(t for t in self._times[first:last] if t > t0), t1])
+            return np.diff(knots) @ self._between(knots, first, last) / (t1 - t0)
         if last - first == 1 and t0 >= self._times[first]:
             return self._u[first]
         edges = np.array([*self._times[first:last], t1])
@@ -129,16 +133,22 @@ class CommandHistory:
                 variance += together * (share * self.typical_change) ** 2
             else:
                 change = self._u[i + 1] - self._u[i]
-                way = max(t0, begin) + 0.5 * missing - 0.5 * self.period - self._times[i]
-                moved += share * way / (following - self._times[i]) * change
+                if self._held:  # else the mean goes to the one after it by itself
+                    way = max(t0, begin) + 0.5 * missing - 0.5 * self.period - self._times[i]
+                    moved += share * way / (following - self._times[i]) * change
                 variance += together * (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
     def unsure_since(self, t: float) -> float:
-        """From when on the command with stamp t [s] changes what acted: where the one before it was due to end."""
+        """From when on the command with stamp t [s] changes what acted: where the one before it was due to end.
+
+        A measured one tells what acted since the one before it.
+        """
         i = bisect_left(self._times, t)
         if i == 0:
             return t
+        if not self._held:
+            return self._times[i - 1]
         due = self._times[i - 1] + self.period
         return due if t - due > 0.5 * self.period else t
 
@@ -177,10 +187,17 @@ class CommandHistory:
             ]
         )
         index = np.maximum(np.searchsorted(self._times, edges[:-1], side="right") - 1, 0)
-        path = CommandPath(edges, np.array(self._u)[index], self._effects, self._robot.joints)
+        acted = np.array(self._u)[index] if self._held else self._between(edges, 0, last)
+        path = CommandPath(edges, acted, self._effects, self._robot.joints)
         u, h = path.acting(self._values)[0], np.diff(edges)
         own = edges[:-1] >= t0
         return h[own] @ u[own] / h[own].sum()
+
+    def _between(self, knots: Array, first: int, last: int) -> Array:
+        """Means from knot to knot of a signal that is linear between its samples, those from first to last [incl.]."""
+        u = np.array(self._u[first : last + 1])
+        at = np.column_stack([np.interp(knots, self._times[first : last + 1], column) for column in u.T])
+        return np.asarray(0.5 * (at[1:] + at[:-1]), dtype=np.float64)
 
 
 def _full_command(robot: Robot) -> float:

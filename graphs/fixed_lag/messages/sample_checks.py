@@ -79,7 +79,14 @@ class SampleChecks:
         return min(max(enough, FEWEST_EQUAL), MOST_EQUAL)
 
     def shared_error(self, t: float, values: list[float]) -> list[float] | None:
-        """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion."""
+        """Factor on the sigma of each channel: samples of a quantized encoder share errors in slow motion.
+
+        NaN stands for a channel that was not measured, and is taken as a repetition.
+        """
+        if any(math.isnan(value) for value in values):
+            if not self._recent:
+                return None
+            values = [last if math.isnan(new) else new for new, last in zip(values, self._recent[-1][1], strict=True)]
         self._samples += not self._recent or t > self._recent[0][0]
         if not self._recent:
             self._recent.append((t, values, self._samples))

@@ -22,6 +22,7 @@ from jointscope.robots.parts.sensors import Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
+LONGEST_DOUBT = 6  # commands in a row of which some joint lacks its own: that joint's drive may do anything then
 LARGEST = 1e6  # [SI] no angle, rate or command is larger; beyond it a number is as good as none
 
 
@@ -38,6 +39,8 @@ class SampleIntake:
     def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
         self._robot, self._status, self._log, self._clock = robot, status, log, clock
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._acting: Array | None = None  # last command of all joints
+        self._in_doubt = 0  # commands since then
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
@@ -45,13 +48,23 @@ class SampleIntake:
             self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro | Accelerometer))
 
     def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
-        """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one."""
+        """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one.
+
+        Joints whose value is no number keep the one before, for a while.
+        """
         values = self._shaped("command", t, u, self._robot.n, now)
         if values is None:
             return None
-        if _useless(values.tolist()):
-            self._drop("command", t, "not_finite", "a command that is not finite was left out")
+        bad = _useless(values.tolist())
+        if not bad:
+            self._acting, self._in_doubt = values, 0
+            return values
+        self._in_doubt += 1
+        joints = ", ".join(self._robot.joints[j] for j in bad)
+        self._drop("command", t, "not_finite", f"the command of {joints} is no number and is left out")
+        if self._acting is None or len(bad) == len(values) or self._in_doubt >= LONGEST_DOUBT:
             return None
+        self._acting = values = np.where(np.isin(np.arange(len(values)), bad), self._acting, values)
         return values
 
     def sample(self, name: str, t: float, values: ArrayLike, now: float | None) -> list[Observation]:
@@ -66,12 +79,14 @@ class SampleIntake:
         numbers = found.tolist()
         bad = _useless(numbers)
         if bad:
-            self._drop(name, t, "not_finite", f"{name} gave values that are not finite; they are left out")
+            numbers = [math.nan if j in bad else number for j, number in enumerate(numbers)]
+            which = ", ".join(sensor.channels[j] for j in bad)
+            self._drop(name, t, "not_finite", f"{which}: no number, left out; the rest of the message is used")
         stuck = checks.stuck(numbers)
         if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
         sigma = self._sigmas[name]
-        shared = None if isinstance(sensor, Gyro | Accelerometer) or bad else checks.shared_error(t, numbers)
+        shared = None if isinstance(sensor, Gyro | Accelerometer) else checks.shared_error(t, numbers)
         if shared is not None:
             sigma = sigma * np.array(shared)
         result = []

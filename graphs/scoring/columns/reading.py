@@ -27,7 +27,9 @@ def reading_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> 
     def column(part: SensorPart) -> Array:
         error: Array = np.zeros(part.reading.shape)
         if part.name == owner:
-            error[:] = (np.imag(effect.law(part.reading, part.stamps, moved)) / STEP)[:, : len(part.channels)]
+            every = np.zeros((len(part.stamps), len(s.robot.sensors[owner].channels)))
+            every[:, part.channels] = part.reading
+            error[:] = (np.imag(effect.law(every, part.stamps, moved)) / STEP)[:, part.channels]
         elif part.name == encoder and owner in s.robot.joints:
             row = np.flatnonzero(part.channels == s.robot.joints.index(owner))
             if len(row):

@@ -109,6 +109,28 @@ def test_a_command_that_is_not_finite_is_as_if_it_were_missing(run, messages):
     same(state, after(run, missing)[1], 1e-9)
 
 
+def test_a_command_of_one_joint_that_is_no_number_leaves_the_others_theirs(run, messages):
+    lost = {0.900, 0.950, 0.951, 0.952}
+
+    def changed(name, t, values, value):
+        if name != "command" or min(abs(t - at) for at in lost) > 1e-4:
+            return values
+        values = values.copy()
+        values[1] = value
+        return values
+
+    kept, held = None, []
+    for name, t, values in messages:
+        if name == "command":
+            hit = min(abs(t - at) for at in lost) < 1e-4
+            kept = kept if hit else values[1]
+        held.append((name, t, changed(name, t, values, kept)))
+    est, state = after(run, [(name, t, changed(name, t, values, np.nan)) for name, t, values in messages])
+    assert dropped(est, "not_finite") == {"command": 4}
+    assert told(est, "not_finite")[0] == "the command of joint2 is no number and is left out"
+    same(state, after(run, held)[1], 1e-9)
+
+
 def test_encoder_glitches_are_refused(run, messages, clean):
     spoilt, glitches = [], (0.85, 0.95, 1.0, 1.001)
     for name, t, values in messages:

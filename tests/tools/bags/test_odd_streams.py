@@ -196,10 +196,16 @@ def test_samples_without_numbers_are_left_out_and_a_stream_of_mostly_those_refus
     values = samples.values.copy()
     values[[7, 9], 0] = np.nan, 1e300
     kept, (notice,) = without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
-    assert len(kept) == 1498 and "in a.motor_position, the first at 0.014 s" in notice.text
+    assert notice.count == 2 and notice.text == (
+        "motor_encoder: left out what is no number (NaN or infinite): a.motor_position in 2 messages, the first at "
+        "0.014 s; what the others of these messages say is used"
+    )
+    assert np.argwhere(kept.filled).tolist() == [[7, 0], [9, 0]] and len(kept) == 1500
+    np.testing.assert_array_equal(kept.values[~kept.filled], samples.values[~kept.filled])
+    assert np.abs(kept.values - samples.values).max() < 2e-4  # a spline through neighbours; nobody measures with it
     values[::3, 1] = np.inf
     kept, _ = without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
-    assert len(kept) == 999  # the message at 9 lacks both
+    assert len(kept) == 1499 and kept.filled.sum() == 500  # the message at 9 lacks both
     values[:800, 1] = np.inf
     with pytest.raises(RecordingError, match=r"b.motor_position is no number .* in 1033 of 1500 messages \(68.9 %\)"):
         without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
@@ -210,7 +216,15 @@ def test_commands_without_numbers_are_left_out_in_runs_but_only_few_alone():
     off = samples.values.copy()
     off[:600] = np.nan  # before the controller is switched on
     kept, (notice,) = without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
-    assert len(kept) == 900 and "command: left out 600 messages" in notice.text
+    assert len(kept) == 900 and notice.text == (
+        "command: left out what is no number (NaN or infinite): a.motor_position in 600 messages, b.motor_position in "
+        "600 messages, the first at 0.000 s"
+    )
+    off[700, 0] = np.nan
+    kept, _ = without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
+    np.testing.assert_array_equal(kept.values[100], [off[699, 0], off[700, 1]])  # the one before acts on, of one joint
+    kept, _ = without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off), held=False)
+    assert kept.values[100, 0] == pytest.approx(samples.values[700, 0], abs=2e-4)  # a measured one runs on
     off[600::10, 0] = np.nan  # whatever acted there stands in no message
     with pytest.raises(RecordingError, match=r"a.motor_position is no number .* use a part of the recording in which"):
         without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
@@ -268,7 +282,7 @@ def test_times_are_said_as_people_say_them(seconds, said):
 
 
 @pytest.mark.parametrize("wild", (1e308, -1e308, np.inf, np.nan))
-def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
+def test_what_is_no_number_is_replaced_before_anything_squares_it(wild):
     samples = motion()
     values = samples.values.copy()
     values[700, 1] = wild
@@ -280,5 +294,27 @@ def test_what_is_no_number_is_left_out_before_anything_squares_it(wild):
         half = plausible_samples(
             "/joint_states", ordered_samples("/joint_states", dataclasses.replace(samples, values=values))
         )
-    assert len(one) == 1499
-    assert len(half) == 1500 and np.isnan(half.values[::2]).all() and np.isfinite(half.values[1::2]).all()
+    assert len(one) == 1500 and one.filled.sum() == 1 and abs(one.values - samples.values).max() < 1e-4
+    assert len(half) == 1500 and half.filled[::2].all() and not half.filled[1::2].any()
+    assert np.isfinite(half.values).all()
+
+
+def test_a_counter_that_begins_anew_where_a_sample_is_missing_is_continued():
+    samples = motion()
+    turned = 4.0 * np.arange(1500)[:, None] / 1500 * 2 * np.pi + 0.1 * np.sin(np.arange(1500)[:, None] / 40.0)
+    values = np.mod(turned, 2 * np.pi)
+    values[100:1400:7] = np.nan
+    spoilt = dataclasses.replace(samples, values=np.column_stack([values, samples.values[:, 1]]))
+    kept, _ = without_gibberish("motor_encoder", CHANNELS, spoilt, wraps=2 * np.pi)
+    np.testing.assert_allclose(kept.values[:, 0], turned[:, 0], atol=2e-4)
+
+
+def test_a_long_run_is_bridged_by_a_straight_line_and_its_ends_stay():
+    samples = motion()
+    values = samples.values.copy()
+    values[:50, 0] = values[300:400, 0] = np.nan
+    kept, _ = without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))
+    assert np.all(kept.values[:50, 0] == values[50, 0])
+    np.testing.assert_allclose(
+        kept.values[299:401, 0], np.linspace(values[299, 0], values[400, 0], 102), rtol=0, atol=1e-9
+    )

@@ -18,18 +18,21 @@ class TimedSamples:
         stamps: time of measurement, shape (n,) [ns].
         received: time of writing to the bag, shape (n,) [ns].
         values: shape (n, m).
+        filled: whether a value stands for one that was no number, shape (n, m); None where all were measured.
     """
 
     stamps: NDArray[np.int64]
     received: NDArray[np.int64]
     values: NDArray[np.float64]
+    filled: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.stamps)
 
     def take(self, index: NDArray[Any]) -> TimedSamples:
         """Some of the samples."""
-        return TimedSamples(self.stamps[index], self.received[index], self.values[index])
+        filled = None if self.filled is None else self.filled[index]
+        return TimedSamples(self.stamps[index], self.received[index], self.values[index], filled)
 
     def stamped(self, stamps: NDArray[np.int64]) -> TimedSamples:
         """The same samples with other stamps."""

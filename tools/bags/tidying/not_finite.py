@@ -1,75 +1,132 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples that are not numbers (NaN, infinite, beyond anything physical) are left out where enough others are there.
+"""Samples that are not numbers (NaN, infinite, beyond anything physical): the rest of their messages is used.
 
-A sensor that lacks samples says less, and what it says is right. A command that is no number acts somehow: where a few
-stand alone, the one before acts on; where many follow each other, as before a controller is switched on, the whole
-stretch is left out as one without commands.
+A channel of a sensor that lacks a sample says less, and what it and the others say is right: a spline through its
+neighbours stands there as `filled`, and no estimate takes it for a measurement. A command that is no number acts
+somehow: where a few stand alone, that channel's command before acts on; where many follow each other, as before a
+controller is switched on, the whole stretch is left out as one without commands.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
 MOST = 0.5  # share of the messages of a sensor that may lack a number
 ALONE, FEW = 0.05, 5  # share of the commands, and number of them, that may lack one alone or almost alone
 RUN = 6  # in a row leave a pause, in which no equation of motion is asked to hold
+SMOOTH = 4  # samples in a row that a spline bridges; a longer way is a straight line
 COMMAND = "command"  # name of that stream
 LARGEST = 1e12  # [unit of the bag]
 
 
-def numbers_only(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def numbers_only(values: Array) -> Array:
     """The same values with NaN for what is none, so that nobody's squares overflow; the same array if all are."""
     some = np.abs(values) < LARGEST  # NaN compares false
     return values if some.all() else np.where(some, values, np.nan)
 
 
-def without_gibberish(name: str, channels: tuple[str, ...], samples: TimedSamples) -> tuple[TimedSamples, list[Notice]]:
-    """The samples in which every channel is a number.
+def without_gibberish(
+    name: str, channels: tuple[str, ...], samples: TimedSamples, wraps: float = 0.0, held: bool = True
+) -> tuple[TimedSamples, list[Notice]]:
+    """The samples in which some channel is a number, with what the others lack filled in.
+
+    Args:
+        name: of the stream.
+        channels: name of each column.
+        samples: in the order of their stamps, in the unit of the bag.
+        wraps: period of the counter behind them, 0 for none; filled ones are continued.
+        held: whether a command acts until the next one; else it was measured and runs on between its samples.
 
     Raises:
         RecordingError: too many are not.
     """
-    bad: NDArray[np.bool_] = ~(np.abs(samples.values) < LARGEST)  # NaN compares false
+    values = numbers_only(samples.values)
+    bad: Flags = np.isnan(values)
     rows = np.asarray(bad.any(axis=1))
-    count = int(np.count_nonzero(rows))
-    if not count:
+    if not rows.any():
         return samples, []
-    worst = int(np.argmax(bad.sum(axis=0)))
-    share = float(bad[:, worst].mean())
-    first = int(np.argmax(rows))
-    since = (samples.stamps[first] - samples.stamps.min()) / 1e9
-    counted_ones = _alone(rows) if name == COMMAND else rows
-    allowed = max(FEW, ALONE * len(samples)) if name == COMMAND else MOST * len(samples)
-    if np.count_nonzero(counted_ones) > allowed or count > MOST * len(samples):
+    _check_shares(name, channels, samples, bad)
+    left_out = _in_runs(rows) if name == COMMAND else np.asarray(bad.all(axis=1))
+    lacking = {channel: int(n) for channel, n in zip(channels, bad.sum(axis=0), strict=True) if n}
+    where = ", ".join(f"{channel} in {counted(n, 'message')}" for channel, n in lacking.items())
+    since = (samples.stamps[int(np.argmax(rows))] - samples.stamps[0]) / 1e9
+    rest = "" if left_out[rows].all() else "; what the others of these messages say is used"
+    text = f"{name}: left out what is no number (NaN or infinite): {where}, the first at {since:.3f} s{rest}"
+    kept = replace(samples, values=values).take(~left_out)
+    kept = filled_in(kept, wraps, acts_on=name == COMMAND and held)
+    return kept, [Notice(name, "dropped", int(np.count_nonzero(rows)), text)]
+
+
+def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) -> TimedSamples:
+    """The samples with values where channels hold NaN, flagged as filled; channels of NaN alone stay.
+
+    Args:
+        samples: in the order of their stamps.
+        wraps: period of the counter behind them, 0 for none.
+        acts_on: whether the last value before stands there, as that of a command does; not in long runs.
+    """
+    bad = np.isnan(samples.values)
+    if not bad.any():
+        return samples
+    times, values = (samples.stamps - samples.stamps[0]) / 1e9, samples.values.copy()
+    for j in range(values.shape[1]):
+        good = np.flatnonzero(~bad[:, j])
+        if len(good) in (0, len(values)):
+            continue
+        column = values[good, j]
+        if acts_on:
+            before = np.maximum(np.searchsorted(good, np.arange(len(values)), side="right") - 1, 0)
+            values[:, j] = np.where(_in_runs(bad[:, j]), np.nan, column[before])
+            continue
+        column = np.unwrap(column, period=wraps) if wraps else column
+        values[:, j] = _bridged(times, times[good], column, _in_runs(bad[:, j], SMOOTH + 1))
+    return replace(samples, values=values, filled=bad & ~np.isnan(values))
+
+
+def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
+    """A channel at all times: what is known, a spline between, straight lines where much is missing, shape (n,)."""
+    straight = np.interp(times, known, column)
+    if len(known) < 4:
+        return straight
+    outside = (times < known[0]) | (times > known[-1])
+    return np.asarray(np.where(long | outside, straight, CubicSpline(known, column)(times)), dtype=np.float64)
+
+
+def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, bad: Flags) -> None:
+    counts = np.count_nonzero(bad, axis=0)
+    worst, n = int(np.argmax(counts)), len(samples)
+    too_many = counts[worst] > MOST * n
+    if name == COMMAND:
+        rows = np.asarray(bad.any(axis=1))
+        too_many |= np.count_nonzero(rows & ~_in_runs(rows)) > max(FEW, ALONE * n) or rows.sum() > MOST * n
+    if too_many:
+        since = (samples.stamps[int(np.argmax(bad.any(axis=1)))] - samples.stamps[0]) / 1e9
         raise RecordingError(
-            f"{channels[worst]} is no number (NaN or infinite) in {np.count_nonzero(bad[:, worst])} of "
-            f"{len(samples)} messages ({100 * share:.3g} %), the first at {since:.3f} s; expected at most "
-            f"{_expected(name)}: {_way_out(name)}"
+            f"{channels[worst]} is no number (NaN or infinite) in {counts[worst]} of {n} messages "
+            f"({100 * counts[worst] / n:.3g} %), the first at {since:.3f} s; expected at most {_expected(name)}: "
+            f"{_way_out(name)}"
         )
-    which = ", ".join(
-        channel for channel, any_bad in zip(channels, np.asarray(bad.any(axis=0)), strict=True) if any_bad
-    )
-    text = (
-        f"{name}: left out {counted(count, 'message')} that hold no number (NaN or infinite) in {which}, the first at "
-        f"{since:.3f} s"
-    )
-    return samples.take(~rows), [Notice(name, "dropped", count, text)]
 
 
-def _alone(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Of some rows those that do not stand in a long run of them, shape (n,)."""
+def _in_runs(rows: Flags, length: int = RUN) -> Flags:
+    """Of some rows those that stand in a run of at least so many, shape (n,)."""
     edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    alone = rows.copy()
+    found = np.zeros_like(rows)
     for begin, end in edges:
-        if end - begin >= RUN:
-            alone[begin:end] = False
-    return alone
+        found[begin:end] = end - begin >= length
+    return found
 
 
 def _expected(name: str) -> str:

@@ -11,11 +11,10 @@ from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.glitches import without_glitches
-from jointscope.tools.bags.tidying.not_finite import numbers_only
+from jointscope.tools.bags.tidying.not_finite import MOST, filled_in, numbers_only
 from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
 from jointscope.tools.bags.tidying.staircase import without_repetitions
 
-MOSTLY = 0.9  # of the samples that must be numbers to tell wild ones
 FEWEST = 30  # samples that tell anything
 
 
@@ -38,16 +37,18 @@ def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
 
     Args:
         name: of the stream.
-        samples: in the order of their stamps; NaN may be among them.
+        samples: in the order of their stamps; NaN may be among them, and stays in channels that are mostly NaN.
 
     Raises:
         RecordingError: so much would be left out that something else is wrong.
     """
-    finite = np.asarray(np.isfinite(samples.values).all(axis=1))
-    if finite.mean() < MOSTLY:
+    sound = np.isnan(samples.values).mean(axis=0) <= MOST
+    if not sound.any():
         return samples
-    samples = samples.take(finite)
-    return cleaned_sensor(name, tuple(map(str, range(samples.values.shape[1]))), samples)[0]
+    whole = filled_in(samples)
+    seen = replace(whole, values=whole.values[:, sound], filled=None)
+    kept = cleaned_sensor(name, tuple(map(str, np.flatnonzero(sound))), seen)[0].stamps
+    return replace(whole, values=np.where(sound, whole.values, samples.values)).take(np.isin(whole.stamps, kept))
 
 
 def cleaned_sensor(

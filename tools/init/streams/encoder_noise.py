@@ -25,8 +25,11 @@ def encoder_noise(
         slides: names of the prismatic joints.
         stances: all joints that the bag has, by name, among them those that stand.
     """
-    times, values = encoder.times, encoder.values
-    each = guess_each(times, values, units)
+    values = encoder.values
+    each = [
+        guess_each(encoder.times[seen], values[seen, j : j + 1], [unit])[0]
+        for j, (unit, seen) in enumerate(zip(units, np.isfinite(encoder.measured).T, strict=True))
+    ]
     of_unit = {unit: _middle([guess for guess, u in zip(each, units, strict=True) if u == unit]) for unit in units}
     at_rest = {
         slide: [s.noise for joint, s in stances.items() if not s.moves and s.noise > 0 and (joint in slides) == slide]

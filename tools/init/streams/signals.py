@@ -21,6 +21,7 @@ from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, joi
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.tidying.long_holes import LongHoles
+from jointscope.tools.bags.tidying.not_finite import filled_in
 from jointscope.tools.bags.tidying.stream_notices import Timing, timing
 from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples
 from jointscope.tools.init.streams.known_fields import KnownField, known_fields
@@ -47,6 +48,7 @@ class Signal:
         quantity: what its field says it is: "position", "effort", "rate" or "numbers".
         joints: whose command each column is, where the topics say so that are joined in it.
         sent: the same with all messages, where some were left out; streams are compared one for one by it.
+        filled: where a value only stands for one that was no number, shape (n, m); None where all were measured.
     """
 
     topic: str
@@ -59,6 +61,7 @@ class Signal:
     quantity: str = ""
     sent: Signal | None = None
     joints: tuple[str, ...] = ()
+    filled: NDArray[np.bool_] | None = None
 
     @property
     def as_sent(self) -> Signal:
@@ -77,16 +80,19 @@ class Signal:
 
     def columns(self, names: tuple[str, ...]) -> Array:
         """Values of some joints, shape (n, k); by place, counted from 0, where the messages name none."""
+        return self.values[:, self._places(names)]
+
+    def _places(self, names: tuple[str, ...]) -> list[int]:
         if self.names:
-            return self.values[:, [self.names.index(name) for name in names]]
-        places = [int(name) for name in names] if all(name.isdecimal() for name in names) else list(range(len(names)))
-        return self.values[:, places]
+            return [self.names.index(name) for name in names]
+        return [int(name) for name in names] if all(name.isdecimal() for name in names) else list(range(len(names)))
 
     def stream(self, names: tuple[str, ...], factor: float | Array = 1.0) -> Stream:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)
-        return Stream(self.topic, self.times[good], values[good], names, "")
+        filled = None if self.filled is None else self.filled[good][:, self._places(names)]
+        return Stream(self.topic, self.times[good], values[good], names, "", filled=filled)
 
 
 def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[str] = ()) -> list[Signal]:
@@ -199,12 +205,14 @@ def _signal(field: _Field, timed: TimedSamples, start_ns: int, troubles: list[Re
         later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
         names, values = field.names, samples.values[later]
         return Signal(
-            field.topic, field.kind.name, known.path, names, times[later], values, field.stamped, known.quantity, sent
-        )
+            field.topic, field.kind.name, known.path, names, times[later], values, field.stamped, known.quantity, sent,
+            filled=None if samples.filled is None else samples.filled[later],
+        )  # fmt: skip
 
     try:
         ordered = ordered_samples(field.topic, timed)
-        samples = plausible_samples(field.topic, ordered) if known.quantity in MEASURED else ordered
+        is_sensor = known.quantity in MEASURED
+        samples = plausible_samples(field.topic, ordered) if is_sensor else filled_in(ordered, acts_on=True)
     except RecordingError as err:  # what nobody can tell the time of is no use; others may do without it
         troubles.append(err)
         return None

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,22 @@ def test_a_step_between_two_commands_gets_exactly_the_first():
     for t, value in zip(times, u, strict=True):
         history.add(t, value)
     np.testing.assert_array_equal(history.mean(times[7], times[8]), u[7])
+
+
+def test_a_measured_drive_signal_is_linear_between_its_samples_in_any_order():
+    robot = replace(DOGGY, command=replace(DOGGY.command, held=False))
+    times, u = commands(2)
+    history = CommandHistory(robot, 0.1)
+    for i in np.random.default_rng(2).permutation(len(times)):
+        history.add(times[i], u[i])
+    rng = np.random.default_rng(8)
+    for _ in range(30):
+        t0 = rng.uniform(times[0], times[-1] - 5e-3)
+        t1 = t0 + rng.uniform(2e-4, 4e-3)
+        expected = brute_mean(lambda t: np.array([np.interp(t, times, column) for column in u.T]).T, t0, t1)
+        np.testing.assert_allclose(history.mean(t0, t1), expected, atol=1e-4)
+    np.testing.assert_allclose(history.mean(times[7], times[8]), 0.5 * (u[7] + u[8]))
+    assert history.unsure_since(times[8]) == times[7]  # the sample at the end of a step tells what acted in it
 
 
 def effect_signal(name, value, times, u):
