@@ -22,7 +22,7 @@ graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
-tools.init.streams tools.init.estimates tools.init tools.init.text
+tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text
 tools.presentation tools.terminal tools.report.page tools.report.sections.calibration tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
 tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verbs tools

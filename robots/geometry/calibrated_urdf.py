@@ -7,7 +7,6 @@ Sag and backlash depend on the load; a comment says that they are not in it.
 
 from __future__ import annotations
 
-import io
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
@@ -15,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.urdf_tree import read_urdf, urdf_text
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, TRACKER
@@ -29,15 +29,18 @@ def calibrated_urdf(robot: Robot) -> str:
     """The text of the URDF with the errors of a robot that has a section `poses`.
 
     Raises:
-        RobotError: the file is XML that no parser without its macros reads, or a joint has no element of its own.
+        RobotError: the file cannot be read, or a joint has no element of its own.
     """
+    root = read_urdf(robot.tree.urdf)
+    move_joints(root, robot)
+    root.insert(0, ET.Comment(NOTE))
+    return urdf_text(root)
+
+
+def move_joints(root: ET.Element, robot: Robot) -> None:
+    """Puts the errors of a robot that has a section `poses` into the joints of its URDF."""
     assert robot.poses is not None
     errors = {name: parameter.value for name, parameter in robot.parameters.items()}
-    try:
-        builder = ET.TreeBuilder(insert_comments=True)
-        root = ET.fromstring(robot.tree.urdf.read_text(encoding="utf-8"), ET.XMLParser(target=builder))
-    except ET.ParseError as err:
-        raise RobotError(f"{robot.tree.urdf}: no calibrated URDF can be made of it: {err}") from err
     joints = {element.get("name"): element for element in root.findall("joint")}
     model = robot.tree.model
     for j in range(1, model.njoints):
@@ -52,11 +55,6 @@ def calibrated_urdf(robot: Robot) -> str:
         mount = parent.get(link) if link is not None else None
         if mount is not None and mount.get("type") == "fixed":
             _move_behind(mount, sign * _lengths(errors, owner))
-    root.insert(0, ET.Comment(NOTE))
-    ET.indent(root)
-    stream = io.BytesIO()
-    ET.ElementTree(root).write(stream, encoding="utf-8", xml_declaration=True)
-    return stream.getvalue().decode() + "\n"
 
 
 def _lengths(errors: Mapping[str, float], owner: str) -> Array:

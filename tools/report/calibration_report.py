@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
+from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.notices import notices
 from jointscope.tools.report.page.page import page
 from jointscope.tools.report.page.provenance import provenance
@@ -20,11 +22,12 @@ from jointscope.tools.report.sections.calibration.verdict import verdict
 from jointscope.tools.report.sections.calibration.weak_directions import weak_directions
 
 
-def calibration_report(result: CalibrationResult) -> str:
+def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMITS) -> str:
     """The whole page as text.
 
     Args:
         result: what the calibration found.
+        checked: limits that the user has declared, as they came out.
 
     Returns:
         HTML without references to anything outside of itself.
@@ -32,6 +35,7 @@ def calibration_report(result: CalibrationResult) -> str:
     recordings = [bag.recording for bag in result.bags]
     sections = [
         verdict(result),
+        *acceptance(checked),
         parameters(result),
         mounting(result),
         fits(result),

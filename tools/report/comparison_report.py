@@ -6,6 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from jointscope.graphs.comparison.comparison_result import ComparisonResult
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
+from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.notices import notices
 from jointscope.tools.report.page.page import page
 from jointscope.tools.report.page.provenance import provenance
@@ -16,17 +18,19 @@ from jointscope.tools.report.sections.comparison.predictions import predictions
 from jointscope.tools.report.sections.comparison.worst_windows import worst_windows
 
 
-def comparison_report(result: ComparisonResult) -> str:
+def comparison_report(result: ComparisonResult, checked: AcceptedBy = NO_LIMITS) -> str:
     """The whole page as text.
 
     Args:
         result: what the comparison found.
+        checked: limits that the user has declared, as they came out.
 
     Returns:
         HTML without references to anything outside of itself.
     """
     sections = [
         model_scores(result),
+        *acceptance(checked),
         horizon_curve(result),
         predictions(result),
         worst_windows(result),

@@ -13,8 +13,10 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.discover_poses import PoseDiscovery
 from jointscope.graphs.poses.tip_errors import parts_of, summary
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.presentation.pose_judgement import judge_poses
+from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
 
@@ -23,18 +25,20 @@ BINS = 30
 MM, MICRO = 1e3, 1e6
 
 
-def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None) -> str:
+def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None, checked: AcceptedBy = NO_LIMITS) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         found: the discovery whose last step it is.
+        checked: limits that the user has declared, as they came out.
     """
     paths = ", ".join(problem.poses.path for problem in result.problems)
     makers = (_verdict, _waterfall, _histogram, _against, _values, _silent)
     sections = [make(result) for make in makers]
     if found is not None:
         sections.insert(1, _steps(found))
+    sections[1:1] = acceptance(checked)
     return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
 
 

@@ -12,6 +12,8 @@ from typing import Any
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
+from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
+from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.result_files import ResultFiles
 from jointscope.tools.writing.whole_file import whole_file, write_json
@@ -65,9 +67,14 @@ def check_one_kind(bags: Sequence[Path], poses: Sequence[Path], options: Mapping
 
 
 def run_pose_calibration(
-    robot: Robot, paths: Sequence[Path], files: ResultFiles, urdf: Path | None, progress: Progress
-) -> str:
-    """Calibrates, writes the files, and returns what the screen says.
+    robot: Robot,
+    paths: Sequence[Path],
+    files: ResultFiles,
+    urdf: Path | None,
+    limits: Sequence[Limit],
+    progress: Progress,
+) -> tuple[str, AcceptedBy]:
+    """Calibrates, writes the files, and returns what the screen says, and which limits are kept.
 
     Raises:
         RobotError: a viewer recording was asked for, or the URDF cannot take the errors.
@@ -80,6 +87,8 @@ def run_pose_calibration(
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not poses; use --report")
     result = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress)
+    content = pose_json(result)
+    checked = check_models(limits, {robot.name: content})
     with ExitStack() as stack:
         if files.robot is not None:
             from jointscope.robots.files.robot_writer import robot_text
@@ -93,10 +102,12 @@ def run_pose_calibration(
         if files.report is not None:
             from jointscope.tools.report.poses_report import poses_report
 
-            stack.enter_context(whole_file(files.report)).write_text(poses_report(result), encoding="utf-8")
+            stack.enter_context(whole_file(files.report)).write_text(
+                poses_report(result, checked=checked), encoding="utf-8"
+            )
         if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), pose_json(result))
-    return pose_calibration_text(result)
+            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+    return pose_calibration_text(result), checked
 
 
 def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[str, dict[str, Any]]:

@@ -9,12 +9,14 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import jointscope
 from jointscope.robots.outside_modules import need_module
 from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 
@@ -64,8 +66,8 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
 
 
-def write_calibration(result: Any, files: ResultFiles) -> None:
-    """Writes a CalibrationResult.
+def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
+    """Writes a CalibrationResult, and which limits it keeps.
 
     Raises:
         JointscopeError: a file cannot be written; then none is.
@@ -79,11 +81,11 @@ def write_calibration(result: Any, files: ResultFiles) -> None:
         from jointscope.tools.report import calibration_report
         from jointscope.tools.rerun_log import log_calibration
 
-        _write_views(stack, result, files, calibration_report, log_calibration)
+        _write_views(stack, result, files, partial(calibration_report, checked=checked), log_calibration, checked)
 
 
-def write_comparison(result: Any, files: ResultFiles) -> None:
-    """Writes a ComparisonResult.
+def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
+    """Writes a ComparisonResult, and which limits its models keep.
 
     Raises:
         JointscopeError: a file cannot be written; then none is.
@@ -92,7 +94,7 @@ def write_comparison(result: Any, files: ResultFiles) -> None:
         from jointscope.tools.report import comparison_report
         from jointscope.tools.rerun_log import log_comparison
 
-        _write_views(stack, result, files, comparison_report, log_comparison)
+        _write_views(stack, result, files, partial(comparison_report, checked=checked), log_comparison, checked)
 
 
 def write_diagnosis(result: Any, files: ResultFiles) -> None:
@@ -166,6 +168,7 @@ def _write_views(
     files: ResultFiles,
     report: Callable[[Any], str],
     log: Callable[[Any, Path], None],
+    checked: AcceptedBy = NO_LIMITS,
 ) -> None:
     """Report, rerun recording and JSON; they take their places when the stack closes."""
     if files.report is not None:
@@ -174,7 +177,7 @@ def _write_views(
     if files.rrd is not None:
         log(result, stack.enter_context(whole_file(files.rrd)))
     if files.json is not None:
-        write_json(stack.enter_context(whole_file(files.json)), result.to_json())
+        write_json(stack.enter_context(whole_file(files.json)), result.to_json() | acceptance_json(checked))
 
 
 def provenance(result: Any) -> dict[str, Any]:

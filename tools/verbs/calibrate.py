@@ -8,9 +8,11 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.robots.errors import RecordingError, RobotError, SolveError
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, check_models
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
@@ -50,6 +52,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_poses_option(parser)
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
+    add_accept_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
@@ -71,13 +74,13 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.verb_parts.first_look import first_look
 
     load_user_effects(args.effects)
-    robot = load_robot(args.robot)
+    robot, limits = load_robot(args.robot), limits_of(args)
     if args.poses:
         with progress_bar() as progress:
-            text = run_pose_calibration(robot, args.poses, files, args.urdf, progress)
+            text, checked = run_pose_calibration(robot, args.poses, files, args.urdf, limits, progress)
         print(text)
         print(f"\nWrote {', '.join(map(str, [*files.all, *filter(None, [args.urdf])]))}")
-        return 0
+        return print_acceptance(checked)
     if robot.free_links and (args.incremental or args.solver != "condensed"):
         raise SolveError(
             f"{robot.name}: its links are free, so there are no states to estimate one by one; leave out "
@@ -88,22 +91,25 @@ def run(args: argparse.Namespace) -> int:
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
         if robot.free_links:
+            if limits:
+                raise RobotError(f"{robot.name}: --accept is not available with link_dynamics: free; leave it out")
             from jointscope.tools.verb_parts.free_links import run_free_links
 
-            text = run_free_links(robot, recordings, None, files, False, progress)
+            text, checked = run_free_links(robot, recordings, None, files, False, progress), NO_LIMITS
         else:
             seen = None if args.incremental else progress  # what is printed and a bar would write into each other
             result = calibrate(robot, recordings, solver=_solver(args, robot), progress=seen)
             if files.report is not None or files.rrd is not None:
                 progress("writing", 1.0)
-            write_calibration(result, files)
+            checked = check_models(limits, {robot.name: result.to_json()})
+            write_calibration(result, files, checked)
             text = calibration_text(result)
     print(text)
     print(f"\nWrote {', '.join(map(str, files.all))}")
     if not robot.free_links and judge(result).level != "good":
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
-    return 0
+    return print_acceptance(checked)
 
 
 def _check_kinds(args: argparse.Namespace) -> None:

@@ -9,8 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.acceptance.evaluation import acceptance_json, check_models
+from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_comparison
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
@@ -34,6 +37,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_models_and_bag(parser)
     add_poses_option(parser)
+    add_accept_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
@@ -69,22 +73,24 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.comparison_text import comparison_text
 
     load_user_effects(args.effects)
+    limits = limits_of(args)
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
     if poses:
-        return _on_poses(robots, poses, files)
+        return _on_poses(robots, poses, files, limits)
     check_same_streams(robots)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
         (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
         result = compare(robots, recording, progress=progress)
-        write_comparison(result, files)
+        checked = check_models(limits, result.to_json()["models"])
+        write_comparison(result, files, checked)
     print(comparison_text(result))
     if files.all:
         print(f"\nWrote {', '.join(map(str, files.all))}")
-    return 0
+    return print_acceptance(checked)
 
 
-def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles) -> int:
+def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
     """Compares the models on poses.
 
     Raises:
@@ -93,10 +99,11 @@ def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles)
     if files.pictures:
         raise RobotError("pictures of poses come with `jointscope calibrate ROBOT --poses ... --report F.html`")
     text, content = compare_poses(robots, poses)
+    checked = check_models(limits, content["models"])
     if files.json is not None:
-        write_json(files.json, content)
+        write_json(files.json, content | acceptance_json(checked))
     print(text)
-    return 0
+    return print_acceptance(checked)
 
 
 def labels(robots: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from jointscope.robots.errors import JointscopeError
 
 URDF_LINE = re.compile(r"^urdf:\s*['\"]?([^'\"#\n]+?)['\"]?\s*(?:#.*)?$", re.MULTILINE)
 RESULTS = ("json", "report", "rrd")  # what is no robot file
-OUTPUTS = ("output", *RESULTS)
+OUTPUTS = ("output", "urdf", "mjcf", *RESULTS)
 
 
 def check_protected(args: argparse.Namespace) -> None:

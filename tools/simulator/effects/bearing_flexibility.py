@@ -31,6 +31,7 @@ class BearingFlexibility(SimulatedEffect):
 
     id = "bearing_flexibility"
     acts_on = ("joint",)
+    built_in = True
     never_negative = ("compliance_x", "compliance_y", "damping_x", "damping_y")
     above_zero = ("inertia_x", "inertia_y")
 

@@ -29,6 +29,7 @@ class GravityImbalance(SimulatedEffect):
 
     id = "gravity_imbalance"
     acts_on = ("joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"cos": 1.8, "sin": 2.4}  # [N m]
     loads_at_rest = True
 

@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
-from jointscope.tools.simulator.world.specification import add_dry_friction, add_tendon, set_linear
+from jointscope.tools.simulator.world.specification import (
+    add_dry_friction,
+    add_light_body,
+    add_tendon,
+    set_linear,
+)
 
 Array = NDArray[np.float64]
 
@@ -30,6 +35,7 @@ class Hysteresis(SimulatedEffect):
 
     id = "hysteresis"
     acts_on = ("elastic joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"torque": 3.0, "deflection": 0.01}  # [N m], [rad]
     never_negative = ("torque",)
     above_zero = ("deflection",)
@@ -44,7 +50,7 @@ class Hysteresis(SimulatedEffect):
 
     def _add_element(self, spec: Any, name: str, strength: float, stiffness: float) -> None:
         inertia = stiffness / SLIDER_RATE**2
-        slider = spec.worldbody.add_body(name=name, explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
+        slider = add_light_body(spec, name, inertia)
         hinge = slider.add_joint(name=name, type=load_mujoco().mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
         add_dry_friction(hinge, strength)
         tendon = add_tendon(spec, name, self.owner, self.shares[self.owner])

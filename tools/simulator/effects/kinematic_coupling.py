@@ -27,6 +27,7 @@ class KinematicCoupling(SimulatedEffect):
 
     id = "kinematic_coupling"
     acts_on = ("elastic joint",)
+    built_in = True
     loads_at_rest = True
 
     def default_parameters(self) -> Mapping[str, float]:

@@ -20,6 +20,7 @@ class LinkCoulomb(SimulatedEffect):
 
     id = "link_coulomb"
     acts_on = ("joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"torque": 0.8}  # [N m]
     never_negative = ("torque",)
 

@@ -15,6 +15,7 @@ class LinkViscous(SimulatedEffect):
 
     id = "link_viscous"
     acts_on = ("joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"coefficient": 1.0}  # [N m s/rad]
     never_negative = ("coefficient",)
 

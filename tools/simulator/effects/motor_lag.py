@@ -19,6 +19,7 @@ class MotorLag(SimulatedEffect):
 
     id = "motor_lag"
     acts_on = ("joint", "robot")
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"time_constant": 3e-3}  # [s]
     never_negative = ("time_constant",)
 

@@ -15,6 +15,7 @@ class MotorViscous(SimulatedEffect):
 
     id = "motor_viscous"
     acts_on = ("joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"coefficient": 2.0}  # [N m s/rad]
     never_negative = ("coefficient",)
 

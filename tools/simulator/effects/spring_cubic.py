@@ -18,6 +18,7 @@ class SpringCubic(SimulatedEffect):
 
     id = "spring_cubic"
     acts_on = ("elastic joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"stiffness": 20000.0}  # [N m/rad^3]
 
     def edit(self, spec: Any) -> None:

@@ -15,6 +15,7 @@ class TorqueOffset(SimulatedEffect):
 
     id = "torque_offset"
     acts_on = ("joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"torque": 1.0}  # [N m]
     loads_at_rest = True
 

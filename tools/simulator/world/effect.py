@@ -58,6 +58,7 @@ class SimulatedEffect:
         outside_catalogue: the estimator has no such effect, so it can only say that something is left.
         mistake: not physics but a wrong setting.
         loads_at_rest: the engine must settle before the recording begins.
+        built_in: with dry friction, elements of the engine are the whole effect, so that a saved model has it.
         friction: the engine's Coulomb friction, "dry" or "smooth"; set by the engine before `edit`.
         shares: of the links in the deflection of each spring, by names of joints; set by the engine before `edit`.
 
@@ -74,6 +75,7 @@ class SimulatedEffect:
     outside_catalogue: ClassVar[bool] = False
     mistake: ClassVar[bool] = False
     loads_at_rest: ClassVar[bool] = False
+    built_in: ClassVar[bool] = False
     friction: str = "dry"
     shares: Mapping[str, Mapping[str, float]]
 

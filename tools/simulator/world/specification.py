@@ -123,7 +123,7 @@ def _add_links(mujoco: Any, spec: Any, robot: Robot) -> None:
         body = parent_body.add_body(
             name=link_body(name),
             pos=placement.translation,
-            quat=_quaternion_wxyz(placement.rotation),
+            quat=quaternion_wxyz(placement.rotation),
             explicitinertial=True,
             mass=max(inertia.mass, 1e-9),  # [kg] the engine refuses a moving body without any
             ipos=inertia.lever,
@@ -163,10 +163,18 @@ def _add_rotor(mujoco: Any, spec: Any, robot: Robot, joint: str, friction: str) 
         hinge = spec.joint(joint)
         hinge.armature = inertia
     else:
-        rotor = spec.worldbody.add_body(name=motor_joint(joint), explicitinertial=True, mass=1.0, inertia=[inertia] * 3)
+        rotor = add_light_body(spec, motor_joint(joint), inertia)
         hinge = rotor.add_joint(name=motor_joint(joint), type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
     if friction == "dry":
         add_dry_friction(hinge, robot.parameter(f"{joint}.coulomb_torque").value)
+
+
+def add_light_body(spec: Any, name: str, inertia: float) -> Any:
+    """A body in the world that only turns, with the same moment of inertia [kg m2] about all axes.
+
+    Without `ipos`, which the compiler does not need, the model that is saved as XML would lack the inertia.
+    """
+    return spec.worldbody.add_body(name=name, explicitinertial=True, mass=1.0, ipos=np.zeros(3), inertia=[inertia] * 3)
 
 
 def _add_spring(spec: Any, robot: Robot, joint: str, shares: Mapping[str, float]) -> None:
@@ -215,7 +223,7 @@ def _add_site(spec: Any, robot: Robot, name: str, body: str, p_body: Array | Non
     parent = spec.body(link_body(joint)) if frame.parentJoint else spec.worldbody
     placement = frame.placement
     place = placement.translation if p_body is None else placement.act(p_body)
-    parent.add_site(name=name, pos=place, quat=_quaternion_wxyz(placement.rotation))
+    parent.add_site(name=name, pos=place, quat=quaternion_wxyz(placement.rotation))
 
 
 def set_linear(element: Any, name: str, value: float) -> None:
@@ -251,6 +259,7 @@ def drive(joint: str) -> str:
     return f"{joint}.drive"
 
 
-def _quaternion_wxyz(R: Array) -> Array:
+def quaternion_wxyz(R: Array) -> Array:
+    """A rotation, shape (3, 3), as the engine's quaternion, shape (4,)."""
     x, y, z, w = pin.Quaternion(R).coeffs()
     return np.array([w, x, y, z])

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots as MuJoCo models against the equations that they were calibrated with."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from tilted_arm import arm_with
+
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.errors import RobotError
+from jointscope.robots.files.effects_at_once import add_effects
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.export.mujoco_model import mujoco_model
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo models need the extra jointscope[sim]")
+
+SIX_DIGITS = 1e-5  # the engine saves numbers with six
+HELD = {
+    "joint1.bearing_flexibility.compliance_x": 4e-4,
+    "joint1.bearing_flexibility.compliance_y": 3e-4,
+    "joint1.bearing_flexibility.damping_x": 10.0,
+    "joint1.bearing_flexibility.damping_y": 11.0,
+    "joint3.payload.inertia": 0.05,
+    "joint2.spring_cubic.stiffness": 3000.0,
+    "joint1.motor_viscous.coefficient": 1.0,
+    "joint3.link_viscous.coefficient": 2.0,
+    "joint2.gravity_imbalance.cos": 1.0,
+    "joint2.gravity_imbalance.sin": -2.0,
+    "joint1.torque_offset.torque": 0.7,
+}
+
+
+DOGGY = load_robot("doggy")
+
+
+def with_effects(robot: Robot, values: dict[str, float]) -> Robot:
+    labels = dict.fromkeys("{1}@{0}".format(*name.split(".")) for name in values)
+    return add_effects(robot, list(labels)).robot.with_values(values)
+
+
+def robot_named(name: str, folder) -> Robot:
+    if name == "doggy and effects":
+        return with_effects(DOGGY, HELD)
+    if name == "arm with a spring found":
+        return with_effects(
+            arm_with(folder), {"elbow.joint_elasticity.compliance": 1e-3, "elbow.joint_elasticity.damping": 2.0}
+        )
+    return {"doggy": DOGGY, "arm": arm_with(folder), "arm in A": arm_with(folder, ("elbow",), "A")}[name]
+
+
+def engine_of(robot: Robot):
+    """The engine with the exported model, and where a state's positions and velocities are in it."""
+    model = mujoco.MjModel.from_xml_string(mujoco_model(robot).text)
+    names = [*robot.layout.links, *(f"{joint}.motor" for joint in robot.layout.motors)]
+    return model, mujoco.MjData(model), np.array([model.joint(name).dofadr[0] for name in names])
+
+
+def equations_of(robot: Robot):
+    equations = ElasticJoints(robot)
+    values = np.array([robot.parameter(name).value for name in equations.names])
+    return lambda x, u: equations.accelerations(x[None], u[None], values)[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ["doggy", "doggy and effects", "arm", "arm in A", "arm with a spring found"])
+def test_accelerations_are_those_of_the_calibrated_model(name, seed, tmp_path):
+    robot = robot_named(name, tmp_path)
+    robot = robot.with_values({f"{joint}.coulomb_torque": 1e-12 for joint in robot.joints})
+    model, data, place = engine_of(robot)
+    rng, layout = np.random.default_rng(seed), robot.layout
+    x, u = rng.uniform(-0.8, 0.8, layout.size), rng.uniform(-0.5, 0.5, robot.n)
+    data.qpos[place], data.qvel[place], data.ctrl[:] = x[layout.positions], x[layout.velocities], u
+    mujoco.mj_forward(model, data)
+    expected = equations_of(robot)(x, u)
+    np.testing.assert_allclose(data.qacc[place], expected, rtol=0, atol=SIX_DIGITS * np.abs(expected).max())
+
+
+def test_a_motion_with_dry_friction_is_that_of_the_calibrated_model(tmp_path):
+    robot = with_effects(arm_with(tmp_path), {"shoulder.motor_viscous.coefficient": 1.5})
+    model, data, place = engine_of(robot)
+    layout, accelerations = robot.layout, equations_of(robot)
+
+    def command(time: float) -> np.ndarray:
+        return np.array([25.0 * np.sin(9.0 * time), 12.0 * np.cos(7.0 * time)])
+
+    def rates(time: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[layout.velocities], accelerations(x, command(time))])
+
+    start = np.zeros(layout.size)
+    start[layout.positions] = 0.4, -0.3
+    seconds = 0.5  # after it the arm has fallen onto its end stop
+    end = solve_ivp(rates, (0.0, seconds), start, method="LSODA", rtol=1e-8, atol=1e-9).y[:, -1]
+    data.qpos[place] = start[layout.positions]
+    while data.time < seconds - 0.5 * model.opt.timestep:
+        data.ctrl[:] = command(data.time + 0.5 * model.opt.timestep)
+        mujoco.mj_step(model, data)
+    moved = np.abs(end[layout.positions] - start[layout.positions])
+    assert moved.max() > 0.3
+    np.testing.assert_allclose(data.qpos[place], end[layout.positions], atol=0.005 * moved.max())
+
+
+def test_ranges_torques_and_sensors_come_from_the_urdf_and_the_robot_file():
+    model, data, place = engine_of(DOGGY)
+    ranges = np.array([model.joint(joint).range for joint in DOGGY.joints])
+    np.testing.assert_allclose(ranges, DOGGY.tree.limits, rtol=SIX_DIGITS)
+    efforts = np.array([model.jnt_actfrcrange[model.joint(f"{joint}.motor").id, 1] for joint in DOGGY.joints])
+    np.testing.assert_allclose(efforts, DOGGY.tree.effort_limits)
+    data.qvel[place[1]] = 0.7  # the link of joint 2, about y of the base
+    mujoco.mj_forward(model, data)
+    omega_body, *_ = DOGGY.tree.body_rate("link3", np.zeros((1, 3)), np.array([[0.0, 0.7, 0.0]]))
+    (imu2,) = (gyro for gyro in DOGGY.gyros if gyro.name == "imu2")
+    np.testing.assert_allclose(data.sensor("imu2").data, imu2.R_imu_body @ omega_body[0], atol=1e-5)
+
+
+def test_what_the_engine_has_no_element_for_is_said_and_not_in_the_model():
+    robot = with_effects(DOGGY, HELD)
+    more = ["backlash@joint3", "motor_stribeck@joint1", "command_delay@robot", "gyro_delay@imu1"]
+    exported, known = mujoco_model(add_effects(robot, more).robot), mujoco_model(robot)
+    assert exported.text == known.text
+    assert set(more) == set(exported.lacks) - set(known.lacks)
+    assert "mjcb_passive" in exported.lacks["backlash@joint3"]
+    assert "before the drive" in exported.lacks["command_delay@robot"]
+    assert "sensor" in exported.lacks["gyro_delay@imu1"]
+
+
+@pytest.mark.parametrize("name, words", [("kr300", "link_dynamics: free"), ("tx90l", "describes poses")])
+def test_a_robot_without_equations_of_motion_is_refused(name, words):
+    with pytest.raises(RobotError, match=words):
+        mujoco_model(load_robot(name))

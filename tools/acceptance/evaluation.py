@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Limits against what a verb found, as its JSON has it: pass, fail or not evaluated, and never a pass by silence.
+
+A value passes if it is inside its limits with two standard deviations to spare, and fails if it is outside; in between
+nobody can tell (the decision rule of ISO 14253-1). What the result lacks is not evaluated, nor is anything of a
+calibration that has not converged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+from typing import Any
+
+from jointscope.robots.yaml_section import did_you_mean
+from jointscope.tools.acceptance.limits import RANGES, Limit
+
+PASS, FAIL, OPEN = "pass", "fail", "not evaluated"
+FAILED, UNDECIDED = 3, 4  # exit codes
+CERTAIN = 2.0  # sigma
+TABLES = {"parameter": "parameters", "channel": "channels", "joint": "missing_torque_percent"}
+"""Where in the JSON the names of a subject stand."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One limit on one name.
+
+    Attributes:
+        limit: the limit.
+        name: what it was checked on; the pattern where nothing was found.
+        outcome: PASS, FAIL or OPEN.
+        found: the value with its unit, or why there is none.
+    """
+
+    limit: Limit
+    name: str
+    outcome: str
+    found: str
+
+    def to_json(self) -> dict[str, str]:
+        """The same for machines."""
+        return {
+            "name": self.name,
+            "limit": self.limit.text,
+            "because": self.limit.reason,
+            "outcome": self.outcome,
+            "found": self.found,
+        }
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A number of the result, or why there is none."""
+
+    value: float = math.nan
+    unit: str = ""
+    sigma: float = 0.0
+    missing: str = ""
+
+
+AcceptedBy = Mapping[str, Sequence[Checked]]
+"""Lines by the label of the model."""
+NO_LIMITS: AcceptedBy = MappingProxyType({})
+
+
+def check_limits(limits: Sequence[Limit], content: Mapping[str, Any]) -> tuple[Checked, ...]:
+    """All limits against one result.
+
+    Args:
+        limits: of `read_limits`.
+        content: of the JSON of `calibrate`, or of one model of `compare`.
+    """
+    return tuple(checked for limit in limits for checked in _check(limit, content))
+
+
+def check_models(limits: Sequence[Limit], models: Mapping[str, Mapping[str, Any]]) -> AcceptedBy:
+    """The lines of each model, by its label; nothing without limits.
+
+    Args:
+        limits: as given.
+        models: what JSON says of each.
+    """
+    return {label: check_limits(limits, content) for label, content in models.items()} if limits else NO_LIMITS
+
+
+def acceptance_json(checked: AcceptedBy) -> dict[str, Any]:
+    """What is added to the JSON: lines by model; nothing without limits."""
+    lines = {label: [line.to_json() for line in lines] for label, lines in checked.items()}
+    return {"acceptance": lines} if lines else {}
+
+
+def exit_code(checked: Sequence[Checked]) -> int:
+    """0 if everything passed, FAILED if anything failed, else UNDECIDED."""
+    outcomes = {line.outcome for line in checked}
+    return FAILED if FAIL in outcomes else UNDECIDED if OPEN in outcomes else 0
+
+
+def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:
+    if content.get("converged") is False:
+        yield Checked(limit, limit.pattern, OPEN, "the calibration has not converged, so its values mean nothing")
+        return
+    if limit.subject == "poses":
+        yield _judged(limit, limit.quantity, _of_poses(limit, content))
+        return
+    table = content.get(TABLES[limit.subject])
+    if not table:
+        yield Checked(limit, limit.pattern, OPEN, f"this result says nothing of {TABLES[limit.subject]}")
+        return
+    names = [name for name in table if fnmatchcase(name, limit.pattern)]
+    for name in names:
+        yield _judged(limit, name, _READ[limit.subject](limit, name, table[name]))
+    if not names:
+        near = did_you_mean(limit.pattern, set(table))
+        yield Checked(limit, limit.pattern, OPEN, f"there is no such {limit.subject}{near}")
+
+
+def _judged(limit: Limit, name: str, found: _Found) -> Checked:
+    if found.missing:
+        return Checked(limit, name, OPEN, found.missing)
+    spread = CERTAIN * found.sigma
+    text = f"{found.value:.6g} {found.unit}".rstrip() + (f" ± {found.sigma:.2g}" if found.sigma else "")
+    if not limit.lower <= found.value <= limit.upper:
+        return Checked(limit, name, FAIL, text)
+    if found.value - spread < limit.lower or found.value + spread > limit.upper:
+        return Checked(limit, name, OPEN, f"{text}: two sigma reach beyond the limit")
+    return Checked(limit, name, PASS, text)
+
+
+def _of_parameter(limit: Limit, name: str, entry: Mapping[str, Any]) -> _Found:
+    value, sigma, unit = entry["value"], entry["sigma"], entry["unit"]
+    if not isinstance(value, int | float):
+        return _Found(missing="it is no single number")
+    if sigma is None:
+        return _Found(missing="it was held, not calibrated")
+    if limit.quantity in RANGES:
+        return _Found(value, unit, sigma)
+    if limit.quantity.startswith("sigma"):
+        return _share(sigma, value, unit, limit.quantity)
+    assert limit.earlier is not None
+    if name not in limit.earlier:
+        return _Found(missing=f"{limit.against} has no such parameter")
+    before = limit.earlier[name]
+    moved = _share(abs(value - before), before, unit, limit.quantity)
+    spread = _share(sigma, before, unit, limit.quantity)
+    return moved if moved.missing else _Found(moved.value, moved.unit, spread.value)
+
+
+def _share(part: float, whole: float, unit: str, quantity: str) -> _Found:
+    """A part in its unit, or in percent of the whole, as the quantity says."""
+    if not quantity.endswith("_percent"):
+        return _Found(part, unit)
+    return _Found(100.0 * part / abs(whole), "%") if whole else _Found(missing="there are no percent of zero")
+
+
+def _of_channel(limit: Limit, _: str, entry: Mapping[str, Any]) -> _Found:
+    if limit.quantity == "error":
+        horizons = entry.get("horizons", {})
+        if limit.horizon not in horizons:
+            known = f"; horizons are {', '.join(horizons)}" if horizons else "; `jointscope compare` tells it"
+            return _Found(missing=f"this result has no error {limit.horizon} ahead{known}")
+        return _number(horizons[limit.horizon])
+    if limit.quantity not in entry:
+        return _Found(missing=f"this result has no {limit.quantity}; `jointscope calibrate` tells it")
+    return _number(entry[limit.quantity])
+
+
+def _of_joint(_: Limit, name: str, entry: float | None) -> _Found:
+    return _number(entry, "%", f"the drive of {name} has no torque unit, or none was judged")
+
+
+def _of_poses(limit: Limit, content: Mapping[str, Any]) -> _Found:
+    return _number(content.get("poses", {}).get(limit.quantity), "mm", "this result says nothing of poses")
+
+
+def _number(value: Any, unit: str = "", otherwise: str = "it is no number") -> _Found:
+    return _Found(float(value), unit) if isinstance(value, int | float) else _Found(missing=otherwise)
+
+
+_READ: Mapping[str, Callable[[Limit, str, Any], _Found]] = {
+    "parameter": _of_parameter,
+    "channel": _of_channel,
+    "joint": _of_joint,
+}

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an export gives: the file's text, what of the calibration is in it, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.effect import Effect
+from jointscope.robots.effect_kinds.groups import group_of
+from jointscope.robots.model.robot import Robot
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model in a format of other programs.
+
+    Attributes:
+        text: of the file.
+        holds: what of the calibration is in it, phrases.
+        lacks: what is not, by name, each with the reason and what to do.
+    """
+
+    text: str
+    holds: tuple[str, ...]
+    lacks: dict[str, str]
+
+    def to_json(self) -> dict[str, object]:
+        """The same for machines, without the text."""
+        return {"holds": list(self.holds), "lacks": self.lacks}
+
+
+def why_not(effect: Effect, otherwise: str) -> str:
+    """Why an effect has no place in a file of bodies and springs.
+
+    Args:
+        effect: the effect.
+        otherwise: what to say of one of the mechanics.
+    """
+    if isinstance(effect, CommandEffect):
+        return "acts on the command before the drive; your program applies it"
+    if group_of(effect) == "sensors":
+        return "an error of a sensor; sensors of the file read what is there"
+    if group_of(effect) == "numerics":
+        return "belongs to the steps of the calibration, not to the robot"
+    return otherwise
+
+
+def of_drives(robot: Robot, name: str) -> str:
+    """A parameter of the drives: "2.428 kg m2" where all share it, else joint by joint."""
+    found = {joint: robot.drive_parameter(joint, name) for joint in robot.joints}
+    shared = {parameter.name for parameter in found.values()} == {f"motor.{name}"}
+    named = {"each": robot.parameter(f"motor.{name}")} if shared else found
+    return ", ".join(f"{owner} {parameter.value:.6g} {parameter.unit}" for owner, parameter in named.items())

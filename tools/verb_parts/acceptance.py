@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""--accept: a result against limits that the user has declared."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from jointscope.tools.acceptance.evaluation import AcceptedBy, exit_code
+from jointscope.tools.acceptance.limits import Limit, read_limits
+
+
+def add_accept_option(parser: argparse.ArgumentParser) -> None:
+    """Adds --accept."""
+    parser.add_argument(
+        "--accept",
+        type=Path,
+        metavar="LIMITS.yaml",
+        help="limits that the result must keep (docs/accept.md); exit code 3 if one is broken, 4 if one cannot be told",
+    )
+
+
+def limits_of(args: argparse.Namespace) -> tuple[Limit, ...]:
+    """The limits that the user named; none without --accept.
+
+    Raises:
+        RobotError: the file has a mistake.
+    """
+    path = getattr(args, "accept", None)  # verbs that build on `compare` do not have it
+    return () if path is None else read_limits(path)
+
+
+def print_acceptance(checked: AcceptedBy) -> int:
+    """Says the lines of all models; returns the exit code."""
+    from jointscope.tools.terminal.acceptance_text import acceptance_text
+
+    if not checked:
+        return 0
+    print(f"\n{acceptance_text(checked)}")
+    return exit_code([line for lines in checked.values() for line in lines])
