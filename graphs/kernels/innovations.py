@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.kernels.compiled import compiled
+from jointscope.robots.compiled import compiled
 
 Array = NDArray[np.float64]
 

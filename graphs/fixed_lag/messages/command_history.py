@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of the last while, whatever the order in which they came, and what acts of them in a step.
 
-A command acts from its stamp until the next one; a drive signal that was measured is linear between its samples. Effects
+A command acts from its stamp until the next one; a measured drive signal is linear between its samples. Effects
 on commands (delays, lags, dead bands) need the history; a history of half a second holds all that a delay or a lag of
 the catalogue reaches back to.
 """
