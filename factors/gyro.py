@@ -44,23 +44,24 @@ class GyroFactor(SensorFactor[Gyro]):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, 3) [rad/s]."""
-        layout = self.layout
-        omega_body = self.tree.body_rate(self.sensor.body, x[0][:, layout.q_link], x[0][:, layout.v_link])[0]
-        R = calibration[rotation_block(self.name)]
-        return omega_body @ R.T + calibration[bias_block(self.name)] - self.measured
+        return self._predicted(x[0], calibration, derivatives=False)[0] - self.measured
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives."""
-        m, layout = len(self.measured), self.layout
-        motion = x[0][:, layout.q_link], x[0][:, layout.v_link]
-        omega_body, by_q, by_v = self.tree.body_rate(self.sensor.body, *motion)
-        R = calibration[rotation_block(self.name)]
+        m, layout, R = len(self.measured), self.layout, calibration[rotation_block(self.name)]
+        reading, omega, by_q, by_v = self._predicted(x[0], calibration, derivatives=True)
         by_state = np.zeros((m, 3, layout.size))
-        by_state[:, :, layout.q_link] = R @ by_q
-        by_state[:, :, layout.v_link] = R @ by_v
+        by_state[:, :, layout.q_link] = by_q
+        by_state[:, :, layout.v_link] = by_v
         by_block = {
-            rotation_block(self.name): -R @ skew(omega_body),
+            rotation_block(self.name): (-skew(omega).reshape(3 * m, 3) @ R).reshape(m, 3, 3),  # R [w]x = [R w]x R
             bias_block(self.name): np.broadcast_to(np.eye(3), (m, 3, 3)),
         }
-        residual = omega_body @ R.T + calibration[bias_block(self.name)] - self.measured
-        return Linearization(residual, (by_state,), by_block)
+        return Linearization(reading - self.measured, (by_state,), by_block)
+
+    def _predicted(self, x: Array, calibration: Calibration, derivatives: bool) -> tuple[Array, Array, Array, Array]:
+        """Reading, and the rate in the sensor frame with its derivatives by link positions and velocities."""
+        motion = x[:, self.layout.q_link], x[:, self.layout.v_link]
+        R = calibration[rotation_block(self.name)]
+        omega, by_q, by_v = self.tree.sensed_rate(self.sensor.body, R, *motion, derivatives)
+        return omega + calibration[bias_block(self.name)], omega, by_q, by_v

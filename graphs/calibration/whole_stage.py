@@ -19,7 +19,7 @@ from jointscope.graphs.calibration.calibration_result import IterationRecord
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve, total_cost
+from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve
 from jointscope.graphs.solving.convergence import measured_rows
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import Problem, SetProblem
@@ -184,10 +184,8 @@ def approach(
     loose = not_below(noise, APPROACH * LOOSE)
     now = [p.with_noise(loose) for p in problems]
     start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
-    estimate = first_step(now, start, hold)
-    if total_cost(now, estimate) < total_cost(now, start):
-        return estimate
-    return solve(now, start, max_iterations=FEW_ITERATIONS, hold=hold).estimate
+    found = first_step(now, start, hold)
+    return found or solve(now, start, max_iterations=FEW_ITERATIONS, hold=hold).estimate
 
 
 def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:

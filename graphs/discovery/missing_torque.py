@@ -132,7 +132,7 @@ def _smoothed(free: BagProblem, own: BagProblem, states: Array, calibration: Cal
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in free.robot.gyros))
     known = Calibration.of(free.robot).with_points({b: calibration[b] for b in calibration.blocks if b != DYNAMICS})
     start = Estimate((free.robot.layout.carried_over(states, own.robot.layout),), (known,))
-    near = first_step([free], start, hold)
+    near = first_step([free], start, hold) or start
     solution = solve([free], near, max_iterations=1, hold=hold)
     (found,), _ = posteriors([free], solution, hold)
     return solution.estimate.states[0], found.sigmas

@@ -62,25 +62,28 @@ def add_squares(
     d, first, second = J0.shape[2], len(J0) > 0, len(J1) > 0
     a, b = 1 + q, 1 + q + d
     size = a + d * (int(first) + int(second))
-    z, H, total = np.empty(size), np.empty((size, size)), 0.0
+    # four rows at once, so that H is read and written less often; rows of zeros fill up the last four
+    z, H, total = np.zeros((rows + (-rows) % 4, size)), np.empty((size, size)), 0.0
     for k in range(m):
-        H[:] = 0.0
         for row in range(rows):
             w = weights[k, row]
-            z[0] = w * r[k, row]
+            z[row, 0] = w * r[k, row]
             for c in range(q):
-                z[1 + c] = w * P[k, row, c]
+                z[row, 1 + c] = w * P[k, row, c]
             if first:
                 for c in range(d):
-                    z[a + c] = w * J0[k, row, c]
+                    z[row, a + c] = w * J0[k, row, c]
             if second:
                 for c in range(d):
-                    z[b + c] = w * J1[k, row, c]
-            for i in range(size):
-                x = z[i]
-                if x != 0.0:  # most of a measurement's derivatives are zero
+                    z[row, b + c] = w * J1[k, row, c]
+        for i in range(size):
+            for j in range(i + 1):
+                H[i, j] = 0.0
+            for row in range(0, rows, 4):
+                x0, x1, x2, x3 = z[row, i], z[row + 1, i], z[row + 2, i], z[row + 3, i]
+                if x0 != 0.0 or x1 != 0.0 or x2 != 0.0 or x3 != 0.0:  # most derivatives of a measurement are zero
                     for j in range(i + 1):
-                        H[i, j] += x * z[j]
+                        H[i, j] += x0 * z[row, j] + x1 * z[row + 1, j] + x2 * z[row + 2, j] + x3 * z[row + 3, j]
         total += 0.5 * H[0, 0]
         for i in range(q):
             g_p[places[i]] += H[1 + i, 0]
@@ -107,6 +110,8 @@ def add_squares(
 def _add_state(H: Array, at: int, places: Places, D: Array, B: Array, g: Array) -> None:
     """Adds what the rows of H from `at` on say of one state."""
     for i in range(len(g)):
+        if H[at + i, at + i] == 0.0:  # the rows see nothing of this component
+            continue
         g[i] += H[at + i, 0]
         for c in range(len(places)):
             B[i, places[c]] += H[at + i, 1 + c]

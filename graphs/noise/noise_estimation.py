@@ -22,7 +22,16 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Linearization
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.batch_solver import NewtonStep, Progress, Solution, newton_step, solve, total_cost
+from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving.batch_solver import (
+    NewtonStep,
+    Progress,
+    Solution,
+    cost_at,
+    newton_step,
+    solve,
+    total_cost,
+)
 from jointscope.graphs.solving.convergence import measured_rows, short_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
@@ -179,15 +188,16 @@ def _cycle(
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
     shared = SharedLayout.of(estimate.calibrations, owners(problems))
     here = Solution(estimate, float("nan"), shared, systems)
-    step = newton_step(problems, here, hold)
+    eliminations = [eliminate(system) for system in systems]
+    step = newton_step(problems, here, hold, eliminations=eliminations)
     cost = sum(system.cost for system in systems)
     far = step.in_sigmas > short_step(cost, FAR, measured_rows(problems))
-    if far or total_cost(problems, step.estimate) > total_cost(problems, estimate):
+    if far or total_cost(problems, step.estimate) > cost_at(problems, here):
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
             return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
         step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
-    found, _ = posteriors(problems, here, hold)
+    found, _ = posteriors(problems, here, hold, eliminations)
     evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
     for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
         dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]

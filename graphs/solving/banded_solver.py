@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.errors import SolveError
@@ -27,7 +26,7 @@ class Elimination:
     """The factorised chain of one recording.
 
     Attributes:
-        L: banded Cholesky factor as LAPACK stores it, shape (2d, m d).
+        columns: banded Cholesky factor L, column by column from its diagonal on, shape (m, d, 2d).
         W: L^-1 B, shape (m d, p).
         w: L^-1 g_x, shape (m d,).
         S: Hessian on the shared values after elimination, shape (p, p).
@@ -35,12 +34,17 @@ class Elimination:
         d: size of a state.
     """
 
-    L: Array
+    columns: Array
     W: Array
     w: Array
     S: Array
     s: Array
     d: int
+
+    @property
+    def L(self) -> Array:
+        """The factor as LAPACK stores a lower band, shape (2d, m d)."""
+        return self.columns.reshape(len(self.w), 2 * self.d).T
 
     def states(self, dp: Array) -> Array:
         """Change of all states for a change dp of the shared values, shape (m, d)."""
@@ -48,7 +52,7 @@ class Elimination:
 
     def blocks(self) -> tuple[Array, Array]:
         """Blocks of L on and below the diagonal, shape (m, d, d) and (m - 1, d, d)."""
-        columns = self.L.T.reshape(self.L.shape[1] // self.d, self.d, 2 * self.d)
+        columns = self.columns
         m, d = len(columns), self.d
         diagonal, below = np.zeros((m, d, d)), np.zeros((max(m - 1, 0), d, d))
         for b in range(d):
@@ -58,10 +62,10 @@ class Elimination:
 
     def solve_transposed(self, right: Array) -> Array:
         """L^-T times a matrix of shape (m d, k)."""
-        if right.size == 0:
-            return right
-        x, info = lapack.dtbtrs(self.L, right, uplo="L", trans="T")
-        _check(info)
+        from jointscope.graphs.kernels.band_kernel import solve_back  # numba takes half a second to import
+
+        x = np.array(right, dtype=np.float64, order="C")
+        solve_back(self.columns, x)
         return x
 
 
@@ -78,7 +82,7 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
     """
     m, d, p = system.B.shape
     if m == 0:
-        return Elimination(np.zeros((2 * d, 0)), np.zeros((0, p)), np.zeros(0), system.C, system.g_p, d)
+        return Elimination(np.zeros((0, d, 2 * d)), np.zeros((0, p)), np.zeros(0), system.C, system.g_p, d)
     from jointscope.graphs.kernels.band_kernel import factorise  # numba takes half a second to import
 
     right = np.empty((m, d, p + 1))
@@ -86,7 +90,15 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
     columns = np.zeros((m, d, 2 * d))
     scale = np.broadcast_to(1.0 + np.asarray(damping, dtype=float), m)
     D, E, scale = (np.ascontiguousarray(a, dtype=float) for a in (system.D, system.E, scale))
-    info = factorise(D, E, scale, columns, right)
+    check_pivots(factorise(D, E, scale, columns, right), d, first_tick)
+    Ww = right.reshape(m * d, p + 1)
+    square = Ww.T @ Ww
+    S, s = system.C - square[:p, :p], system.g_p - square[:p, p]
+    return Elimination(columns, Ww[:, :p], Ww[:, p], S, s, d)
+
+
+def check_pivots(info: int, d: int, first_tick: int) -> None:
+    """Raises SolveError where a kernel says that a pivot is not positive."""
     if info > 0:
         tick, component = divmod(info - 1, d)
         raise SolveError(
@@ -94,12 +106,3 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
             "its Hessian is not positive definite; either no sample sees it, or the estimate ran away because "
             "the model contradicts the recording (a wrong sign, axis or unit, a sensor that stopped)"
         )
-    Ww = right.reshape(m * d, p + 1)
-    square = Ww.T @ Ww
-    S, s = system.C - square[:p, :p], system.g_p - square[:p, p]
-    return Elimination(columns.reshape(m * d, 2 * d).T, Ww[:, :p], Ww[:, p], S, s, d)
-
-
-def _check(info: int) -> None:
-    if info != 0:
-        raise SolveError(f"the banded factorisation failed (LAPACK info {info}); are there NaN or infinite values?")

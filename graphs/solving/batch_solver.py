@@ -215,7 +215,11 @@ class NewtonStep:
 
 
 def newton_step(
-    problems: Sequence[Problem], solution: Solution, hold: Sequence[str] = (), damping: float = 0.0
+    problems: Sequence[Problem],
+    solution: Solution,
+    hold: Sequence[str] = (),
+    damping: float = 0.0,
+    eliminations: Sequence[Elimination] | None = None,
 ) -> NewtonStep:
     """One step from the solution's normal equations, not checked against the cost.
 
@@ -224,35 +228,41 @@ def newton_step(
         solution: estimate with its normal equations.
         hold: blocks that stay.
         damping: Levenberg-Marquardt lambda, relative to the diagonal.
+        eliminations: of the solution's systems without damping, where they are there already.
     """
     shared = solution.shared
     free = free_indices(shared, hold)
-    eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
+    if eliminations is None:
+        eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
     H, g = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
 
-def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate:
-    """Where one hardly damped step leads; for starts from which every step is an improvement."""
-    shared = SharedLayout.of(estimate.calibrations, owners(problems))
-    here = Solution(estimate, float("nan"), shared, _build(problems, estimate))
-    return newton_step(problems, here, hold, LAMBDA_START).estimate
-
-
-def _build(problems: Sequence[Problem], estimate: Estimate) -> list[NormalEquations]:
+def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate | None:
+    """Where one hardly damped step leads; None where the cost does not fall."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    return [linearized(problem, x, calibration) for problem, x, calibration in bags]
+    systems = [linearized(problem, x, calibration) for problem, x, calibration in bags]
+    here = Solution(estimate, float("nan"), SharedLayout.of(estimate.calibrations, owners(problems)), systems)
+    there = newton_step(problems, here, hold, LAMBDA_START).estimate
+    return there if total_cost(problems, there) < cost_at(problems, here) else None
 
 
 def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:
     """Cost of all recordings and of the priors they share."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    total = sum(cost_of(problem, x, calibration) for problem, x, calibration in bags)
-    for prior, piece in priors_of(problems, estimate.calibrations):
-        total += 0.5 * float(np.sum((prior.residual((), estimate.calibrations[piece]) / prior.sigmas) ** 2))
-    return total
+    return sum(cost_of(*bag) for bag in bags) + _prior_cost(problems, estimate.calibrations)
+
+
+def cost_at(problems: Sequence[Problem], solution: Solution) -> float:
+    """As `total_cost`, where the solution's systems know what the recordings cost."""
+    return sum(system.cost for system in solution.systems) + _prior_cost(problems, solution.estimate.calibrations)
+
+
+def _prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:
+    residuals = ((p.residual((), calibrations[i]) / p.sigmas) for p, i in priors_of(problems, calibrations))
+    return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
 
 
 def reduced_system(

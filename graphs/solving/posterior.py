@@ -49,19 +49,12 @@ class StatePosterior:
     @staticmethod
     def of(elimination: Elimination, shared: Array) -> StatePosterior:
         """Backward recursion over the factorised chain."""
-        L_diagonal, L_below = elimination.blocks()
-        d = elimination.d
-        L_inverse = np.linalg.solve(L_diagonal, np.broadcast_to(np.eye(d), L_diagonal.shape))
-        P = L_inverse.transpose(0, 2, 1) @ L_inverse
-        C = L_below @ L_inverse[:-1]
-        neighbours = np.empty_like(C)
-        C_transposed = np.ascontiguousarray(C.transpose(0, 2, 1))
-        for k in range(len(C) - 1, -1, -1):
-            across = C_transposed[k] @ P[k + 1]
-            neighbours[k] = across
-            P[k] += across @ C[k]
-        np.negative(neighbours, out=neighbours)
-        X = elimination.solve_transposed(elimination.W).reshape(len(P), d, elimination.W.shape[1])
+        from jointscope.graphs.kernels.selected_inverse import selected_inverse  # numba takes half a second to import
+
+        m, d, _ = elimination.columns.shape
+        P, neighbours = np.empty((m, d, d)), np.empty((max(m - 1, 0), d, d))
+        selected_inverse(elimination.columns, P, neighbours)
+        X = elimination.solve_transposed(elimination.W).reshape(m, d, elimination.W.shape[1])
         return StatePosterior(P, neighbours, X, shared)
 
     @property
@@ -77,7 +70,10 @@ class StatePosterior:
 
 
 def posteriors(
-    problems: Sequence[Problem], solution: Solution, hold: Sequence[str] = ()
+    problems: Sequence[Problem],
+    solution: Solution,
+    hold: Sequence[str] = (),
+    eliminations: Sequence[Elimination] | None = None,
 ) -> tuple[list[StatePosterior], Array]:
     """Uncertainty of all recordings at a solution, and the covariance of all shared values.
 
@@ -85,12 +81,14 @@ def posteriors(
         problems: the recordings.
         solution: where the solver ended.
         hold: blocks that were held; they have no uncertainty.
+        eliminations: of the solution's systems, where they are there already.
 
     Raises:
         SolveError: the Hessian is not positive definite.
     """
     shared = solution.shared
-    eliminations = [eliminate(system) for system in solution.systems]
+    if eliminations is None:
+        eliminations = [eliminate(system) for system in solution.systems]
     H, _ = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     free = free_indices(shared, hold)
     covariance = np.zeros_like(H)
@@ -134,18 +132,17 @@ def residual_parts(
         calibration: gives the layout of the shared values.
         posterior: uncertainty of the recording's states.
     """
+    from jointscope.graphs.kernels.selected_inverse import absorb  # as above
+
     columns = calibration.columns
     p = posterior.shared.shape[0]
     for factor, ticks, linear in linearized:
         r, J, by_block = whitened(factor, linear)
-        by_shared = np.zeros((*r.shape, p))
+        by_shared, leverage = np.zeros((*r.shape, p)), np.zeros(r.shape)
         for block, J_block in by_block.items():
             by_shared[:, :, columns[block]] = J_block
-        leverage = np.zeros(r.shape)
-        for i, J_i in enumerate(J):
-            by_shared -= J_i @ posterior.response[ticks + i]
-            leverage += np.einsum("kri,kri->kr", J_i @ posterior.given_shared[ticks + i], J_i)
-        if len(J) == 2:
-            leverage += 2.0 * np.einsum("kri,kri->kr", J[0] @ posterior.neighbours[ticks], J[1])
-        leverage += np.einsum("krp,krp->kr", by_shared @ posterior.shared, by_shared)
+        none = np.zeros((0, r.shape[1], posterior.given_shared.shape[1]))
+        sides = (np.ascontiguousarray(J_i) for J_i in (*J, none, none)[:2])
+        known = (posterior.given_shared, posterior.neighbours, posterior.response, posterior.shared)
+        absorb(*sides, np.asarray(ticks, dtype=np.intp), *map(np.ascontiguousarray, known), by_shared, leverage)
         yield ResidualPart(factor, ticks, r, leverage, by_shared)

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A stretch of one recording: its normal equations, with all states but those at its ends eliminated.
-
-[ A  B ] [inner]      B: inner states against (first, last, free blocks), C: those among themselves
-[ B' C ] [ rim ]
-"""
+"""A stretch of one recording: its normal equations, with all states but those at its ends eliminated."""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.inner_states import InnerStates
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
 
 Array = NDArray[np.float64]
@@ -72,7 +68,7 @@ class RecordingStretch:
             n += calibration.block_size(block)
         self._size = n
         self._base = self._trial = self._evaluated(x.copy(), calibration)
-        self._elimination: Elimination | None = None
+        self._inner: InnerStates | None = None
         self._eliminated_with = self.damping
 
     @property
@@ -116,57 +112,30 @@ class RecordingStretch:
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
-        same = self._elimination is not None and np.array_equal(self._eliminated_with, self.damping)
+        same = self._inner is not None and np.array_equal(self._eliminated_with, self.damping)
         if self._base is not self._trial or not same:
-            self._base = self._trial
-            self._elimination, self._eliminated_with = self._eliminated(), self.damping
-        found = self._elimination
-        system = self._base.system
-        if found is None:
-            rim = self._rim(system)
-            return rim.C, rim.g_p, system.cost
-        return found.S, found.s, system.cost - 0.5 * float(found.w @ found.w)
+            self._base, self._inner = self._trial, None
+        found = self._eliminated()
+        return found.H, found.g, self._base.system.cost - found.gain
 
     def _evaluated(self, x: Array, calibration: Calibration) -> Point:
         return Point(x, calibration, build(self.problem, x, calibration))
 
-    def _eliminated(self) -> Elimination | None:
-        """The inner states eliminated; None where there are none."""
-        system = self._base.system
-        return eliminate(self._rim(system), self.damping[1:-1], self._start + 1) if len(system.D) > 2 else None
-
-    def _rim(self, system: NormalEquations) -> NormalEquations:
-        """The system with both ends counted among the shared values, held blocks left out."""
-        d, kept, n = self._d, self._kept, self._size
-        first, last, blocks = slice(0, d), slice(d, 2 * d), slice(2 * d, n)
-        B = np.zeros((len(system.D) - 2, d, n))
-        C = np.zeros((n, n))
-        if len(B):
-            B[0, :, first], B[-1, :, last] = system.E[0], system.E[-1].T
-            B[:, :, blocks] = system.B[1:-1][:, :, kept]
-        else:
-            C[last, first], C[first, last] = system.E[0], system.E[0].T
-        for end, k in ((first, 0), (last, -1)):
-            C[end, end] = system.D[k] + self.damping[k] * np.diag(np.diag(system.D[k]))
-            C[end, blocks], C[blocks, end] = system.B[k][:, kept], system.B[k][:, kept].T
-        C[blocks, blocks] = system.C[np.ix_(kept, kept)]
-        g = np.concatenate([system.g_x[0], system.g_x[-1], system.g_p[kept]])
-        return NormalEquations(
-            system.D[1:-1], system.E[1:-1], B, C, system.g_x[1:-1], g, system.cost, system.costs[1:-1]
-        )
+    def _eliminated(self) -> InnerStates:
+        if self._inner is None:
+            self._inner = InnerStates.of(self._base.system, self._kept, self.damping, self._start)
+            self._eliminated_with = self.damping
+        return self._inner
 
     def _following(self, first: Array, last: Array, calibration: Calibration) -> Array:
         """All states, the inner ones where the last linearisation puts them for new ends and shared values."""
         base = self._base
         x = base.x.copy()
         x[0], x[-1] = first, last
-        if len(x) > 2:
-            if self._elimination is None:
-                self._elimination, self._eliminated_with = self._eliminated(), self.damping
-            assert self._elimination is not None
-            parts = [first - base.x[0], last - base.x[-1]]
-            parts += [base.calibration.local(calibration, block) for block in self._columns]
-            x[1:-1] += self._elimination.states(np.concatenate(parts))
+        change = np.zeros(base.calibration.size)
+        for block in self._columns:
+            change[base.calibration.columns[block]] = base.calibration.local(calibration, block)
+        x[1:-1] += self._eliminated().states(base.system, first - base.x[0], last - base.x[-1], change)
         return x
 
 

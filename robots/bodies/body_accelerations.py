@@ -20,7 +20,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.body_rates import skew, turned_back, unit_motion
+from jointscope.robots.bodies.body_rates import skew, turned_back
+from jointscope.robots.bodies.joint_table import unit_motion
 
 if TYPE_CHECKING:
     from jointscope.robots.bodies.rigid_tree import RigidTree

@@ -13,10 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+
+from jointscope.robots.bodies.coupling import Coupling
+from jointscope.robots.bodies.joint_table import JointTable, unit_motion
 
 Array = NDArray[np.float64]
 
@@ -35,10 +39,11 @@ class BodyRates:
 
     Args:
         model: pinocchio model with one-axis joints.
+        coupling: its coordinates from those of the joints; None where they are the same.
     """
 
-    def __init__(self, model: pin.Model):
-        self._model = model
+    def __init__(self, model: pin.Model, coupling: Coupling | None = None):
+        self._model, self._coupling = model, coupling
         self._links: dict[int, _Link] = {}
         self._chains: dict[int, tuple[list[_Link], Array]] = {}
 
@@ -54,6 +59,7 @@ class BodyRates:
             omega, shape (m, 3) [rad/s]; its derivatives by q and by v, each of shape (m, 3, n).
         """
         links, R_joint_frame = self._chain(frame)
+        q, v = self._of_model(q, v)
         m, n = q.shape
         # columns: omega, derivatives by q, derivatives by v
         columns = np.zeros((m, 3, 1 + 2 * n))
@@ -64,7 +70,37 @@ class BodyRates:
             columns[:, :, 1 + n + link.column] = link.axis
             columns[:, :, 0] += link.axis * v[:, link.column, None]
         columns = R_joint_frame.T @ columns
-        return columns[:, :, 0], columns[:, :, 1 : 1 + n], columns[:, :, 1 + n :]
+        return columns[:, :, 0], self._by_joints(columns[:, :, 1 : 1 + n]), self._by_joints(columns[:, :, 1 + n :])
+
+    def sensed(
+        self, frame: int, R_sensor_frame: Array, q: Array, v: Array, derivatives: bool
+    ) -> tuple[Array, Array, Array]:
+        """As `rate`, in the axes of a sensor on the frame, by a compiled loop over samples.
+
+        Args:
+            frame: index of the frame.
+            R_sensor_frame: rotation of its axes into those of the sensor, shape (3, 3).
+            q: positions, shape (m, n) [rad].
+            v: velocities, shape (m, n) [rad/s].
+            derivatives: whether they are wanted; else they come back with length 0.
+        """
+        from jointscope.robots.bodies.chain_recursion import body_rates  # numba takes half a second to import
+
+        links, R_joint_frame = self._chain(frame)
+        table, joint = self._table, self._model.frames[frame].parentJoint
+        R_sensor_axes = R_sensor_frame @ R_joint_frame.T @ table.R_joint_axes[joint]
+        q, v = self._of_model(q, v)
+        m, n = q.shape
+        wanted = m * derivatives
+        omega, by_q, by_v = np.empty((m, 3)), np.empty((wanted, 3, n)), np.empty((wanted, 3, n))
+        chain = np.array([link.column for link in links], dtype=np.intp)
+        motion = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, v))
+        body_rates(chain, table.rows, np.ascontiguousarray(R_sensor_axes), *motion, omega, by_q, by_v)
+        return omega, self._by_joints(by_q), self._by_joints(by_v)
+
+    @cached_property
+    def _table(self) -> JointTable:
+        return JointTable.of(self._model)
 
     def of_joints(self, q: Array, v: Array, wanted: Collection[int] | None = None) -> dict[int, Array]:
         """Angular velocities of what moves, each in the frame behind its joint.
@@ -82,6 +118,7 @@ class BodyRates:
         for joint in range(self._model.njoints - 1, 0, -1):
             if joint in needed:
                 needed.add(int(parents[joint]))
+        q, v = self._of_model(q, v)
         rates = {0: np.zeros((len(q), 3))}
         for joint in sorted(needed - {0}):
             if joint not in self._links:
@@ -90,6 +127,15 @@ class BodyRates:
             R = turned_back(link.axis, q[:, link.column]) @ link.R_parent_joint.T
             rates[joint] = (R @ rates[parents[joint]][:, :, None])[:, :, 0] + link.axis * v[:, link.column, None]
         return rates
+
+    def _of_model(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Positions and velocities of the model for those of the joints."""
+        coupling = self._coupling
+        return (q, v) if coupling is None else (coupling.positions(q), coupling.rates(v))
+
+    def _by_joints(self, by: Array) -> Array:
+        """Derivatives by the joints from those by the coordinates of the model."""
+        return by if self._coupling is None else by @ self._coupling.G
 
     def _chain(self, frame: int) -> tuple[list[_Link], Array]:
         """Joints from the base to a frame, and the frame's rotation on the last one."""
@@ -105,14 +151,6 @@ class BodyRates:
     def _link(self, joint: int) -> _Link:
         axis = np.array(unit_motion(self._model, joint).angular)
         return _Link(self._model.joints[joint].idx_q, self._model.jointPlacements[joint].rotation.copy(), axis)
-
-
-def unit_motion(model: pin.Model, joint: int) -> pin.Motion:
-    """The motion that a unit velocity of a joint gives to what is behind it, in the axes there."""
-    probe, unit = model.createData(), np.zeros(model.nv)
-    unit[model.joints[joint].idx_v] = 1.0
-    pin.forwardKinematics(model, probe, pin.neutral(model), unit)
-    return probe.v[joint] - probe.liMi[joint].actInv(probe.v[model.parents[joint]])
 
 
 def turned_back(axis: Array, angle: Array) -> Array:

@@ -19,8 +19,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.body_rates import unit_motion
 from jointscope.robots.bodies.coupling import Coupling
+from jointscope.robots.bodies.joint_table import JointTable
 
 Array = NDArray[np.float64]
 Derivatives = tuple[Array, Array, Array, Array]
@@ -41,8 +41,8 @@ class FreeEquations:
         return FreeEquations, (self._model,)
 
     @cached_property
-    def _tree(self) -> tuple[NDArray[np.intp], Array, Array]:
-        return joint_table(self._model)
+    def _table(self) -> JointTable:
+        return JointTable.of(self._model)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Accelerations of many samples; arguments and result of shape (m, n)."""
@@ -60,7 +60,8 @@ class FreeEquations:
         m, n = q.shape
         a, by_q, by_v, M_inverse = np.empty((m, n)), *np.empty((3, wanted, n, n))
         motion = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, v, tau))
-        accelerations(*self._tree, *motion, a, by_q, by_v, M_inverse)
+        table = self._table
+        accelerations(table.parents, table.rows, table.gravity, *motion, a, by_q, by_v, M_inverse)
         return a, by_q, by_v, M_inverse
 
     def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
@@ -159,27 +160,3 @@ Equations = FreeEquations | CoupledEquations
 def equations_of(model: pin.Model, coupling: Coupling | None) -> Equations:
     """The equations of a model."""
     return FreeEquations(model) if coupling is None else CoupledEquations(model, coupling)
-
-
-def joint_table(model: pin.Model) -> tuple[NDArray[np.intp], Array, Array]:
-    """Parents, table of the joints and gravity, as `tree_recursion.accelerations` wants them."""
-    rows, R_joint_axes = [], [np.eye(3)]  # frames with the joint's axis for their z axis
-    for joint in range(1, model.njoints):
-        motion, parent = unit_motion(model, joint), model.parents[joint]
-        turns = bool(np.any(motion.angular))
-        z = motion.angular if turns else motion.linear
-        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-        x /= np.linalg.norm(x)
-        R, R_before = np.column_stack([x, np.cross(z, x), z]), R_joint_axes[parent]
-        placement = model.jointPlacements[joint]
-        R_joint_axes.append(R)
-        mass, *h = (parameters := model.inertias[joint].toDynamicParameters())[:4]
-        xx, xy, yy, xz, yz, zz = parameters[4:]
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        sigma = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-        rotation, origin = R_before.T @ placement.rotation @ R, R_before.T @ placement.translation
-        second = R.T @ sigma @ R
-        rows.append(np.concatenate([rotation.ravel(), origin, [turns, mass], R.T @ h, second.ravel(), [0.0]]))
-    table = np.array(rows).reshape(model.nv, -1)
-    table[:, -1] = model.armature
-    return np.array(model.parents)[1:] - 1, table, np.array(model.gravity.linear)

@@ -127,7 +127,7 @@ class RigidTree:
         self.model, self.data = model, model.createData()
         self.coupling = Coupling.of(tuple(model.names)[1:], self.joints, self._bodies.followers)
         self.equations: Equations = equations_of(model, self.coupling)
-        self._rates, self.accelerations = BodyRates(model), BodyAccelerations(model)
+        self._rates, self.accelerations = BodyRates(model, self.coupling), BodyAccelerations(model)
 
     def with_coriolis(self, coriolis: bool) -> RigidTree:
         """The same tree with or without Coriolis and centrifugal terms."""
@@ -254,16 +254,16 @@ class RigidTree:
         Returns:
             omega_body, shape (m, 3) [rad/s]; its derivatives by q and by v, each of shape (m, 3, n).
         """
-        frame, coupling = self.frame_id(body), self.coupling
-        if coupling is None:
-            return self._rates.rate(frame, q, v)
-        omega, by_q, by_v = self._rates.rate(frame, coupling.positions(q), coupling.rates(v))
-        return omega, by_q @ coupling.G, by_v @ coupling.G
+        return self._rates.rate(self.frame_id(body), q, v)
+
+    def sensed_rate(
+        self, body: str, R_sensor_body: Array, q: Array, v: Array, derivatives: bool
+    ) -> tuple[Array, Array, Array]:
+        """As `body_rate`, in the axes of a sensor on the body; derivatives that are not wanted have length 0."""
+        return self._rates.sensed(self.frame_id(body), R_sensor_body, q, v, derivatives)
 
     def joint_rates(self, q: Array, v: Array, wanted: Collection[int] | None = None) -> dict[int, Array]:
         """Angular velocities behind joints of `model`, see `BodyRates.of_joints`, each of shape (m, 3) [rad/s]."""
-        if self.coupling is not None:
-            q, v = self.coupling.positions(q), self.coupling.rates(v)
         return self._rates.of_joints(q, v, wanted)
 
     def body_poses(self, body: str, q: Array) -> tuple[Array, Array]:

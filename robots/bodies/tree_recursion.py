@@ -20,12 +20,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.joint_table import ARMATURE, FIRST, MASS, ORIGIN, SECOND, TURNS
 from jointscope.robots.compiled import compiled
 
 Array = NDArray[np.float64]
 
-# columns of the table of joints, see `accelerations`
-ROTATION, ORIGIN, TURNS, MASS, FIRST, SECOND, ARMATURE, COLUMNS = np.cumsum((0, 9, 3, 1, 1, 3, 9, 1))
 # columns of the work space, a row for each joint: pose and motions; sums over all bodies behind it; the body's own
 _R, _O, _S, _V, _A, _PSI, _CHI, _ALL = np.cumsum((0, 9, 3, 6, 6, 6, 6, 6))
 _M, _H, _SIGMA, _P, _GAMMA, _F, _OWN, _WORK = _ALL + np.cumsum((0, 1, 3, 9, 3, 9, 6, 13))
@@ -259,9 +258,7 @@ def accelerations(
 
     Args:
         parents: joint before each, -1 for the base, shape (n,).
-        table: a row for each joint in a frame whose z axis is the joint's: rotation into the frame of the joint before
-            and origin there [m]; 1 for a joint that turns, 0 for one that slides; mass [kg], h [kg m] and Sigma
-            [kg m^2] of the body; inertia of the rotor [kg m^2]; shape (n, 27).
+        table: rows of a `JointTable`, shape (n, 27).
         gravity: acceleration in the base frame, shape (3,) [m/s^2].
         q: positions, shape (m, n) [rad] or [m].
         v: velocities, shape (m, n).

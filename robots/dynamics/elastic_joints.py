@@ -181,6 +181,8 @@ class ElasticJoints:
     def _differentiate(
         self, x: Array, parameters: Array, rigid: RigidDerivatives | None, u: Array | None
     ) -> Accelerations:
+        from jointscope.robots.dynamics.follow_kernel import links_follow  # numba takes half a second to import
+
         layout, values = self.layout, self.named(parameters)
         terms = self._terms(x, values, derivatives=True)
         assert terms.by_state is not None and terms.by_parameter is not None
@@ -191,10 +193,8 @@ class ElasticJoints:
         assert found is not None
         by_state, by_parameter, n = terms.by_state, terms.by_parameter, layout.n_link
         a_link, M_inverse = value[:, :n], found.by_torque
-        by_state[:, :n] = M_inverse @ by_state[:, :n]
-        by_state[:, :n, layout.q_link] += found.by_position
-        by_state[:, :n, layout.v_link] += found.by_velocity
-        by_parameter[:, :n] = M_inverse @ by_parameter[:, :n]
+        parts = (np.ascontiguousarray(part) for part in (M_inverse, found.by_position, found.by_velocity))
+        links_follow(*parts, by_state, by_parameter)
         if self._tree.varies:
             q, v, tau = x[:, layout.q_link], x[:, layout.v_link], terms.value[:, :n]
             for name, slope in self._tree.by_parameter(q, v, tau, a_link, M_inverse, values).items():

@@ -12,6 +12,7 @@ import pytest
 from scipy.linalg import lapack
 
 from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving.inner_states import InnerStates
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.errors import SolveError
 
@@ -91,3 +92,30 @@ def test_a_chain_of_one_state_has_no_blocks_below():
 def test_numba_is_imported_only_where_something_is_solved():
     code = "import sys, jointscope.graphs.solving.batch_solver; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], env=os.environ).returncode == 0
+
+
+@pytest.mark.parametrize(("d", "p", "m"), [(12, 24, 9), (3, 5, 4), (1, 2, 3), (2, 0, 2)])
+def test_a_chain_without_its_inner_states_equals_the_dense_schur_complement(d, p, m):
+    system = _random_chain(d, p, m)
+    kept, damping = np.arange(p)[::2], np.random.default_rng(6).uniform(0.0, 0.5, m)
+    inner, blocks = slice(d, (m - 1) * d), m * d + kept
+    rim = np.concatenate([np.arange(d), np.arange((m - 1) * d, m * d), blocks])
+    H, g = np.zeros((m * d + p, m * d + p)), np.concatenate([system.g_x.ravel(), system.g_p])
+    for k in range(m):
+        own = slice(k * d, (k + 1) * d)
+        H[own, own] = system.D[k] + damping[k] * np.diag(np.diag(system.D[k]))
+        H[own, m * d :] = system.B[k]
+        H[m * d :, own] = system.B[k].T
+        if k < m - 1:
+            H[(k + 1) * d : (k + 2) * d, own], H[own, (k + 1) * d : (k + 2) * d] = system.E[k], system.E[k].T
+    H[m * d :, m * d :] = system.C
+    A, B = H[inner, inner], H[inner][:, rim]
+    found = InnerStates.of(system, kept, damping, 0)
+    np.testing.assert_allclose(found.H, H[np.ix_(rim, rim)] - B.T @ np.linalg.solve(A, B), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.g, g[rim] - B.T @ np.linalg.solve(A, g[inner]), rtol=1e-9, atol=1e-9)
+    assert found.gain == pytest.approx(0.5 * float(g[inner] @ np.linalg.solve(A, g[inner])), rel=1e-9)
+    step = np.random.default_rng(7).normal(size=len(rim))
+    change = np.zeros(p)
+    change[kept] = step[2 * d :]
+    moved = found.states(system, step[:d], step[d : 2 * d], change)
+    np.testing.assert_allclose(moved.ravel(), -np.linalg.solve(A, g[inner] + B @ step), rtol=1e-8, atol=1e-10)

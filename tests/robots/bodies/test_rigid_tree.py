@@ -59,3 +59,14 @@ def test_accelerations_in_parallel_equal_those_with_derivatives(slanted, corioli
     M = tree.mass_matrix(q)
     bias = pin.rnea(tree.model, tree.data, q[0], v[0] if coriolis else 0 * v[0], np.zeros(3))
     np.testing.assert_allclose(M[0] @ a[0] + bias, tau[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("body", ["a", "b", "c", "tip"])
+def test_compiled_rates_of_a_sensor_equal_those_of_its_body_turned(slanted, body):
+    q, v = np.random.default_rng(3).normal(size=(2, 20, 3))
+    R_sensor_body = pin.exp3(np.array([0.3, -1.2, 0.8]))
+    found = slanted.sensed_rate(body, R_sensor_body, q, v, derivatives=True)
+    omega, by_q, by_v = slanted.body_rate(body, q, v)
+    for got, wanted in zip(found, (omega @ R_sensor_body.T, R_sensor_body @ by_q, R_sensor_body @ by_v), strict=True):
+        np.testing.assert_allclose(got, wanted, atol=1e-13)
+    np.testing.assert_array_equal(slanted.sensed_rate(body, R_sensor_body, q, v, derivatives=False)[0], found[0])
