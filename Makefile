@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | test | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
+# make demo | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
 # Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
@@ -11,15 +11,21 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
+.PHONY: demo test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
 	$(BIN)/jointscope demo -o demo
 
 # One process a core, each with one thread of linear algebra; a file's tests stay together, as they share recordings.
+PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+# Without what is marked slow: some minutes.
 test: $(VENV)/dev $(VENV)/code
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(PYTEST) -m "not slow"
+
+test-all: $(VENV)/dev $(VENV)/code
+	$(PYTEST)
 
 lint: style types
 

@@ -26,6 +26,7 @@ def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_readme_work_and_write_what_they_name(tmp_path):
     assert len(COMMANDS) >= 6
     for command in COMMANDS:

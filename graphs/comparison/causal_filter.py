@@ -7,8 +7,9 @@ what reaches on to later states,
     information  D(k) - D_next(k) - L(k, k-1) L(k, k-1)',   gradient  g(k) - g_next(k) - L(k, k-1) w(k-1)
 
 which is quick, but linearised around smoothed states: the future has a small say. `filter_states` is an extended Kalman
-filter in information form, linearised around its own past; it runs many pieces of the recording side by side, each
-started early enough to forget where it began.
+filter in information form, linearised around its own past. A guess of its means gives all its linear steps at once,
+these give better means, and what stays the same is the filter. Where that does not settle, it runs tick by tick, many
+pieces of the recording side by side, each started early enough to forget where it began.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import Placed
 from jointscope.graphs.solving.banded_solver import eliminate
-from jointscope.graphs.solving.normal_equations import build, whitened
+from jointscope.graphs.solving.normal_equations import CHUNK, add_at, build, whitened
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
 PIECE = 0.5  # [s] of filtered states from each run
+SETTLED, ROUNDS = 1e-6, 10  # [sigma] largest change of the last round; rounds of linear steps at the most
 BURN_IN = 0.5  # [s] that each run starts earlier; a state is forgotten within a few tenths of a second
 
 
@@ -58,7 +60,8 @@ def filter_states(problem: BagProblem, x: Array, calibration: Calibration) -> Fi
         SolveError: the filter ran away, as it may under a model that contradicts the recording.
     """
     try:
-        return _filtered(problem, x, calibration)
+        begin = filter_around(problem, x, calibration)
+        return _settled(problem, begin, calibration) or _tick_by_tick(problem, begin, calibration)
     except np.linalg.LinAlgError as err:
         raise SolveError(
             f"{problem.robot.name} cannot follow the recording: the filter of its states ran away; the model "
@@ -66,9 +69,53 @@ def filter_states(problem: BagProblem, x: Array, calibration: Calibration) -> Fi
         ) from err
 
 
-def _filtered(problem: BagProblem, x: Array, calibration: Calibration) -> FilteredStates:
-    begin = filter_around(problem, x, calibration)
-    m, h = len(x), float(np.median(problem.timeline.h))
+def _settled(problem: BagProblem, begin: FilteredStates, calibration: Calibration) -> FilteredStates | None:
+    """Rounds of linear steps, stretch by stretch, until the means are those around which they were linearised.
+
+    None where a stretch does not settle, or leaves the numbers.
+    """
+    from jointscope.graphs.kernels.filter_kernel import filter_steps
+
+    predictor = Predictor(problem.robot, problem.timeline)
+    mean, information = begin.mean.copy(), np.empty_like(begin.covariance)
+    information[0] = _inverse(begin.covariance[:1])[0]
+    for first in range(0, len(mean) - 1, CHUNK):
+        ticks = np.arange(first, min(first + CHUNK, len(mean) - 1))
+        own = slice(first, first + len(ticks) + 1)
+        for _ in range(ROUNDS):
+            H, g, ahead = _linear_steps(problem, predictor, mean, ticks, calibration)
+            found, known, good = filter_steps(H, g, mean[own], ahead, mean[first], information[first])
+            change = np.abs(found - mean[own]) * np.sqrt(np.einsum("kii->ki", known))
+            if not good or not np.all(np.isfinite(change)):
+                return None
+            mean[own], information[own] = found, known
+            if np.max(change) < SETTLED:
+                break
+        else:
+            return None
+    return FilteredStates(mean, _inverse(information))
+
+
+def _linear_steps(
+    problem: BagProblem, predictor: Predictor, mean: Array, ticks: NDArray[np.intp], calibration: Calibration
+) -> tuple[Array, Array, Array]:
+    """What steps that follow each other add to Hessian and gradient on (old state, new state), and the new states."""
+    d, first, last = mean.shape[1], ticks[0], ticks[-1]
+    ahead = predictor.advance(mean[ticks], ticks)
+    H, g = np.zeros((len(ticks), 2 * d, 2 * d)), np.zeros((len(ticks), 2 * d))
+    _add(H, g, problem.dynamics.select(ticks), ticks - first, (mean[ticks], ahead), calibration)
+    for placed in problem.sensors:
+        # a sample at a tick belongs to the step before it, one between two ticks to the step around it
+        one = placed.factor.states == 1
+        begin, end = np.searchsorted(placed.ticks, (first + one, last + one + 1))
+        step = placed.ticks[begin:end] - one - first
+        x = (ahead[step],) if one else (mean[first + step], ahead[step])
+        _add(H, g, placed.factor.select(slice(begin, end)), step, x, calibration)
+    return H, g, ahead
+
+
+def _tick_by_tick(problem: BagProblem, begin: FilteredStates, calibration: Calibration) -> FilteredStates:
+    m, h = len(begin.mean), float(np.median(problem.timeline.h))
     piece, early = max(int(PIECE / h), 1), int(BURN_IN / h)
     first = np.arange(0, m, piece)
     start = np.maximum(first - early, 0)
@@ -133,14 +180,14 @@ class _Run:
         g = np.zeros((len(x0), 2 * d))
         H[:, :d, :d] = self.information
         everyone = np.arange(len(x0))
-        self._add(H, g, self._problem.dynamics.select(self.tick), everyone, (x0, x1))
+        _add(H, g, self._problem.dynamics.select(self.tick), everyone, (x0, x1), self._calibration)
         for placed, (first, count) in self._samples:
             # a sample at a tick belongs to the step before it, one between two ticks to the step around it
             at = self.tick + (1 if placed.factor.states == 1 else 0)
             for j in range(int(np.max(count[at], initial=0))):
                 who = np.flatnonzero(count[at] > j)
                 factor = placed.factor.select(first[at[who]] + j)
-                self._add(H, g, factor, who, (x1[who],) if factor.states == 1 else (x0[who], x1[who]))
+                _add(H, g, factor, who, (x1[who],) if factor.states == 1 else (x0[who], x1[who]), self._calibration)
         H, scale = _balanced(H)
         g = g * scale
         gain = np.linalg.solve(H[:, :d, :d], np.concatenate([H[:, :d, d:], g[:, :d, None]], axis=2))
@@ -152,13 +199,17 @@ class _Run:
         self.tick = self.tick + 1
         return self
 
-    def _add(self, H: Array, g: Array, factor: Factor, who: NDArray[np.intp], x: tuple[Array, ...]) -> None:
-        r, J, _ = whitened(factor, factor.linearize(x, self._calibration))
-        full = np.concatenate(J, axis=2)
-        columns = slice(g.shape[1] - full.shape[2], None)
-        transposed = full.transpose(0, 2, 1)
-        H[who, columns, columns] += transposed @ full
-        g[who, columns] += (transposed @ r[:, :, None])[:, :, 0]
+
+def _add(
+    H: Array, g: Array, factor: Factor, who: NDArray[np.intp], x: tuple[Array, ...], calibration: Calibration
+) -> None:
+    """Adds samples to the systems of their filters or steps, of which one may have several."""
+    r, J, _ = whitened(factor, factor.linearize(x, calibration))
+    full = np.concatenate(J, axis=2)
+    columns = slice(g.shape[1] - full.shape[2], None)
+    transposed = full.transpose(0, 2, 1)
+    add_at(H[:, columns, columns], who, transposed @ full)
+    add_at(g[:, columns], who, (transposed @ r[:, :, None])[:, :, 0])
 
 
 def _rows_by_tick(placed: Placed, problem: BagProblem) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

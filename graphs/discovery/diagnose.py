@@ -97,7 +97,8 @@ def diagnose(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    report, clock = progress or (lambda text, share: None), _Clock()
+    report, clock, pool = progress or (lambda text, share: None), _Clock(), side_by_side or SideBySide()
+    pool.begin(leaders)
     report("calibrating the base model", 0.0)
     base = base or BaseModel.of(robot, recordings)
     clock.stage("calibration")
@@ -112,7 +113,6 @@ def diagnose(
     clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
-    pool = side_by_side or SideBySide()
     validated, failed = dict[str, ValidatedRefit](), set[str]()
     if torques is None:
         validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from jointscope.graphs.calibration.base_model import BaseModel, with_full_gyros
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.comparison.compare import compare_model
-from jointscope.graphs.discovery.diagnose import ADEQUATE, diagnose, unexplained
+from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, diagnose, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
@@ -89,6 +89,8 @@ class _Search:
         """All steps."""
         for saved in resume:
             self._restore(saved)
+        if self.side_by_side is not None:
+            self.side_by_side.begin(LEADERS)
         self.report("calibrating the base model", 0.0)
         start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
         base = BaseModel.of(start, self.recordings)

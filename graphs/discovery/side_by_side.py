@@ -47,6 +47,13 @@ class SideBySide:
     ) -> None:
         self._stop()
 
+    def begin(self, tasks: int) -> None:
+        """Starts processes for a number of tasks to come, which are ready by then; what they import takes a second."""
+        count = min(self.workers, tasks)
+        if count > 1 and self._pool is None:
+            for _ in range(count):
+                self._processes().submit(os.getpid)
+
     def in_order(self, function: Callable[[Any, T], R], shared: Any, tasks: Sequence[T]) -> Generator[R]:
         """Results of function(shared, task) in the order of the tasks; who stops asking stops the rest.
 
@@ -88,10 +95,13 @@ class SideBySide:
         return function(shared, task)
 
     def _submit(self, function: Callable[[Any, T], R], file: Path, task: T) -> Future[R]:
+        return self._processes().submit(_run, function, str(file), task)
+
+    def _processes(self) -> ProcessPoolExecutor:
         if self._pool is None:
             spawn = multiprocessing.get_context("spawn")
             self._pool = ProcessPoolExecutor(self.workers, spawn, _begin, (self._effect_files,))
-        return self._pool.submit(_run, function, str(file), task)
+        return self._pool
 
     def _stop(self) -> None:
         """Ends the processes, whatever they are doing."""
@@ -110,8 +120,10 @@ def available_cores() -> int:
 
 
 def _begin(effect_files: tuple[Path, ...]) -> None:
-    """Makes a worker ready; the process that asked handles Ctrl-C."""
+    """Makes a worker ready, with the modules that it will need; the process that asked handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from jointscope.graphs.discovery import diagnose  # noqa: F401
+    from jointscope.graphs.kernels import band_kernel  # noqa: F401
     from jointscope.robots.files.effect_catalogue import add_user_effects
 
     for file in effect_files:

@@ -34,6 +34,7 @@ def beginning(recording, seconds):
     return replace(recording, streams={name: s.between(0.0, seconds) for name, s in recording.streams.items()})
 
 
+@pytest.mark.slow
 def test_the_kalman_filter_agrees_with_the_filter_behind_compare(case):
     problem, states, calibration = smooth(case.robot, case.recording)
     causal = filter_around(problem, states, calibration)

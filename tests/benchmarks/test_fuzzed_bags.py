@@ -39,15 +39,18 @@ def findings(trials, deep=False):
     return [f"trial {f.trial} ({f.damage}): {f.verb}: {f.what}: {f.where}" for f in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, TRIALS, STRETCH))
 def test_damaged_bags_end_info_and_init_in_one_line(first):
     assert findings(range(first, first + STRETCH)) == []
 
 
+@pytest.mark.slow
 def test_damaged_bags_end_calibrate_and_replay_in_one_line():
     assert findings(range(DEEP), deep=True) == []
 
 
+@pytest.mark.slow
 def test_what_was_found_once_stays_mended():
     assert findings(FOUND) + findings(FOUND_DEEP, deep=True) == []
 

@@ -15,6 +15,8 @@ import fuzz_messages
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.command_line import main
 
+pytestmark = pytest.mark.slow
+
 HOUR = 3_600_000_000_000  # [ns]
 TRUE = {"inertia": (0.3, 0.08), "coulomb_torque": (0.6, 0.2), "motor_viscous.coefficient": (0.8, 0.2)}
 

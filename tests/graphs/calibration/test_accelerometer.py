@@ -14,6 +14,8 @@ from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.sensors import Accelerometer
 from jointscope.robots.recordings.screening import screen
 
+pytestmark = pytest.mark.slow
+
 TRUE_PLACE = np.array([0.05, -0.03, 0.08])  # [m]
 
 

@@ -58,6 +58,7 @@ def test_the_unobservable_yaw_is_named_and_held_by_its_prior(clean):
     assert "about the axis (+1.00 z) of link1 is not observable" in clean.weak_directions[0].text
 
 
+@pytest.mark.slow
 def test_held_out_error_equals_that_of_the_true_parameters(clean, doggy_data, doggy):
     values, truth = _truth(doggy_data / "clean")
     true_robot = clean.robot.with_values(values)
@@ -75,6 +76,7 @@ def test_held_out_error_equals_that_of_the_true_parameters(clean, doggy_data, do
     assert calibrated.channels["imu2.z"].horizons["open_loop"] < 1.1 * calibrated.channels["imu2.z"].noise_sigma
 
 
+@pytest.mark.slow
 def test_soft_bearing_shows_on_the_sensor_axes_x_and_z_of_gyro_1(doggy_data, doggy):
     recording = read_recording(doggy_data / "bearing_flexibility" / "train.bag", doggy)
     result = calibrate(doggy, [recording])
@@ -83,6 +85,7 @@ def test_soft_bearing_shows_on_the_sensor_axes_x_and_z_of_gyro_1(doggy_data, dog
     assert result.channels["imu1.x"].chi2 > 100.0
 
 
+@pytest.mark.slow
 def test_a_calibrated_robot_file_is_read_back_and_calibrates_to_the_same_values(clean, doggy_data, tmp_path):
     path = tmp_path / "calibrated.yaml"
     text = robot_text(clean.robot, tmp_path, {"bags": [{"path": "train", "sha256": "0"}], "version": "0"})
@@ -103,6 +106,7 @@ def test_a_calibrated_robot_file_is_read_back_and_calibrates_to_the_same_values(
         assert abs(p.value - clean.robot.parameters[p.name].value) < 4.0 * p.sigma
 
 
+@pytest.mark.slow
 def test_far_start_values_lead_to_the_same_place(simulated, doggy):
     far = {"motor.k_pwm": 1.0, "motor.k_mi": 60.0, "joint1.stiffness": 3000.0, "joint2.stiffness": 30.0}
     near, result = calibrate(doggy, [simulated.recording]), calibrate(doggy.with_values(far), [simulated.recording])
@@ -110,6 +114,7 @@ def test_far_start_values_lead_to_the_same_place(simulated, doggy):
         assert abs(a.value - b.value) < 0.5 * a.sigma, a.name
 
 
+@pytest.mark.slow
 def test_sensors_with_jitter_gaps_and_low_rates_do_not_bias_the_parameters(doggy):
     pytest.importorskip("mujoco")
     from jointscope.tools.simulator import simulate
@@ -121,6 +126,7 @@ def test_sensors_with_jitter_gaps_and_low_rates_do_not_bias_the_parameters(doggy
     assert all(fit.chi2 < 1.25 for fit in result.channels.values())
 
 
+@pytest.mark.slow
 def test_two_recordings_have_their_own_biases(doggy):
     pytest.importorskip("mujoco")
     from jointscope.tools.simulator import simulate
@@ -135,6 +141,7 @@ def test_two_recordings_have_their_own_biases(doggy):
         assert p.value == pytest.approx(runs[0].truth["parameters"][p.name], rel=0.01), p.name
 
 
+@pytest.mark.slow
 def test_paper_choices_calibrate_to_their_recorded_result(simulated):
     """Regression: the literal model of the paper on a recording with Coriolis terms and motor friction."""
     result = calibrate(load_robot("doggy_paper"), [simulated.recording])
@@ -174,6 +181,7 @@ def test_joint_that_never_moves_is_an_error_that_names_its_parameters(simulated,
         calibrate(doggy, [Recording("still.mcap", "", 0, streams)])
 
 
+@pytest.mark.slow
 def test_no_convergence_is_an_error_and_not_a_result(simulated, doggy, monkeypatch):
     monkeypatch.setattr("jointscope.graphs.calibration.whole_stage.MOST_ITERATIONS", 1)
     with pytest.raises(SolveError, match="no convergence after 1 iterations: the last step was still"):

@@ -45,6 +45,7 @@ def test_gtsams_optimizer_stays_where_the_calibration_ended(calibrated):
             assert found[parameter.name] == pytest.approx(parameter.value, abs=1e-3 * parameter.sigma)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_sample", [False, True], ids=["condensed", "a factor per sample"])
 def test_gtsams_marginals_are_the_sigmas_of_the_calibration(calibrated, per_sample):
     graph = CalibrationGraph.of(calibrated, per_sample)

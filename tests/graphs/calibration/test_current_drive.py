@@ -59,6 +59,7 @@ def test_derivatives_are_those_of_differences(folder):
     np.testing.assert_allclose(model.with_derivatives(x, u, p).by_parameter[:, :, k], slope, rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_constant_is_calibrated_from_a_simulated_recording(folder):
     pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
     from jointscope.tools.simulator import simulate

@@ -115,18 +115,21 @@ def pushed(doggy):
     return SimpleNamespace(whole=whole, moment=moment, without=without, clean=calibrate(near, [clean]))
 
 
+@pytest.mark.slow
 def test_calibrations_name_the_push_and_how_to_leave_it_out(pushed):
     assert pushed.moment.row == "joint2.link" and pushed.moment.t0 <= 5.05 and pushed.moment.t1 >= 5.25
     assert any("--leave-out" in text and "joint2.link" in text for text in pushed.whole.findings)
     assert not any("--leave-out" in text for text in pushed.without.findings)
 
 
+@pytest.mark.slow
 def test_without_the_push_the_noise_is_that_of_a_clean_recording(pushed):
     noise, clean = pushed.without.noise.link_velocity, pushed.clean.noise.link_velocity
     assert pushed.whole.noise.link_velocity[1] > 10.0 * clean[1]
     assert np.all(noise < 1.5 * clean)
 
 
+@pytest.mark.slow
 def test_without_the_push_values_are_those_of_a_clean_recording(pushed):
     values, clean, bent = (
         {p.name: p for p in result.parameters} for result in (pushed.without, pushed.clean, pushed.whole)
@@ -139,6 +142,7 @@ def test_without_the_push_values_are_those_of_a_clean_recording(pushed):
     assert np.median([bent[name].sigma / clean[name].sigma for name in of_robot]) > 2.0
 
 
+@pytest.mark.slow
 def test_no_model_is_judged_where_something_was_left_out(pushed, doggy):
     from jointscope.graphs.comparison.compare import compare_model
 

@@ -23,6 +23,7 @@ def robot():
     return replace(doggy, sensors={motors.name: motors, "links": links})
 
 
+@pytest.mark.slow
 def test_springs_are_calibrated_from_the_two_encoders_of_each_joint_alone(robot):
     pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
     from jointscope.tools.simulator import simulate

@@ -111,6 +111,7 @@ def arm(tmp_path_factory):
     return robot, Recording("arm", "", 0, streams)
 
 
+@pytest.mark.slow
 def test_an_arm_with_gravity_torque_commands_and_odd_rates_is_calibrated(arm):
     robot, recording = arm
     result = calibrate(robot, [recording])
@@ -123,6 +124,7 @@ def test_an_arm_with_gravity_torque_commands_and_odd_rates_is_calibrated(arm):
     assert model.error == pytest.approx(model.floor, rel=0.1)
 
 
+@pytest.mark.slow
 def test_error_is_the_mean_square_of_all_channels_in_sigmas(arm):
     robot, recording = arm
     model = compare({"start": robot}, recording).models[0]
@@ -134,6 +136,7 @@ def test_error_is_the_mean_square_of_all_channels_in_sigmas(arm):
     assert model.channels["shoulder.motor_position"].horizons["0.1"] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_a_slice_that_starts_in_motion_is_not_taken_for_rest(arm):
     robot, recording = arm
     part = recording.between(3.0, 6.0)
@@ -177,6 +180,7 @@ def test_a_command_with_the_wrong_sign_is_said(simulated, doggy):
         calibrate(doggy, [Recording("flipped", "", 0, streams)])
 
 
+@pytest.mark.slow
 def test_all_dynamics_fixed_leaves_mounting_and_biases(simulated, doggy):
     from dataclasses import replace
 

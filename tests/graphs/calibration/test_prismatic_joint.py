@@ -74,6 +74,7 @@ def clean(telescope):
     return simulate(telescope, "calibration", 6.0, 1, friction="smooth").recording
 
 
+@pytest.mark.slow
 def test_a_calibration_finds_masses_and_stiffness_of_a_slide(telescope, clean):
     start = telescope.with_values({name: FAR * p.value for name, p in telescope.parameters.items()})
     result = calibrate(start, [clean])
@@ -86,6 +87,7 @@ def test_a_calibration_finds_masses_and_stiffness_of_a_slide(telescope, clean):
     assert result.robot.noise.motor_velocity[1] < 1e-3  # finer than the smallest of a joint that turns
 
 
+@pytest.mark.slow
 def test_friction_of_a_slide_comes_first_and_explains_it(telescope):
     hidden = ["link_viscous@reach:coefficient=3"]
     recording = simulate(telescope, "calibration", 6.0, 3, effects=hidden, friction="smooth").recording

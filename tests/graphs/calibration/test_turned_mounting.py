@@ -42,6 +42,7 @@ def near(doggy):
     return doggy.with_values({name: p.published for name, p in doggy.parameters.items() if p.published is not None})
 
 
+@pytest.mark.slow
 def test_a_wrong_mounting_in_the_file_that_explains_its_gyro_is_found_and_kept(doggy, recording):
     from jointscope.graphs.calibration.calibrate import calibrate
 
@@ -55,6 +56,7 @@ def test_a_wrong_mounting_in_the_file_that_explains_its_gyro_is_found_and_kept(d
     assert back < 0.2 and not any("was held" in text for text in found.findings)
 
 
+@pytest.mark.slow
 def test_a_held_mounting_stays_and_its_prior_comes_back(doggy, recording):
     from jointscope.graphs.calibration.calibrate import calibrate
 

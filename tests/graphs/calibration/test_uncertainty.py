@@ -78,6 +78,7 @@ def test_jackknife_over_blocks_finds_the_spread_of_estimates_under_coloured_nois
     assert np.all(typical > 0.7 * scatter) and np.all(typical < 1.4 * scatter)
 
 
+@pytest.mark.slow
 def test_process_noise_of_disturbed_recordings_is_found(doggy):
     pytest.importorskip("mujoco")
     from jointscope.tools.simulator import Disturbance, simulate

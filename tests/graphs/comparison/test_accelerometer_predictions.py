@@ -10,6 +10,8 @@ from linearised_motion import with_an_accelerometer
 from jointscope.graphs.comparison.channel_errors import channel_errors
 from jointscope.graphs.discovery.diagnose import diagnose
 
+pytestmark = pytest.mark.slow
+
 HIDDEN, COEFFICIENT = "load_dependent_friction@joint2", 0.25
 AXES = ("acc.x", "acc.y", "acc.z")
 

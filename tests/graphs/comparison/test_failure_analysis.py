@@ -228,6 +228,7 @@ def test_an_error_in_the_motion_of_two_joints_names_both_and_one_spread_evenly_n
     assert concentration(np.ones(1000), {"reversal": mask}).regime == ""
 
 
+@pytest.mark.slow
 def test_a_soft_bearing_shows_in_the_gyro_behind_it(doggy_data, doggy):
     """Recordings made elsewhere; the published parameters stand for a calibration, which would take long."""
     from jointscope.graphs.comparison.compare import compare_model

@@ -25,6 +25,7 @@ def recorded(doggy, seconds=3.0, **choices):
     return robot.with_sensors(mounted), simulation.recording
 
 
+@pytest.mark.slow
 def test_floor_of_a_true_model_under_white_torques_is_its_error(doggy):
     from jointscope.tools.simulator import Disturbance
 
@@ -34,6 +35,7 @@ def test_floor_of_a_true_model_under_white_torques_is_its_error(doggy):
     assert found.floor == pytest.approx(found.error, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_missing_effect_does_not_lift_the_floor(doggy):
     robot, recording = recorded(doggy, effects=["motor_viscous@joint2"])
     found = compare_model("base", robot, recording)

@@ -205,6 +205,7 @@ def test_corrections_are_newest_minus_smoothed_at_the_same_time(doggy, recording
     assert 0.9 < spread < 1.6  # the fake draws both with independent noise: sqrt(1 + 0.36) over a wobbling sigma
 
 
+@pytest.mark.slow
 def test_the_estimator_agrees_with_the_batch_smoother(simulated, doggy):
     part = simulated.recording.between(0.0, 2.0)
     robot = true_robot(doggy, simulated.truth["parameters"])

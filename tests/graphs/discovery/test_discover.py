@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The search for several effects: once for real, and its bookkeeping with computations that are made up."""
+"""The bookkeeping of the search for several effects, with computations that are made up."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,35 +16,6 @@ from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.robots.files.effect_editing import add_effect
 
 FIRST, SECOND = "motor_viscous@joint2", "torque_offset@joint1"
-
-
-def test_discover_adds_the_hidden_effect_and_the_held_out_error_falls_to_its_floor(discovered):
-    steps = discovered.result.steps
-    assert [step.label for step in steps] == ["base model", f"+ {discovered.label}"]
-    assert steps[1].train_error < 0.2 * steps[0].train_error
-    assert steps[1].heldout_error < 0.6 * steps[0].heldout_error
-    assert steps[1].heldout_error == pytest.approx(steps[1].floor, rel=0.1)
-    assert discovered.result.adequate
-    assert discovered.result.stop_reason == (
-        "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
-    )
-    assert discovered.result.robot.parameters["joint2.load_dependent_friction.coefficient"].value == pytest.approx(
-        discovered.coefficient, rel=0.1
-    )
-
-
-def test_discover_saves_every_step_once(discovered):
-    assert discovered.saved == [(0, "base model"), (1, f"+ {discovered.label}")]
-    assert discovered.result.robot_file == "step1.yaml"
-
-
-def test_the_json_of_a_discovery_has_the_promised_keys(discovered):
-    content = json.loads(json.dumps(discovered.result.to_json(), allow_nan=False))
-    assert set(content) == {"steps", "stop_reason", "adequate", "robot_file"}
-    for step in content["steps"]:
-        assert {"added", "removed", "train_error", "heldout_error", "floor"} <= set(step)
-    assert content["steps"][0]["added"] is None
-    assert content["steps"][1]["added"] == discovered.label
 
 
 class MadeUp:

@@ -76,6 +76,7 @@ def test_a_gain_that_cannot_be_measured_is_named(servo, loaded):
         controller_of(servo, replace(loaded[0], goal=None))
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_judged_by_the_loop(servo, loaded):
     found = diagnose(servo, loaded, measured(servo, 4, LOAD_FRICTION), leaders=2, missing_torque=False)
     first = found.candidates[0]
@@ -86,6 +87,7 @@ def test_what_is_missing_is_judged_by_the_loop(servo, loaded):
     assert "error of the loop simulated from its goals" in " ".join(found.paragraphs)
 
 
+@pytest.mark.slow
 def test_without_goals_predictions_judge(servo, loaded):
     with_goals = compare_model("loop", servo, loaded[0])
     assert with_goals.judged_error == pytest.approx(

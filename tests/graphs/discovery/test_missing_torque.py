@@ -45,6 +45,7 @@ def hidden(request, doggy):
     return found, found.explained_by[label], found.times > found.times[0] + SETTLED
 
 
+@pytest.mark.slow
 def test_the_hidden_torque_is_found_in_its_own_equation(hidden):
     found, true, late = hidden
     assert found.rows[RIGHT_ROW] == "joint2.motor"
@@ -53,12 +54,14 @@ def test_the_hidden_torque_is_found_in_its_own_equation(hidden):
     assert np.all(np.delete(size, RIGHT_ROW) < 0.05 * size[RIGHT_ROW])
 
 
+@pytest.mark.slow
 def test_its_sigma_covers_the_distance_to_the_truth(hidden):
     found, true, late = hidden
     in_sigmas = (found.torque - true)[late, RIGHT_ROW] / found.sigma[late, RIGHT_ROW]
     assert 0.2 < np.sqrt(np.mean(in_sigmas**2)) < 1.5
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_from_a_clean_recording(doggy):
     pytest.importorskip("mujoco")
     from jointscope.tools.simulator import simulate

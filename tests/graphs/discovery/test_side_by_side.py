@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import pickle
 import signal
@@ -25,6 +26,20 @@ def test_who_stops_asking_stops_the_rest():
         assert next(results) == (14, 2)
         results.close()
         assert list(pool.in_order(divmod, 10, [3, 4])) == [(3, 1), (2, 2)]
+
+
+def test_processes_that_were_begun_do_the_tasks():
+    with SideBySide(2) as pool:
+        pool.begin(3)
+        begun = set(pool._pool._processes)
+        assert len(begun) == 2
+        assert set(pool.in_order(operator.call, eval, ["__import__('os').getpid()"] * 2)) <= begun
+
+
+def test_one_process_begins_nothing():
+    with SideBySide(1) as pool:
+        pool.begin(2)
+        assert pool._pool is None
 
 
 def test_an_error_of_a_task_is_the_callers():

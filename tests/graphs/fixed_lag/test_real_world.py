@@ -288,6 +288,7 @@ def test_commands_at_100_hz_are_held_and_steps_stay_short(run):
     assert est.status.nis_mean < 1.3  # at rest samples of the quantized encoder share errors and count for less
 
 
+@pytest.mark.slow
 def test_a_gyro_with_a_wrong_clock_raises_an_alarm(run):
     """Stamps of one gyro are 50 ms ahead: the estimate suffers, and says so."""
     shifted = [(t, n, t + (0.05 if n == "imu2" else 0.0), v) for n, t, v in run.messages(0.45, 0.9)]

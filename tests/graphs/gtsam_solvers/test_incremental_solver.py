@@ -24,6 +24,7 @@ def both(simulated, doggy):
     return SimpleNamespace(batch=calibrate(robot, parts), incremental=incremental, told=told)
 
 
+@pytest.mark.slow
 def test_incremental_ends_where_the_batch_ends(both):
     assert both.incremental.cost == pytest.approx(both.batch.cost, rel=1e-9)
     for one, other in zip(both.incremental.parameters, both.batch.parameters, strict=True):
@@ -33,6 +34,7 @@ def test_incremental_ends_where_the_batch_ends(both):
         assert np.max(np.abs(one.states - other.states) / other.sigmas) < 1e-2
 
 
+@pytest.mark.slow
 def test_more_is_known_after_every_stretch(both):
     told = both.told
     assert [known.stretch for known in told] == list(range(1, told[0].stretches + 1))
@@ -42,6 +44,7 @@ def test_more_is_known_after_every_stretch(both):
     assert np.all(sigmas[-1] < 1.02 * sigmas.min(axis=0))
 
 
+@pytest.mark.slow
 def test_what_is_said_of_a_value_on_the_way_holds_in_the_end(both):
     told = both.told
     last = told[-1]

@@ -71,6 +71,7 @@ def around_sockets(robot, rng):
 PLACES = {"left": (0.4, 0.3, 0.2), "right": (0.45, -0.3, 0.1), "high": (0.3, 0.1, 0.6), "far": (0.6, 0.0, 0.3)}
 
 
+@pytest.mark.slow
 def test_an_arm_is_calibrated_without_any_tracker(panda):
     rng = np.random.default_rng(5)
     errors = {n: p.prior_sigma * 0.3 * rng.standard_normal() for n, p in panda.parameters.items() if n[0] == "j"}

@@ -47,6 +47,7 @@ def test_white_noise_is_no_quantization():
     assert shared_error(stream(SIGMA * rng.standard_normal((3000, 1))), SIGMA) is None
 
 
+@pytest.mark.slow
 def test_quantized_encoders_leave_friction_and_noise_where_they_are(doggy, simulated):
     published = {name: p.published for name, p in doggy.parameters.items() if p.published is not None}
     result = calibrate(doggy.with_values(published), [simulated.recording])

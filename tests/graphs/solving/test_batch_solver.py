@@ -67,6 +67,7 @@ def test_batched_cost_equals_the_cost_of_the_gtsam_graph(name, simulated):
     assert graph.error(initial_values(start)) == pytest.approx(total_cost(problems, start), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_batched_solver_ends_where_gtsam_ends(moving):
     problems, start = moving
     fast = solve(problems, start, max_iterations=200, step_tolerance=1e-6)
@@ -82,6 +83,7 @@ def test_batched_solver_ends_where_gtsam_ends(moving):
     np.testing.assert_allclose(fast.estimate.states[0], slow.estimate.states[0], atol=2e-5)
 
 
+@pytest.mark.slow
 def test_two_recordings_share_parameters_as_in_the_gtsam_graph(simulated, doggy):
     robot = _noisier(doggy, 0.3)
     parts = [_short(simulated.recording, t, 0.04, every=2) for t in (4.0, 6.0)]

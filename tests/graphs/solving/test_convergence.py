@@ -49,6 +49,7 @@ def test_rounding_alone_counts_only_in_undamped_steps():
     assert not has_converged(same, 0.1, 1000, undamped=False)
 
 
+@pytest.mark.slow
 def test_a_calibration_that_never_came_to_rest_says_so_first(simulated, doggy):
     from jointscope.graphs.calibration.calibrate import calibrate
 

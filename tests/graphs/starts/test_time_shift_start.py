@@ -22,6 +22,7 @@ def recording(doggy, effect, seconds=4.0):
     return simulate(doggy, "calibration", seconds, seed=12, friction="smooth", effects=[effect]).recording
 
 
+@pytest.mark.slow
 def test_a_gyro_that_is_many_samples_late_is_calibrated_from_the_null_model(doggy):
     """From the start value of a millisecond this ran into bent states, and ended with an error."""
     late = recording(doggy, "gyro_delay@imu1:delay=0.006")
@@ -37,6 +38,7 @@ def started(robot, data, hold=()):
     return problem, estimate, with_best_shifts([problem], estimate, hold)
 
 
+@pytest.mark.slow
 def test_offsets_are_found_on_either_side(doggy):
     robot = add_effect(doggy, "clock_offset@imu2")
     _, _, (problems, estimate) = started(robot, recording(doggy, "clock_offset@imu2:offset=-0.004"))

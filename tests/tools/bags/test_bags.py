@@ -78,6 +78,7 @@ def test_the_fast_path_equals_full_decoding_bit_by_bit(doggy, tmp_path, name):
     assert_same_streams(fast, read_recording(tmp_path / name, doggy, decode_all=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOGGY_BAGS)
 def test_on_the_shared_recordings_both_paths_agree_and_the_fast_one_is_taken(doggy, name):
     path = shared_bag(name)

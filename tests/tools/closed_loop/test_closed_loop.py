@@ -124,6 +124,7 @@ def test_a_model_with_a_soft_bearing_has_gains_and_a_reference_for_it(truth, pla
     assert gains.at(100).shape == (3, model.layout.size)
 
 
+@pytest.mark.slow
 def test_state_feedback_with_the_true_state_tracks_far_better_than_the_p_controller(loops):
     result, _ = loops
     p, feedback = (result.run(controller, "true").tracking for controller in ("p", "state_feedback"))
@@ -134,6 +135,7 @@ def test_state_feedback_with_the_true_state_tracks_far_better_than_the_p_control
     assert feedback.saturated < 0.01
 
 
+@pytest.mark.slow
 def test_the_true_state_is_true_and_encoders_know_less(loops):
     result, _ = loops
     assert max(result.run("p", "true").tracking.estimation.values()) == 0.0
@@ -144,6 +146,7 @@ def test_the_true_state_is_true_and_encoders_know_less(loops):
     assert encoders.hit_position > 2.0 * true.hit_position
 
 
+@pytest.mark.slow
 def test_the_p_law_is_that_of_the_paper(loops):
     result, _ = loops
     for run in (result.run("p", "true"), result.run("p", "encoders")):
@@ -151,6 +154,7 @@ def test_the_p_law_is_that_of_the_paper(loops):
         np.testing.assert_allclose(run.commands, np.clip(GAIN * (result.plan.q - q_motor), -1, 1), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_an_estimator_is_told_every_sample_and_every_command_in_time(loops):
     result, made = loops
     assert len(made) == 2  # one per run, nothing is carried over
@@ -167,12 +171,14 @@ def test_an_estimator_is_told_every_sample_and_every_command_in_time(loops):
     np.testing.assert_allclose([encoder[t] for t in recorded.times[:500]], recorded.values[:500], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_before_an_estimator_knows_anything_the_plan_is_believed(loops):
     result, _ = loops
     run = result.run("state_feedback", "estimator")
     np.testing.assert_array_equal(run.estimates[0, :3], result.plan.q[0])
 
 
+@pytest.mark.slow
 def test_all_runs_see_the_same_robot_plan_and_noise(loops):
     result, _ = loops
     starts = np.array([run.states[0] for run in result.runs])
@@ -182,6 +188,7 @@ def test_all_runs_see_the_same_robot_plan_and_noise(loops):
         np.testing.assert_array_equal(other, noise[0])
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_changes_the_truth_but_not_the_hits():
     robot, options = load_robot("doggy"), LoopOptions(("state_feedback",), ("true",))
     plain = run_closed_loop(robot, None, 3.0, 3, options=options)
@@ -190,6 +197,7 @@ def test_a_hidden_effect_changes_the_truth_but_not_the_hits():
     assert soft.runs[0].tracking.head_position > 1.5 * plain.runs[0].tracking.head_position
 
 
+@pytest.mark.slow
 def test_without_a_model_file_the_parameters_are_a_little_off_and_gyros_as_mounted():
     robot = load_robot("doggy")
     result = run_closed_loop(robot, None, 3.0, 3, options=LoopOptions(("p",), ("true",), mismatch=0.05))

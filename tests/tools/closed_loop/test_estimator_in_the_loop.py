@@ -9,6 +9,8 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
 from jointscope.tools.report.sections.closed_loop.loop_answer import loop_judgement
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
 

@@ -110,6 +110,7 @@ def test_joints_with_a_gyro_behind_them_get_a_spring(doggy, bag, tmp_path):
     assert robot.parameters["joint2.stiffness"].value > 0.0
 
 
+@pytest.mark.slow
 def test_a_calibration_from_a_guessed_file_finds_the_truth(doggy, doggy_data, tmp_path):
     """Of a robot made elsewhere, knowing its URDF, its supply and that its weight is compensated."""
     run(doggy.tree.urdf, doggy_data / "clean" / "train", "-o", tmp_path / "own.yaml")
@@ -218,6 +219,7 @@ def test_irregular_sampling_of_a_fast_motion_is_no_noise():
     assert found.sigma == pytest.approx(1e-3, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_joint_that_counts_backwards_gets_a_sign(doggy, tmp_path):
     bag = written(tmp_path, moving(doggy), doggy, motor_encoder=[1.0, -1.0, 1.0])
     # axes at right angles: the mirrored robot turns its gyroscopes alike, only its command tells which joint it is
@@ -231,6 +233,7 @@ def test_a_joint_that_counts_backwards_gets_a_sign(doggy, tmp_path):
     assert not any(gyro.left_handed for gyro in robot.gyros)
 
 
+@pytest.mark.slow
 def test_a_counter_that_begins_anew_is_continued(doggy, tmp_path):
     recording = moving(doggy)
     encoder = recording.streams["motor_encoder"]
@@ -296,6 +299,7 @@ def test_an_unknown_joint_is_named(doggy, bag, tmp_path):
         run(doggy.tree.urdf, bag, "-o", tmp_path / "own.yaml", "--joints", "joint1,elbow")
 
 
+@pytest.mark.slow
 @needs_real
 def test_a_series_elastic_arm_is_recognised(tmp_path):
     arm = load_robot("hebi_5r")

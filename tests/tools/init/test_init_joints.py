@@ -323,6 +323,7 @@ def test_links_and_joints_may_have_the_same_names(tmp_path):
     assert load_robot(tmp_path / "a.yaml").tree.locked == pytest.approx({"wrist": -1.0192}, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [("finger",), ("arm", "finger")])
 def test_a_finger_without_a_mass_has_that_of_its_rotor(moving, tmp_path, capsys):
     text = write_urdf(tmp_path / "g.urdf", {"arm": None, "finger": "arm"}).read_text()

@@ -58,6 +58,7 @@ def test_who_names_the_unit_is_believed():
     assert suspicious_constants(result((0.5, 0.5, 0.5), law="k_pwm")) == ""
 
 
+@pytest.mark.slow
 @needs_cases
 @pytest.mark.parametrize("factor", [1000.0, 0.5])
 def test_masses_that_are_off_by_a_factor_are_never_called_good(tmp_path, capsys, factor):

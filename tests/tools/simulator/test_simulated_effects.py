@@ -191,6 +191,7 @@ def test_effects_that_are_always_or_never_there_say_how_to_get_them():
             make_effect(f"{effect_id}@robot", DOGGY)
 
 
+@pytest.mark.slow
 def test_all_effects_of_all_kinds_run_together(plain):
     truth = true_robot(DOGGY, {})
     texts = []

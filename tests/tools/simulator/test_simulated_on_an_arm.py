@@ -87,6 +87,7 @@ def test_without_a_gear_ratio_one_period_per_turn_of_the_joint_is_assumed(arm):
         assert make_effect(f"{effect_id}@elbow", arm).parameters["order"] == 1.0
 
 
+@pytest.mark.slow
 def test_state_feedback_from_the_robot_file_alone_moves_the_arm_against_gravity(arm):
     options = LoopOptions(sources=("true",))
     result = run_closed_loop(arm, None, seconds=6.0, seed=1, options=options)

@@ -56,6 +56,7 @@ def test_accelerations_are_those_of_the_engine_with_effects_on_every_side():
         np.testing.assert_allclose(a[engine.motor][1], found[4], atol=0.01)
 
 
+@pytest.mark.slow
 def test_elements_of_the_matrix_are_calibrated_from_a_simulated_recording():
     truth = replace(DOGGY, transmission=np.array([[1.0, 0, 0], [0, 1, 0], [0, -0.19, 0.8]]))
     run = simulate(truth, "calibration", 2.0, seed=4, friction="smooth")

@@ -167,6 +167,7 @@ def test_friction_stops_a_free_rotor_with_constant_torque(doggy, friction):
     assert np.abs(v[-1]).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "largest"), [("smooth", 1e-5), ("dry", 3e-4)])
 def test_half_the_step_gives_the_same_motion_far_below_the_noise_of_the_gyros(doggy, truth, friction, largest):
     recorded = simulate(doggy, seconds=3.0, seed=1, friction=friction)

@@ -29,6 +29,7 @@ def test_discover_writes_robot_report_and_json_and_calibrate_takes_the_robot_aga
     assert main(["calibrate", str(out), *KR, "-o", str(tmp_path / "again.yaml")]) == 0
 
 
+@pytest.mark.slow
 def test_the_last_part_of_a_recording_can_be_held_out(tmp_path, capsys):
     bag = str(REAL / "hebi_arms_mit" / "arm5_capstone_robot_data")
     out = ["-o", str(tmp_path / "found.yaml")]

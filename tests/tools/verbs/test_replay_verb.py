@@ -86,6 +86,7 @@ def test_an_alarm_names_the_sensor_and_the_command_that_asks_why(bag, capsys, mo
     assert screen.rstrip().endswith(f"jointscope diagnose doggy '{bag}'")
 
 
+@pytest.mark.slow
 def test_both_tables_hold_every_tick_with_mean_sigma_and_lagged_state(doggy, bag, tmp_path):
     import pyarrow.parquet
 
@@ -172,6 +173,7 @@ def test_a_recording_that_the_batch_smoother_refuses_is_replayed_all_the_same(ba
     assert capsys.readouterr().err == "jointscope: error: it is odd.\n"
 
 
+@pytest.mark.slow
 def test_the_batch_is_compared_and_disagreement_is_told(doggy, bag, capsys, monkeypatch):
     import jointscope.graphs.fixed_lag.replay.batch_agreement as module
 

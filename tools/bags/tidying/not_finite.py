@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
@@ -97,6 +96,8 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
 
 def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
     """A channel at all times: what is known, a spline between, straight lines where much is missing, shape (n,)."""
+    from scipy.interpolate import CubicSpline
+
     straight = np.interp(times, known, column)
     if len(known) < 4:
         return straight

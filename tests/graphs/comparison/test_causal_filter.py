@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The filter by rounds of linear steps is the one that runs tick by tick."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jointscope.graphs.comparison import causal_filter
+from jointscope.graphs.comparison.causal_filter import FilteredStates, filter_around, filter_states
+from jointscope.graphs.comparison.compare import smooth
+
+DIFFERENT = 1e-4  # [sigma]
+
+
+@pytest.fixture(scope="module")
+def solved(doggy):
+    """A second of a robot whose friction the model does not know."""
+    pytest.importorskip("mujoco")
+    from jointscope.tools.simulator import simulate
+
+    hidden = ["load_dependent_friction@joint2:coefficient=0.25"]
+    return smooth(doggy, simulate(doggy, "moves", 1.2, seed=5, friction="smooth", effects=hidden).recording)
+
+
+def test_rounds_of_linear_steps_end_where_the_filter_tick_by_tick_does(solved, monkeypatch):
+    problem, x, calibration = solved
+    monkeypatch.setattr(causal_filter, "CHUNK", 500)  # several stretches
+    monkeypatch.setattr(causal_filter, "BURN_IN", 10.0)  # all runs tick by tick begin where the recording does
+    slow = causal_filter._tick_by_tick(problem, filter_around(problem, x, calibration), calibration)
+    fast = filter_states(problem, x, calibration)
+    sigma = np.sqrt(np.einsum("kii->ki", slow.covariance))
+    assert np.max(np.abs(fast.mean - slow.mean) / sigma) < DIFFERENT
+    np.testing.assert_allclose(np.sqrt(np.einsum("kii->ki", fast.covariance)), sigma, rtol=DIFFERENT)
+
+
+def test_where_rounds_do_not_settle_the_filter_runs_tick_by_tick(solved, monkeypatch):
+    problem, x, calibration = solved
+    asked, found = [], FilteredStates(x, np.zeros((0, 0, 0)))
+    monkeypatch.setattr(causal_filter, "ROUNDS", 1)
+    monkeypatch.setattr(causal_filter, "_tick_by_tick", lambda *args: asked.append(args) or found)
+    assert filter_states(problem, x, calibration) is found
+    assert len(asked) == 1
