@@ -30,7 +30,7 @@ from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
-from jointscope.graphs.starts.drive_signal import with_known_drive_signal
+from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
@@ -43,12 +43,6 @@ from jointscope.robots.recordings.screening import screen
 
 Array = NDArray[np.float64]
 
-MEASURED = (
-    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
-    "`held: true` in the section command makes it a command that acts until the next one"
-)
-TOLD_HELD = "the motion says that each value on {} acts until the next one, as a command does: `held: true`"
-TOLD_MEASURED = "the motion says that the drive signal on {} was measured, linear between its samples: `held: false`"
 WINDOW_ITERATIONS = 12
 
 
@@ -103,7 +97,7 @@ def _calibrated(
 ) -> CalibrationResult:
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
-    robot, found = _with_drive_signal(robot, recordings)
+    robot, found = told_drive_signal(robot, recordings)
     notices += found
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
@@ -156,18 +150,6 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
     if every_joint:
         must_move(robot, recordings)
     return notices
-
-
-def _with_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> tuple[Robot, list[Notice]]:
-    """The robot with what the motion says about its drive signal, and a sentence about it where it is not plain."""
-    known = with_known_drive_signal(robot, recordings)
-    if known.command.held is not robot.command.held:
-        text = (TOLD_HELD if known.command.held else TOLD_MEASURED).format(robot.command.topic)
-    elif robot.command.held is None and not robot.command_held:
-        text = MEASURED.format(robot.command.topic)
-    else:
-        return known, []
-    return known, [Notice("command", "info", 0, text)]
 
 
 def _windows_stage(

@@ -18,12 +18,18 @@ from jointscope.graphs.starts.drive_regression import GAIN, DriveEquation, Drive
 from jointscope.graphs.starts.drive_starts import driven_joints
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.recording import Notice, Recording
 
 Array = NDArray[np.float64]
 
 CLEARLY = 1.5  # times the missing torque, mean over the joints, that the wrong way leaves
 EXPLAINED = 0.1  # of the driving torque that may be missing where that is believed
+MEASURED = (
+    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
+    "`held: true` in the section command makes it a command that acts until the next one"
+)
+TOLD_HELD = "the motion says that each value on {} acts until the next one, as a command does: `held: true`"
+TOLD_MEASURED = "the motion says that the drive signal on {} was measured, linear between its samples: `held: false`"
 
 
 def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Robot:
@@ -43,6 +49,18 @@ def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Ro
     if told is None or told == robot.command_held:
         return robot
     return replace(robot, command=replace(robot.command, held=told))
+
+
+def told_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> tuple[Robot, list[Notice]]:
+    """The same with a sentence about it where it is not plain."""
+    known = with_known_drive_signal(robot, recordings)
+    if known.command.held is not robot.command.held:
+        text = (TOLD_HELD if known.command.held else TOLD_MEASURED).format(robot.command.topic)
+    elif robot.command.held is None and not robot.command_held:
+        text = MEASURED.format(robot.command.topic)
+    else:
+        return known, []
+    return known, [Notice("command", "info", 0, text)]
 
 
 def acts_until_the_next(

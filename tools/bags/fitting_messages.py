@@ -2,7 +2,8 @@
 """Which messages of a topic belong together, by the names in them: several nodes may publish on one topic.
 
 Of messages that name joints, those are used that name all that are wanted, in whatever order and whatever else they
-name. Of messages without names, those with the right number of values. All others are left out and counted by what they
+name. Where every joint has messages of its own, the others are taken at the stamps of the one with most of them. Of
+messages without names, those with the right number of values. All others are left out and counted by what they
 are.
 """
 
@@ -12,16 +13,23 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.messages.columns import Columns, LeftOut
+from jointscope.tools.bags.messages.joined_topics import PLUS
 from jointscope.tools.bags.messages.message_parts import MessageParts, message_parts
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import RawTopic
+from jointscope.tools.bags.tidying.not_finite import LARGEST
+
+Array = NDArray[np.float64]
 
 NAMES_SAID = 6
+FEWEST = 4  # messages of a joint
+GAP = 4.5  # usual steps between two messages of a joint, from which nobody knows where it was between them
 
 
 def read_columns(
@@ -32,6 +40,7 @@ def read_columns(
     first: int = 0,
     wanted: Sequence[str] = (),
     width: int | None = None,
+    acts_on: bool = False,
 ) -> Columns:
     """One field of the messages of a topic that belong together.
 
@@ -43,17 +52,21 @@ def read_columns(
         first: number of the first message in its topic.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values of messages without names; None for what most have.
+        acts_on: whether values act until the next one, as those of commands.
     """
-    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
+    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width, acts_on)
 
 
-def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int | None = None) -> Columns:
+def fitting_messages(
+    found: MessageParts, wanted: Sequence[str] = (), width: int | None = None, acts_on: bool = False
+) -> Columns:
     """The messages that fit.
 
     Args:
         found: the messages in parts.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values that a message without names must have; None for what most messages have.
+        acts_on: whether values act until the next one, as those of commands; else they were measured.
 
     Returns:
         Their columns: the wanted names first, then others that all of them have. Where no message fits, the largest
@@ -66,11 +79,13 @@ def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int
     if len(parts) == 1:
         return _with_broken(parts[0], found.broken)
     named = [part for part in parts if _is_sound(part)]
+    if not wanted and PLUS in found.topic:
+        wanted = tuple(dict.fromkeys(name for part in named for name in part.names or ()))
     core = tuple(wanted) or _most_shared(named)
     if core:
         chosen = [part for part in named if set(core) <= set(part.names or ())]
-        if not chosen and wanted:
-            _refuse_scattered(found, named, core)
+        if not chosen and wanted and all(any(name in (part.names or ()) for part in named) for name in core):
+            return _woven(found, named, core, acts_on)
     else:
         chosen = []
     if not chosen:
@@ -113,16 +128,54 @@ def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:
     return max(named, key=values).names or () if named else ()
 
 
-def _refuse_scattered(found: MessageParts, named: Sequence[Columns], wanted: Sequence[str]) -> None:
-    """Joints of one robot that different nodes publish never stand in one message."""
-    counts = Counter({name: sum(len(p.values) for p in named if name in (p.names or ())) for name in wanted})
-    if named and all(counts.values()):
-        said = ", ".join(f"{name} in {counts[name]}" for name in wanted)
+def _woven(found: MessageParts, named: Sequence[Columns], names: tuple[str, ...], acts_on: bool) -> Columns:
+    """Joints that different messages name, at the stamps of the joint with most messages; NaN where one is silent."""
+    series = {name: _series(named, name) for name in names}
+    if any(series[name] is None for name in names):
+        counts = {name: sum(len(part.values) for part in named if name in (part.names or ())) for name in names}
+        said = ", ".join(f"{name} in {count}" for name, count in counts.items())
         raise RecordingError(
-            f"topic {found.topic}, field {found.field!r}: no message names all of {', '.join(wanted)}: {said}; "
-            "expected them in one message: let one node publish them together, or calibrate the joints of one node at "
-            "a time (`jointscope init URDF BAG --joints ...`)"
+            f"topic {found.topic}, field {found.field!r}: no message names all of {', '.join(names)}: {said}; "
+            "expected them in one message, or stamps in each: let one node publish them together, or calibrate the "
+            "joints of one node at a time (`jointscope init URDF BAG --joints ...`)"
         )
+    known = {name: one for name, one in series.items() if one is not None}
+    stamps, _, rows = max(known.values(), key=lambda one: len(one[0]))
+    values = np.column_stack([_at(stamps, *known[name][:2], acts_on) for name in names])
+    others = [part for part in found.parts if not set(part.names or ()) & set(names)]
+    return Columns(stamps, values, names, rows, tuple([*_kinds(others, set(names)), *_broken(found.broken)]))
+
+
+def _series(named: Sequence[Columns], name: str) -> tuple[NDArray[np.int64], Array, NDArray[np.intp]] | None:
+    """Stamps in order, values and places of one joint's messages; None where they carry no stamps."""
+    parts = [part for part in named if name in (part.names or ())]
+    if not all(part.stamps is not None and part.rows is not None for part in parts):
+        return None
+    stamps = np.concatenate([part.stamps for part in parts if part.stamps is not None])
+    values = np.concatenate([part.values[:, (part.names or ()).index(name)] for part in parts])
+    rows = np.concatenate([part.rows for part in parts if part.rows is not None])
+    stamps, first = np.unique(stamps, return_index=True)
+    return stamps, values[first], rows[first]
+
+
+def _at(wanted: NDArray[np.int64], stamps: NDArray[np.int64], values: Array, acts_on: bool) -> Array:
+    """One joint's values at the stamps of another: the last one, or a curve through those nearby."""
+    good = np.abs(values) < LARGEST
+    stamps, values = stamps[good], values[good]
+    if len(stamps) < FEWEST:
+        return np.full(len(wanted), np.nan)
+    if np.array_equal(wanted, stamps):
+        return values
+    from scipy.interpolate import CubicSpline  # slow to load, and rarely asked for
+
+    since, at = (stamps - stamps[0]) / 1e9, (wanted - stamps[0]) / 1e9
+    before = np.clip(np.searchsorted(since, at, side="right") - 1, 0, len(since) - 1)
+    if acts_on:
+        return np.where(at >= since[0], values[before], np.nan)
+    after = np.minimum(before + 1, len(since) - 1)
+    silent = (since[after] - since[before] > GAP * np.median(np.diff(since))) & (at > since[before])
+    outside = (at < since[0]) | (at > since[-1])
+    return np.where(silent | outside, np.nan, CubicSpline(since, values)(at))
 
 
 def _unnamed(parts: Sequence[Columns], width: int | None) -> Columns:

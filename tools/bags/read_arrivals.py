@@ -179,7 +179,13 @@ class ArrivalReader:
         """The messages of a block that fit, what does not is counted; None where a later block has none that do."""
         wanted, width = wanted_of(need)
         columns = read_columns(
-            topic, types[need.name], need.source.field, first=counts[topic.name], wanted=wanted, width=width
+            topic,
+            types[need.name],
+            need.source.field,
+            first=counts[topic.name],
+            wanted=wanted,
+            width=width,
+            acts_on=need.name == "command",
         )
         later = need.name in self._last
         if later and wanted and columns.names and not set(wanted) <= set(columns.names):

@@ -71,7 +71,8 @@ def read_recording(
     parts = {n.name: message_parts(raw[n.source.topic], types[n.name], n.source.field, decode_all) for n in needed}
     posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
     notices += found
-    columns = {need.name: fitting_messages(parts[need.name], *wanted_of(need)) for need in needed}
+    acting = "command" if robot.command_held else ""
+    columns = {n.name: fitting_messages(parts[n.name], *wanted_of(n), acts_on=n.name == acting) for n in needed}
     samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
     notices += said_once(found)
     samples, seams, found = on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])

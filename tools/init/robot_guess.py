@@ -245,10 +245,9 @@ def _sensor_name(topic: str, taken: Sequence[str]) -> str:
 
 
 def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
-    used = {roles.motor_encoder.signal.topic, *(s.topic for s in roles.imus)}
-    used |= {roles.command.signal.topic, *parts_of(roles.command.signal.topic)}
-    if roles.link_encoder is not None:
-        used.add(roles.link_encoder.signal.topic)
+    chosen = [roles.command, roles.motor_encoder, *([roles.link_encoder] if roles.link_encoder else [])]
+    whole = [*(role.signal.topic for role in chosen), *(s.topic for s in roles.imus)]
+    used = {*whole, *(part for topic in whole for part in parts_of(topic))}
     said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]
     if roles.joint_torque is not None and masses:
         said.append(f"{roles.joint_torque.signal.topic}, effort: measured joint torques need link_dynamics: free")

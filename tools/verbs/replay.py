@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.terminal.replay_text import replay_text
 
-    robot, said = _in_posture(load_robot(args.robot), args.bag)
+    robot, said = _as_recorded(load_robot(args.robot), args.bag)
     with progress_bar() as progress, ExitStack() as stack:
         result, left_out = _replayed(args, robot, progress, stack)
         write_replay(result, files)
@@ -97,12 +97,20 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _in_posture(robot: Robot, bag: Path) -> tuple[Robot, list[str]]:
-    """The robot with its other joints where the bag has them, and what is said about them."""
-    from jointscope.tools.bags.read_recording import read_posture
+def _as_recorded(robot: Robot, bag: Path) -> tuple[Robot, list[str]]:
+    """The robot with its other joints where the bag has them, its drive signal as it was sent, and what is said."""
+    from jointscope.graphs.starts.drive_signal import told_drive_signal
+    from jointscope.tools.bags.read_recording import read_posture, read_recording
 
     posture, notices = read_posture(bag, robot)
-    return robot.in_posture(posture), [notice.text for notice in notices]
+    robot = robot.in_posture(posture)
+    if robot.command.held is None and not robot.layout.motors and not robot.free_links:
+        try:
+            robot, found = told_drive_signal(robot, [read_recording(bag, robot)])
+            notices += found
+        except RecordingError:  # a replay leaves out what a recording cannot have
+            pass
+    return robot, [notice.text for notice in notices]
 
 
 def _replayed(

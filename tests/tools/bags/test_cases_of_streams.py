@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.fixed_lag.replay.replay import replay
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.screening import screen
 from jointscope.tools.bags.describe_bag import describe_bag
@@ -118,3 +120,12 @@ def test_a_replay_leaves_out_what_does_not_fit(doggy):
 def test_a_replay_in_small_blocks_passes_blocks_of_foreign_messages(doggy):
     blocks = list(ArrivalReader(CASES / "gripper_on_same_topic.mcap", doggy, block=7))
     assert sum(map(len, blocks)) == 2400
+
+
+def test_a_replay_tells_a_measured_drive_from_a_held_command():
+    true = {"torque_constant": 2.0, "coulomb_torque": 0.5, "motor_viscous.coefficient": 0.4}
+    robot = load_robot(CASES / "measured_effort.yaml").with_values({f"shoulder.{k}": v for k, v in true.items()})
+    robot = replace(robot, noise=replace(robot.noise, link_velocity=np.array([1e-3])))  # next to none, as is true
+    assert replay(robot, ArrivalReader(CASES / "measured_effort.mcap", robot)).nis_mean < 1.2
+    held = replace(robot, command=replace(robot.command, held=True))
+    assert replay(held, ArrivalReader(CASES / "measured_effort.mcap", held)).nis_mean > 10.0

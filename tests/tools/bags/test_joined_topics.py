@@ -1,12 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics with one number each become one with a number for each."""
+"""Topics and messages of single joints become those of all joints."""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+import pytest
+from changed_bag import changed_bag
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags.fitting_messages import fitting_messages
+from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.joined_topics import Joiner, joined_message_type
+from jointscope.tools.bags.messages.message_parts import MessageParts
 from jointscope.tools.bags.messages.message_type import MessageType
+from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.command_line import main
+
+CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
+NOTHING = {"velocity": np.zeros(0), "effort": np.zeros(0)}
 
 KIND = joined_message_type()
 SINGLE = MessageType("std_msgs/msg/Float64", KIND.typestore, True)
@@ -44,3 +60,59 @@ def test_an_array_of_one_is_a_number_and_another_one_is_none():
     ((_, raw),) = joiner.take("/b", 1, KIND.encode(array(layout, np.array([1.0, 2.0]))))
     values = KIND.decode(raw).data
     assert values[0] == 1.5 and np.isnan(values[1])
+
+
+def columns(name, times, values, first):
+    stamps = np.round(1e9 * np.asarray(times)).astype(np.int64)
+    return Columns(stamps, np.asarray(values)[:, None], (name,), first + 2 * np.arange(len(stamps)))
+
+
+def test_joints_with_messages_of_their_own_are_read_at_the_stamps_of_one():
+    a, b = np.arange(0.0, 2.0, 0.01), np.arange(0.0042, 1.99, 0.0101)
+    b = b[(b < 0.7) | (b > 0.8)]
+    parts = MessageParts("/t", "position", (columns("a", a, np.sin(3 * a), 0), columns("b", b, np.cos(4 * b), 1)), 0)
+    found = fitting_messages(parts, ("b", "a"))
+    assert found.names == ("b", "a") and found.stamps.tolist() == parts.parts[0].stamps.tolist()
+    assert found.values[:, 1].tolist() == np.sin(3 * a).tolist()
+    silent = (a < b[0]) | (a > b[-1]) | ((a > b[b < 0.7][-1]) & (a < b[b > 0.7][0]))
+    np.testing.assert_array_equal(np.isnan(found.values[:, 0]), silent)
+    np.testing.assert_allclose(found.values[~silent, 0], np.cos(4 * a[~silent]), atol=2e-6)
+    held = fitting_messages(parts, ("b", "a"), acts_on=True).values[:, 0]
+    k = 150
+    assert held[k] == np.cos(4 * b[b <= a[k]][-1])  # a command acts until the next one
+
+
+def test_joints_of_messages_without_stamps_are_refused_with_the_way_out():
+    parts = [columns("a", np.arange(9.0), np.arange(9.0), 0), columns("b", np.arange(8.0), np.arange(8.0), 1)]
+    parts = [replace(part, stamps=None) for part in parts]
+    with pytest.raises(
+        RecordingError, match=r"no message names all of a, b: a in 9, b in 8; .* or stamps in each: let"
+    ):
+        fitting_messages(MessageParts("/t", "position", tuple(parts), 0), ("a", "b"))
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")
+@pytest.mark.parametrize("topic", ["/{}/joint_states", "/joint_states"])
+def test_an_arm_whose_joints_have_topics_or_messages_of_their_own_is_the_same_arm(tmp_path, topic):
+    def by_joint(name, message, k):
+        if name != "/joint_states":
+            yield name, message
+            return
+        for j, joint in enumerate(message.name):
+            yield topic.format(joint), replace(message, name=[joint], position=message.position[j : j + 1], **NOTHING)
+
+    bag = changed_bag(CASES / "arm_viscous.mcap", tmp_path / "split", by_joint)
+    apart = tmp_path / "apart.yaml"
+    whole = tmp_path / "whole.yaml"
+    urdf = str(CASES / "arm_viscous.urdf")
+    assert main(["init", urdf, str(CASES / "arm_viscous.mcap"), "-o", str(whole)]) == 0
+    if topic != "/joint_states":
+        assert main(["init", urdf, str(bag), "-o", str(apart)]) == 0
+        assert "/shoulder/joint_states + /elbow/joint_states + /wrist/joint_states" in apart.read_text()
+    else:
+        apart.write_text(whole.read_text())
+    expected = read_recording(CASES / "arm_viscous.mcap", load_robot(whole)).streams["motor_encoder"]
+    found = read_recording(bag, load_robot(apart)).streams["motor_encoder"]
+    assert found.values.tobytes() == expected.values.tobytes() and found.times.tobytes() == expected.times.tobytes()
+    (block,) = list(ArrivalReader(bag, load_robot(apart)))
+    assert len(block) == 2 * len(expected)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics with one number each, as controllers of single joints have them, put together into one.
+"""Topics of single joints put together into one.
 
-"/a/command + /b/command" names them; its messages are arrays with one value for each. A value holds until the next one
-of its topic. A message is made when all have come anew, or when one comes for the second time before the others.
+"/a/command + /b/command" names them. JointStates, which name their joints, are woven in the order of the bag. Of topics
+with one number each, as controllers of single joints have them, arrays with one value for each are made: a value holds
+until the next one of its topic. A message is made when all have come anew, or when one comes for the second time before
+the others.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from jointscope.tools.bags.messages.message_type import MessageType
 
 PLUS = " + "
 JOINED_TYPE = "std_msgs/msg/Float64MultiArray"
+WOVEN_TYPE = "sensor_msgs/msg/JointState"
 SINGLE_TYPES = ("std_msgs/msg/Float64", "std_msgs/msg/Float32", JOINED_TYPE)
 
 

@@ -98,9 +98,9 @@ class Bag:
         Raises:
             RecordingError: the definition in the bag cannot be understood.
         """
-        if len(parts_of(topic)) > 1:
+        if self.type_names(topic) == (JOINED_TYPE,) and len(parts_of(topic)) > 1:
             return joined_message_type()
-        connection = self._infos[topic].connections[0]
+        connection = self._infos[parts_of(topic)[0]].connections[0]
         try:
             found = defined_message_type(connection.msgtype, connection.msgdef, self.ros2)
             _look_up(found, found.name, set())
@@ -125,7 +125,9 @@ class Bag:
         Raises:
             RecordingError: the bag is damaged or holds fewer messages than it promises.
         """
-        joiners = [Joiner(t, [self.message_type(p) for p in parts_of(t)]) for t in topics if len(parts_of(t)) > 1]
+        several = [topic for topic in topics if len(parts_of(topic)) > 1]
+        woven = [topic for topic in several if self.type_names(topic) != (JOINED_TYPE,)]  # their messages name joints
+        joiners = [Joiner(t, [self.message_type(p) for p in parts_of(t)]) for t in several if t not in woven]
         found = dict.fromkeys((part for topic in topics for part in parts_of(topic)), 0)
         connections = [connection for topic in found for connection in self._infos[topic].connections]
         expected, k = sum(self.count(topic) for topic in found), 0
@@ -140,6 +142,7 @@ class Bag:
                     progress(k, expected)
                 if connection.topic in topics:
                     yield connection.topic, time, data
+                yield from ((topic, time, data) for topic in woven if connection.topic in parts_of(topic))
                 for joiner in joiners:
                     if connection.topic in parts_of(joiner.name):
                         yield from ((joiner.name, *made) for made in joiner.take(connection.topic, time, data))

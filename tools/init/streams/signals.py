@@ -17,7 +17,7 @@ from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.fitting_messages import read_columns
-from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, joined_message_type
+from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, WOVEN_TYPE
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.tidying.long_holes import LongHoles
@@ -104,7 +104,7 @@ def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[
     with open_bag(path) as bag:
         types = {topic: kind for topic in bag.topics if (kind := _useful_type(bag, topic)) is not None}
         joined = joint_by_joint(bag, joints)
-        types |= dict.fromkeys(joined, joined_message_type())
+        types |= {topic: bag.message_type(topic) for topic in joined}
         raw = bag.read(list(types), progress)
     filled = {topic: kind for topic, kind in types.items() if raw[topic].data}
     start = min((min(part.received) for part in raw.values() if part.received), default=0)
@@ -134,11 +134,11 @@ def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[
 
 
 def joint_by_joint(bag: Bag, joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Topics that are to be joined, as one number each commands one joint, and the joints in their order."""
+    """Topics that are to be joined, as each is about one joint, and the joints in their order."""
     groups: dict[tuple[str, ...], dict[str, str]] = {}
     for topic in bag.topics:
         kinds = bag.type_names(topic)
-        if not COMMANDED.search(topic.lower()) or not set(kinds) <= set(SINGLE_TYPES):
+        if kinds != (WOVEN_TYPE,) and not (COMMANDED.search(topic.lower()) and set(kinds) <= set(SINGLE_TYPES)):
             continue
         named = [joint for joint in joints if re.search(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", topic)]
         if named:
@@ -183,7 +183,7 @@ class _Field:
 def _field(raw: RawTopic, kind: MessageType, known: KnownField) -> _Field | None:
     """One field; None where it is empty in some messages or changes its length."""
     try:
-        columns = read_columns(raw, kind, known.path)
+        columns = read_columns(raw, kind, known.path, acts_on=bool(COMMANDED.search(raw.name.lower())))
     except RecordingError:
         return None
     width = columns.values.shape[1]
