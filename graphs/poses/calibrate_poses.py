@@ -19,19 +19,20 @@ from jointscope.graphs.poses.determined import Determined, determined
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
-from jointscope.graphs.poses.tracker_start import base_from_tracker
+from jointscope.graphs.poses.tracker_start import base_from_tracker, tracker_and_target
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
-from jointscope.robots.geometry.error_parameters import error_names
+from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_names
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 
 Array = NDArray[np.float64]
 PASSES = 12  # of repeatability and outliers
 AGREES = 0.02  # relative change of the repeatability that asks for no further pass
+TOOL_KNOWN = 5e-3  # [m] the place of a target that is known less well is looked for with that of the tracker
 OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
 MOST_OUT = 0.2  # share of the poses that may be left out
 MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is missing pulls along go a long way
@@ -151,9 +152,14 @@ def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet
             _ = problem.arm  # says what is missing
         return robot, problems
     placed = []
+    if setup.tool_sigma > TOOL_KNOWN and problems[0].poses.target is not None:
+        shift = tracker_and_target(problems[0], problems[0].poses.target)[1]
+        values = {f"{TOOL}.{part}": float(v) for part, v in zip(LENGTHS, shift, strict=True)}
+        robot = robot.with_values(values if all(abs(robot.parameters[n].value) < TOOL_KNOWN for n in values) else {})
+        problems = [problem.of_robot(robot) for problem in problems]
     for problem in problems:
-        values = problem.values(Calibration.of(robot))
-        targets = problem.arm.at(problem.q, np.zeros_like(problem.q), values).target
+        known = problem.values(Calibration.of(robot))
+        targets = problem.arm.at(problem.q, np.zeros_like(problem.q), known).target
         assert problem.poses.target is not None
         placed.append(replace(problem, tracker=base_from_tracker(targets, problem.poses.target)[0]))
     robot = replace(robot, poses=replace(setup, tracker=placed[0].tracker))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An arm that sags: where its target is for given angles of the motors, and how that depends on every value.
 
-Gravity is taken where the arm has sagged; a second look changes the target by nanometres (Neubauer et al. 2015, eq. 12
+Gravity is taken where the arm has sagged, in as many looks as that takes (Neubauer et al. 2015, eq. 12
 to 14). Derivatives are those of the equilibrium: what moves the arm moves its weight, too.
 """
 
@@ -23,7 +23,8 @@ from jointscope.robots.geometry.pose_effects import DRIFT
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
-LOOKS = 2  # at gravity, the first one at the arm that does not sag
+LOOKS = 8  # at gravity, the first one at the arm that does not sag
+SETTLED = 1e-8  # [rad] that nothing may give way from look to look
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,14 @@ class SaggingArm:
         chain, parts = self.chain, WhatGivesWay(self.chain.joints, values)
         read = q + e + parts.waves(q)
         rigid = point = chain.at(read, values)
+        last = np.zeros((*q.shape, 3))
         for _ in range(LOOKS if parts.some else 0):
             turn, tilt = parts.deflections(point)
             point = chain.at(read + turn, values, tilt)
+            now = np.concatenate([turn[:, :, None], tilt], axis=2)
+            if np.max(np.abs(now - last), initial=0.0) < SETTLED:
+                break
+            last = now
         columns, by_yield = _following(chain, point, parts) if parts.some else (point.by_error, _by_yield(point))
         by_value = {**columns, **parts.columns(q, point, by_yield)}
         return SaggingPoint(point.target, by_yield[:, :, : len(chain.joints)], by_value, point.target - rigid.target)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.graphs.poses.tracker_start import base_from_tracker
+from jointscope.graphs.poses.tracker_start import base_from_tracker, tracker_and_target
 from jointscope.robots.errors import RecordingError
 
 Array = NDArray[np.float64]
@@ -96,6 +96,15 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         raise RecordingError(
             f"{poses.path}: the tracker does not stand where {place} says: another place fits to {1e3 * left:.2g} mm "
             f"instead of {1e3 * misses:.3g} mm; leave out `tracker` in the section poses, and its place is found"
+        )
+    _, shift, fits = tracker_and_target(problem, target)
+    if fits < LARGEST_ERROR / 5.0:
+        assert problem.robot.poses is not None
+        x, y, z = (f"{v:.3g}" for v in problem.robot.poses.at + shift)
+        raise RecordingError(
+            f"{poses.path}: the target is not where {place} has it: at [{x}, {y}, {z}] of {problem.robot.poses.link} "
+            f"the arm fits to {1e3 * fits:.2g} mm instead of {1e3 * left:.3g} mm; set `at` of poses to it, or "
+            "`tool_sigma` to how little is known [m], and its place is estimated"
         )
     raise RecordingError(
         f"{poses.path}: the arm misses the measured targets by {1e3 * misses:.3g} mm (rms), {1e3 * left:.3g} mm "

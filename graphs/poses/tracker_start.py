@@ -9,7 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL
+
 Array = NDArray[np.float64]
+ROUNDS = 200  # of place of the tracker and place of the target in turn
 
 
 def base_from_tracker(in_base: Array, in_tracker: Array) -> tuple[Array, float, bool]:
@@ -30,3 +35,21 @@ def base_from_tracker(in_base: Array, in_tracker: Array) -> tuple[Array, float, 
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, a - R @ b
     return T, left(R), hand < 0.0 and left(mirrored) < 0.1 * left(R)
+
+
+def tracker_and_target(problem: PoseSet, in_tracker: Array) -> tuple[Array, Array, float]:
+    """The same with the target anywhere on its link: both in turn.
+
+    Returns:
+        Base from tracker, shape (4, 4), shift of the target in the axes of its link, shape (3,), what is left [m].
+    """
+    values = problem.values(Calibration.of(problem.robot).only([DYNAMICS]))
+    point = problem.arm.at(problem.q, np.zeros_like(problem.q), values)
+    turns = np.stack([point.by_value[f"{TOOL}.{part}"] for part in LENGTHS], axis=2)
+    shift, T, left = np.zeros(3), np.eye(4), np.inf
+    for _ in range(ROUNDS):
+        T, left, _ = base_from_tracker(point.target + turns @ shift, in_tracker)
+        wanted = in_tracker @ T[:3, :3].T + T[:3, 3] - point.target
+        spread, off = turns - turns.mean(axis=0), wanted - wanted.mean(axis=0)
+        shift = np.linalg.lstsq(spread.reshape(-1, 3), off.reshape(-1), rcond=None)[0]
+    return T, shift, left

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import gammaincc
 
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.tip_errors import summary
@@ -14,12 +15,16 @@ from jointscope.tools.presentation.numbers import significant
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
 SURE = 3.0  # [sigma]
+FEWEST = 4  # poses on each side of a step
+CHANCE = 1e-4  # of a step where there is none
+SHOWN = 4
 BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach
 
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    checks = (_enough(result), _repeatability(result), _within(result), _backlash(result), _worth(result))
+    makers = (_enough, _repeatability, _still, _within, _backlash, _worth)
+    checks = tuple(make(result) for make in makers)
     worst = max(LEVELS.index(check.level) for check in checks)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
     return Judgement(level, ANSWERS[level], checks)
@@ -35,7 +40,43 @@ def _enough(result: PoseCalibration) -> Check:
     if level != "good":
         more = int(np.ceil((REDUNDANT[0] * values - measured + contacts) / 3))
         text += f"; {more} more poses would make the values trustworthy, till then priors decide a part of them"
+        weak = sorted(result.told, key=lambda n: -_kept(result, n))[:SHOWN]
+        text += f", most of all {', '.join(weak)}"
     return Check(level, "Enough poses", f"{text}.")
+
+
+def _kept(result: PoseCalibration, name: str) -> float:
+    """Share of a prior's sigma that the poses have left."""
+    p = result.robot.parameters[name]
+    return (p.sigma or 0.0) / p.prior_sigma
+
+
+def _still(result: PoseCalibration) -> Check:
+    """Whether the tracker stood still: no step in what is left, anywhere in a session."""
+    name, found = "A tracker that stands still", None
+    for problem, errors in zip(result.problems, result.errors, strict=True):
+        m = len(errors.vectors)
+        if problem.poses.target is None or m < 2 * FEWEST:
+            continue
+        before = np.cumsum(errors.vectors, axis=0)[FEWEST - 1 : m - FEWEST]
+        k = np.arange(FEWEST, m - FEWEST + 1)[:, None]
+        steps = (errors.vectors.sum(axis=0) - before) / (m - k) - before / k
+        weights = (k * (m - k) / m)[:, 0]
+        falls = weights[:, None] * steps**2
+        best = int(np.argmax(falls.sum(axis=1)))
+        after = np.var(errors.vectors, axis=0) - falls[best] / m
+        score = float(np.sum(falls[best] / np.maximum(after, 1e-300)))
+        if gammaincc(1.5, score / 2.0) * m < CHANCE:
+            jump, names = 1e3 * float(np.linalg.norm(steps[best])), problem.poses.names
+            at = best + FEWEST
+            found = (
+                f"From pose {names[at]} of {problem.poses.path} on all targets are shifted by {significant(jump, 2)} "
+                f"mm: the tracker, the base or the target was moved; give poses up to {names[at - 1]} and the others "
+                "as two tables, without `tracker` in the robot file"
+            )
+    if found:
+        return Check("bad", name, f"{found}.")
+    return Check("good", name, "No step in what is left over the session.")
 
 
 def _geometric(result: PoseCalibration) -> set[str]:

@@ -19,6 +19,7 @@ from jointscope.tools.presentation.pose_judgement import judge_poses
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
+from jointscope.tools.terminal.pose_discovery_text import step_table
 
 Array = NDArray[np.float64]
 BINS = 30
@@ -44,16 +45,10 @@ def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None, ch
 
 def _steps(found: PoseDiscovery) -> Section:
     """The waterfall: what each effect that was added is worth."""
-    rows = []
-    for k, step in enumerate(found.steps):
-        mm = summary(step.result.errors).to_json()
-        cells = [significant(mm["p90_mm"], 3), significant(mm["max_mm"], 3)]
-        other = step.heldout.to_json() if step.heldout is not None else None
-        cells += ["-", "-"] if other is None else [significant(other[key], 3) for key in ("p90_mm", "max_mm")]
-        rows.append([str(k), escape(step.added.hypothesis.label if step.added else "base model"), *cells])
-    head = ["step", "added", "90 % [mm]", "largest [mm]", "held out: 90 % [mm]", "largest [mm]"]
+    head, rows = step_table(found)
+    rows = [[escape(cell) for cell in row] for row in rows]
     lead = f"It ended because {found.stop_reason}."
-    return Section("steps", "What was missing", table(head, rows, range(2, 6)), lead)
+    return Section("steps", "What was missing", table(head, rows, range(2, len(head))), lead)
 
 
 def _verdict(result: PoseCalibration) -> Section:

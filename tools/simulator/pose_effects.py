@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from jointscope.robots.errors import EffectError
+from jointscope.tools.simulator.effects import parameters_in
 
 DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "backlash": {"half_gap": 2.0e-4},  # [rad]
@@ -51,13 +52,8 @@ def pose_effects(texts: Iterable[str], joints: Sequence[str]) -> list[PoseEffect
 
 
 def _sizes(text: str, effect: str, tail: str) -> dict[str, float]:
-    sizes = {}
-    for item in filter(None, tail.split(",")):
-        name, _, number = item.partition("=")
-        if name not in DEFAULTS[effect]:
-            raise EffectError(f"effect {effect} has no parameter {name!r}; it has {', '.join(DEFAULTS[effect])}")
-        try:
-            sizes[name] = float(number)
-        except ValueError:
-            raise EffectError(f"effect {text!r}: expected param=number, got {item!r}") from None
+    sizes = parameters_in(text, tail)
+    unknown = next((name for name in sizes if name not in DEFAULTS[effect]), None)
+    if unknown is not None:
+        raise EffectError(f"effect {effect} has no parameter {unknown!r}; it has {', '.join(DEFAULTS[effect])}")
     return sizes

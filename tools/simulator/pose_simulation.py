@@ -23,7 +23,7 @@ from jointscope.tools.simulator.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.world.inertia import full_inertia
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.random_streams import random_stream
-from jointscope.tools.simulator.world.specification import joint_axis
+from jointscope.tools.simulator.world.specification import joint_axis, quaternion_wxyz
 
 Array = NDArray[np.float64]
 LENGTH, ANGLE = 2.5e-4, 5e-4  # [m], [rad] 1 sigma of the errors that are drawn
@@ -192,11 +192,10 @@ class _Arm:
             turn = pin.exp3(self._value(name, "mis_y") * y) @ pin.exp3(self._value(name, "mis_x") * x)
             turn = place.rotation @ turn @ pin.exp3(self._value(name, "offset") * axis)
             shift = [self._value(name, part) for part in ("lx", "ly", "lz")]
-            qx, qy, qz, qw = pin.Quaternion(turn).coeffs()
             parent = parent.add_body(
                 name=f"{name}.link",
                 pos=place.translation + shift,
-                quat=[qw, qx, qy, qz],
+                quat=quaternion_wxyz(turn),
                 explicitinertial=True,
                 mass=max(inertia.mass + self._of.get(("link_mass", name), {}).get("mass", 0.0), 1e-9),
                 ipos=inertia.lever,

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jointscope.graphs.poses.discover_poses import PoseCandidate, PoseDiscovery, PoseStep
-from jointscope.graphs.poses.tip_errors import summary
+from jointscope.graphs.poses.discover_poses import PoseCandidate, PoseDiscovery
+from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 8
+TOLD = ("p90_mm", "max_mm")
 
 
 def pose_ranking_text(candidates: Sequence[PoseCandidate], count: int) -> str:
@@ -29,9 +30,7 @@ def pose_ranking_text(candidates: Sequence[PoseCandidate], count: int) -> str:
 
 def pose_discovery_text(found: PoseDiscovery) -> str:
     """The steps, and what was looked at last."""
-    held = bool(found.holdout)
-    head = ["step", "added", "90 % [mm]", "largest [mm]", *(["held out: 90 % [mm]", "largest [mm]"] if held else [])]
-    rows = [_row(k, step, held) for k, step in enumerate(found.steps)]
+    head, rows = step_table(found)
     last = found.steps[-1]
     alike = [
         f"{step.added.hypothesis.label} cannot be told from {', '.join(step.added.look_alikes)} by these poses"
@@ -47,10 +46,13 @@ def pose_discovery_text(found: PoseDiscovery) -> str:
     return "\n\n".join(parts)
 
 
-def _row(number: int, step: PoseStep, held: bool) -> list[str]:
-    mm = summary(step.result.errors).to_json()
-    cells = [significant(mm["p90_mm"], 3), significant(mm["max_mm"], 3)]
-    if held and step.heldout is not None:
-        other = step.heldout.to_json()
-        cells += [significant(other["p90_mm"], 3), significant(other["max_mm"], 3)]
-    return [str(number), step.added.hypothesis.label if step.added else "base model", *cells]
+def step_table(found: PoseDiscovery) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns, and a row per step; those of poses that were held out only where there are any."""
+    head, rows = ["step", "added", "90 % [mm]", "largest [mm]"], []
+    if found.holdout:
+        head += ["held out: 90 % [mm]", "largest [mm]"]
+    for k, step in enumerate(found.steps):
+        seen: list[TipErrors | None] = [summary(step.result.errors), step.heldout]
+        cells = [significant(each.to_json()[key], 3) for each in seen if each is not None for key in TOLD]
+        rows.append([str(k), step.added.hypothesis.label if step.added else "base model", *cells])
+    return head, rows

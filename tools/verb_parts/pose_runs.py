@@ -15,7 +15,7 @@ from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 
@@ -243,13 +243,5 @@ def pose_json(result: Any) -> dict[str, Any]:
 
 
 def _origin(result: Any, start: Robot) -> dict[str, Any]:
-    from datetime import UTC, datetime
-
-    import jointscope
-
-    return {
-        "version": jointscope.__version__,
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "start": start.path.name,
-        "poses": [{"path": p.poses.path, "sha256": p.poses.sha256, "count": len(p.poses)} for p in result.problems],
-    }
+    poses = [{"path": p.poses.path, "sha256": p.poses.sha256, "count": len(p.poses)} for p in result.problems]
+    return made_from(start.path.name) | {"poses": poses}

@@ -202,13 +202,19 @@ def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Reco
 
 def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
     """Version, date, name of the start model's file, and bags with hashes."""
-    return {
-        "version": jointscope.__version__,
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "start": start,
+    return made_from(start) | {
         "bags": [
             {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
             | ({"left_out": [list(stretch) for stretch in recording.left_out]} if recording.left_out else {})
             for recording in recordings
         ],
+    }
+
+
+def made_from(start: str) -> dict[str, Any]:
+    """Version, date, name of the start model's file."""
+    return {
+        "version": jointscope.__version__,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "start": start,
     }

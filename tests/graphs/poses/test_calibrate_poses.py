@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,10 @@ from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors, without_sag
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.pose_section import with_poses
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.tools.presentation.pose_judgement import judge_poses
 
 pytestmark = pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")
 
@@ -172,6 +175,35 @@ def changed(poses, **what):
 def test_plain_mistakes_are_told_before_any_physics(tx90l, change, told):
     with pytest.raises(RecordingError, match=told):
         calibrate_poses(tx90l, [changed(table("poses_calibration"), **change)])
+
+
+def test_a_target_that_sits_elsewhere_on_the_tool_is_told_with_its_place(tx90l):
+    tool = tx90l.poses.at
+    wrong = replace(
+        tx90l, poses=replace(tx90l.poses, at=tool + np.array([0.0, 0.08, -0.12]), tracker_link=None, tracker=None)
+    )
+    with pytest.raises(RecordingError, match=r"at \[.*\] of reflector the arm fits to .* or `tool_sigma`") as told:
+        calibrate_poses(wrong, [table("poses_calibration")])
+    place = [float(v) for v in str(told.value).split("[")[1].split("]")[0].split(",")]
+    np.testing.assert_allclose(place, tool, atol=6e-3)
+    known = replace(wrong, poses=replace(wrong.poses, tool_sigma=0.15))
+    found = calibrate_poses(with_poses(replace(known, parameters={}), known.poses), [table("poses_calibration")])
+    assert found.robot.parameters["tool.lz"].value == pytest.approx(0.12, abs=5e-3)
+
+
+def test_a_tracker_that_was_moved_is_told_with_the_pose(tx90l, result):
+    assert all(check.level == "good" for check in judge_poses(result).checks if check.name.startswith("A tracker"))
+    poses = table("poses_calibration")
+    later = np.arange(len(poses))[:, None] >= 25
+    found = calibrate_poses(tx90l, [replace(poses, target=poses.target + later * np.array([0.0, 1e-3, 0.0]))])
+    (check,) = (check for check in judge_poses(found).checks if check.name.startswith("A tracker"))
+    assert check.level == "bad" and "From pose 25 of poses_calibration on" in check.text, check.text
+
+
+def test_few_poses_are_judged_with_how_many_more_and_which_values_wait_for_them(tx90l):
+    judged = judge_poses(calibrate_poses(tx90l, [table("poses_calibration").only(np.arange(40) < 9)]))
+    (check,) = (check for check in judged.checks if check.name == "Enough poses")
+    assert judged.level == "bad" and re.search(r"27 measured .* \d+ more poses .* most of all \w+\.\w+", check.text)
 
 
 def test_too_few_poses_are_told_with_how_many_more(tx90l):

@@ -130,6 +130,21 @@ def test_a_table_that_cannot_be_read_says_where(tx90l, tmp_path, text, told):
         read_poses(path, tx90l)
 
 
+@pytest.mark.parametrize(
+    ("angles", "told"),
+    [
+        ("0.1, 0.25, 0.5, 0.125, -0.3, 0.7", "multiples of 0.001 rad, as commanded ones are"),
+        (", ".join(str(np.deg2rad(a)) for a in (10, 20.5, -30, 5, 7, 8)), "multiples of 0.1 deg"),
+        ("0.1000034, 0.2538172, 0.5, 0.125, -0.3, 0.7", None),
+    ],
+)
+def test_angles_that_were_commanded_are_told(tx90l, tmp_path, angles, told):
+    path = tmp_path / "poses.csv"
+    path.write_text("pose,q1,q2,q3,q4,q5,q6,x,y,z\n" + "".join(f"{i},{angles},2,2,2\n" for i in range(5)))
+    texts = [notice.text for notice in read_poses(path, tx90l).notices]
+    assert (len(texts) == 1 and told in texts[0]) if told else not texts
+
+
 @pytest.mark.skipif(not PANDA.is_dir(), reason="shared/data/real/panda_sockets is not beside the project")
 def test_contacts_and_places_of_a_table(tx90l):
     path = PANDA / "panda_1.csv"

@@ -50,7 +50,7 @@ def make_effect(text: str, robot: Robot) -> SimulatedEffect:
     if not at or not owner:
         example = f"{effect_id}@{next(iter(owners_of(known[effect_id].acts_on[0], robot)), 'JOINT')}"
         raise EffectError(f"effect {text!r}: expected ID@OWNER[:param=value,...], for example {example}")
-    return known[effect_id](owner, _parameters(text, tail), robot)
+    return known[effect_id](owner, parameters_in(text, tail), robot)
 
 
 def make_effects(texts: Iterable[str], robot: Robot) -> list[SimulatedEffect]:
@@ -68,7 +68,12 @@ def make_effects(texts: Iterable[str], robot: Robot) -> list[SimulatedEffect]:
     return effects
 
 
-def _parameters(text: str, tail: str) -> dict[str, float]:
+def parameters_in(text: str, tail: str) -> dict[str, float]:
+    """Sizes from param=value,... behind the colon of an effect's text.
+
+    Raises:
+        EffectError: a value that is no number.
+    """
     parameters: dict[str, float] = {}
     for item in filter(None, tail.split(",")):
         name, _, number = item.partition("=")
