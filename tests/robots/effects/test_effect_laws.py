@@ -84,6 +84,15 @@ def test_friction_takes_energy(effect):
     assert np.all(effect.law(s, example(effect)) * speed <= 0.0)
 
 
+def test_friction_by_direction_has_four_numbers():
+    v = np.array([-2.0, -0.5, 0.5, 2.0])
+    s = JointSignals(q_link=v, v_link=v, q_motor=v, v_motor=v, tau_spring=v, stiffness=150.0, sharpness=1e3)
+    found = catalogue()["friction_by_direction"].law(s, {"torque": 0.4, "coefficient": 0.3})
+    base = -(1.0 * np.sign(v) + 0.5 * v)
+    forwards, backwards = -(1.4 * np.sign(v) + 0.8 * v), -(0.6 * np.sign(v) + 0.2 * v)
+    np.testing.assert_allclose(base + found, np.where(v > 0.0, forwards, backwards))
+
+
 def test_backlash_leaves_the_gap_free_and_spring_and_damper_beyond_it():
     q, rate = np.array([-0.05, -0.004, 0.004, 0.05]), np.array([0.3, -0.4, 0.5, -0.6])
     base = 150.0 * q + 2.0 * rate

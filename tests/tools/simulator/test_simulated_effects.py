@@ -25,6 +25,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "motor_stribeck": ("joint", "torque velocity"),
     "load_dependent_friction": ("joint", "coefficient"),
     "asymmetric_friction": ("joint", "torque"),
+    "friction_by_direction": ("joint", "torque coefficient"),
     "cogging": ("joint", "cos sin order"),
     "torque_offset": ("joint", "torque"),
     "motor_lag": ("joint, robot", "time_constant"),
