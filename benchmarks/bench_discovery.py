@@ -27,6 +27,7 @@ from discovery_row import Row
 from hidden_effects import Case, cases, tenth
 from kept_rows import keep, known_rows
 from patience import say
+from setting_arms import SettingCase
 
 import jointscope.graphs
 
@@ -57,7 +58,7 @@ def main() -> None:
     )
 
 
-def measure(missing: list[Case], jobs: int) -> Iterator[Row]:
+def measure(missing: list[Case | SettingCase], jobs: int) -> Iterator[Row]:
     """Rows as they come; each process has one core, where the linear algebra of several would fight for all."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     began = time.perf_counter()
@@ -83,7 +84,7 @@ def code() -> str:
     """Changes with the package and with the table, so that no stale row is used."""
     package = Path(jointscope.graphs.__file__).parents[1]
     files = [p for room in ("robots", "factors", "graphs", "tools/simulator") for p in (package / room).rglob("*.py")]
-    files.append(Path(__file__).with_name("hidden_effects.py"))
+    files += [Path(__file__).with_name(name) for name in ("hidden_effects.py", "setting_arms.py")]
     content = b"".join(path.read_bytes() for path in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]
 

@@ -12,6 +12,7 @@ from tables import Section, Table
 
 FIRST = 0.95  # of the recordings whose effect matters
 PAIRS_FOUND = 0.8
+NAMED = 10.0 / 12.0
 HALF = 0.5  # of the squared error above the floor
 LARGEST_Z = 3.0
 DIAGNOSE, SCORE = 60.0, 10.0  # [s] on 20 s of recording
@@ -25,6 +26,7 @@ TITLES = {
     "outside": "An effect outside the catalogue is hidden",
     "hard": "Short (6 s), disturbed (0.3 N m for 20 ms) and jittery (0.2 ms, 2 % lost) recordings",
     "mistake": "A setting is wrong",
+    "setting": "A setting of an arm of a maker is wrong, or none: rigid, fine encoders, torques with a memory, ripple",
 }
 HEAD = (
     "hidden",
@@ -104,6 +106,11 @@ def _promise_honesty(found: Section, rows: Sequence[Row]) -> None:
     _count(found, "outside the catalogue: what is accepted explains less than half of the excess", 1.0, explained)
     mistakes = [row for row in rows if row.kind == "mistake"]
     _count(found, "wrong setting: named as what it is", 1.0, [row.named for row in mistakes])
+    arms = [row for row in rows if row.kind == "setting"]
+    named = [row.first in row.truth for row in arms if row.truth]
+    _count(found, "arms with a wrong setting: named first", NAMED, named)
+    nothing = [not row.physics and not row.error for row in arms if not row.truth]
+    _count(found, "arms with nothing wrong: nothing accepted", 1.0, nothing)
     _count(found, "wrong setting: never called friction or Coriolis", 1.0, [not row.blamed for row in mistakes])
     elsewhere = [not row.adequate or row.named for row in mistakes]
     _count(found, "wrong setting: not called adequate unless it was named", 1.0, elsewhere)
@@ -122,7 +129,7 @@ def _promise_times(found: Section, rows: Sequence[Row]) -> None:
 
     The median counts: other work on the machine lengthens single ones. Time a quiet machine with `--jobs 1`.
     """
-    stages = [row.stages for row in rows if row.stages and "short" not in row.name]
+    stages = [row.stages for row in rows if row.stages and row.kind != "setting" and "short" not in row.name]
     if not stages:
         return
     whole = [sum(s for name, s in stage.items() if CALIBRATION_STAGE not in name) for stage in stages]

@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from discovery_row import Row
 from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, Case
+from setting_arms import TEST as ARM_TEST
+from setting_arms import TRAIN as ARM_TRAIN
+from setting_arms import SettingCase, arm_model, record_arm, true_sizes
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
@@ -45,12 +48,15 @@ class Recordings:
     parameters: dict[str, Any]
 
 
-def run_case(case: Case) -> Row:
+def run_case(case: Case | SettingCase) -> Row:
     """One row of the table; an error of the project becomes part of the row."""
-    recordings = _simulate(case)
+    if isinstance(case, SettingCase):
+        model, recordings = _arm(case)
+    else:
+        model, recordings = _model(case), _simulate(case)
     began = time.perf_counter()
     try:
-        found = discover(_model(case), [recordings.train], holdout=recordings.test, missing_torque=False)
+        found = discover(model, [recordings.train], holdout=recordings.test, missing_torque=False)
     except JointscopeError as err:
         seconds = time.perf_counter() - began
         return Row(case.name, case.kind, case.truth, seconds=seconds, error=str(err).splitlines()[0])
@@ -68,6 +74,14 @@ def _simulate(case: Case) -> Recordings:
         for motion, duration in (("calibration", seconds), ("moves", TEST))
     ]
     return Recordings(made[0].recording, made[1].recording, made[0].truth["parameters"])
+
+
+def _arm(case: SettingCase) -> tuple[Robot, Recordings]:
+    """The arm as its file has it, and what it did with its fault."""
+    with tempfile.TemporaryDirectory() as folder:
+        robot, true, drive = arm_model(case, Path(folder))
+    made = [record_arm(case, robot, true, drive, seconds, i) for i, seconds in enumerate((ARM_TRAIN, ARM_TEST))]
+    return robot, Recordings(*made, true_sizes(case, robot))
 
 
 def _model(case: Case) -> Robot:
@@ -88,7 +102,7 @@ def _model(case: Case) -> Robot:
         return load_robot(str(path))
 
 
-def _row(case: Case, recordings: Recordings, found: Discovery, seconds: float) -> Row:
+def _row(case: Case | SettingCase, recordings: Recordings, found: Discovery, seconds: float) -> Row:
     diagnosis = found.steps[0].diagnosis
     labels = [candidate.label for candidate in diagnosis.candidates] if diagnosis else []
     accepted = _accepted(found)
@@ -146,9 +160,11 @@ def _alike(diagnosis: Diagnosis, truth: tuple[str, ...]) -> bool:
     return any(c.label in first.look_alikes or first.label in c.look_alikes for c in true_ones)
 
 
-def _true_error(case: Case, recordings: Recordings, found: Discovery, accepted: tuple[str, ...]) -> float | None:
+def _true_error(
+    case: Case | SettingCase, recordings: Recordings, found: Discovery, accepted: tuple[str, ...]
+) -> float | None:
     """Held-out error of the true structure, calibrated with the same recording; None where there is no such model."""
-    if case.kind in ("outside", "mistake"):
+    if isinstance(case, SettingCase) or case.kind in ("outside", "mistake"):
         return None
     if set(accepted) == set(case.truth):
         return _or_none(found.steps[-1].heldout_error)
@@ -161,7 +177,7 @@ def _true_error(case: Case, recordings: Recordings, found: Discovery, accepted: 
         return None
 
 
-def _deviations(case: Case, recordings: Recordings, robot: Robot) -> dict[str, float]:
+def _deviations(case: Case | SettingCase, recordings: Recordings, robot: Robot) -> dict[str, float]:
     """(estimate - truth) / sigma of the parameters of true effects in the last model."""
     found = {}
     for label in case.truth:

@@ -2,9 +2,9 @@
 """Everything that is hidden in a simulated recording: what, where, how large, and under which circumstances.
 
 Every effect of the catalogue in two sizes and, where it has a choice, at two owners; recordings without any; pairs;
-effects outside the catalogue; short, disturbed and jittery recordings; plain mistakes. Seeds are fixed by the place in
-the table, so each recording is another robot on another occasion. Only append to a list: what is inserted moves the
-seeds of all that follow.
+effects outside the catalogue; short, disturbed and jittery recordings; plain mistakes; settings of arms of makers.
+Seeds are fixed by the place in the table, so each recording is another robot on another occasion. Only append to a
+list: what is inserted moves the seeds of all that follow.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+from setting_arms import SettingCase, setting_cases
 
 EFFECTS = (
     ("motor_viscous@joint1:coefficient=2", "motor_viscous@joint3:coefficient=5"),
@@ -107,8 +109,9 @@ MISTAKES = (
 
 CLEAN = 20
 TRAIN, TEST = 20.0, 8.0  # [s]
-KINDS = ("effect", "clean", "pair", "outside", "hard", "mistake")
-FIRST_SEED = {"effect": 2000, "clean": 3000, "pair": 4000, "outside": 5000, "hard": 6000, "mistake": 7000}
+DOGGYS = ("effect", "clean", "pair", "outside", "hard", "mistake")
+KINDS = (*DOGGYS, "setting")
+FIRST_SEED = dict(zip(KINDS, range(2000, 9000, 1000), strict=True))
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ class Case:
         return (*(text.split(":")[0] for text in self.hidden), *self.left_out)
 
 
-def cases() -> list[Case]:
+def cases() -> list[Case | SettingCase]:
     """The whole table."""
     hidden: dict[str, list[tuple[tuple[str, ...], tuple[str, ...], str]]] = {
         "effect": [((text,), (), "") for sizes in EFFECTS for text in sizes]
@@ -154,16 +157,17 @@ def cases() -> list[Case]:
         "hard": [((text,) if text else (), (), how) for how in HARD for text in IN_HARD_RECORDINGS],
         "mistake": [((text,) if text else (), (), how) for text, how in MISTAKES],
     }
-    return [
+    doggys = [
         Case(kind, texts, left_out, FIRST_SEED[kind] + i, how, HARD.get(how, {}))
-        for kind in KINDS
+        for kind in DOGGYS
         for i, (texts, left_out, how) in enumerate(hidden[kind])
     ]
+    return [*doggys, *setting_cases(FIRST_SEED["setting"])]
 
 
-def tenth(every: list[Case]) -> list[Case]:
+def tenth(every: list[Case | SettingCase]) -> list[Case | SettingCase]:
     """About one in ten of every kind, spread over the table."""
-    found = []
+    found: list[Case | SettingCase] = []
     for kind in KINDS:
         of_kind = [case for case in every if case.kind == kind]
         count = -(-len(of_kind) // 10)

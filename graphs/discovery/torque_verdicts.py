@@ -62,8 +62,8 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: Model
     found = {j.hypothesis.label: j for j in judged if j is not None}
     accepted = sorted((j for j in found.values() if not j.refused), key=lambda j: -j.common)
     equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
-    fewest = min((len(j.sizes) for j in equal), default=0)
-    first = [j for j in equal if len(j.sizes) == fewest]
+    fewest = min((j.dof for j in equal), default=0)
+    first = [j for j in equal if j.dof == fewest]
     by_label = {c.label: c for c in _scored_only(scored)}
     candidates = [_candidate(by_label.get(label), j, j in first, base.robot) for label, j in found.items()]
     alike = tuple(j.hypothesis.label for j in first)
@@ -110,7 +110,7 @@ def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
 
 def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
     """Candidates as they are before anything is judged."""
-    reason = "it acts on readings, not on torques: where sensors are finer than the model nothing tells it from motion"
+    reason = "it is a choice of the computation, which torques averaged over many steps do not tell"
     return [
         Candidate(
             effect=c.best.hypothesis.here.effect.id,
@@ -130,7 +130,7 @@ def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
 
 def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot: Robot) -> Candidate:
     here = j.hypothesis.here
-    start = scored or Candidate(here.effect.id, here.owner, j.score, len(j.sizes), float("nan"), {}, "absent")
+    start = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
     sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
     parameters = {
         p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
@@ -159,7 +159,7 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
         stands_in = j.share > SHARE and not j.refused.startswith("there")
         verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
     return replace(
-        start, score=j.score, dof=len(j.sizes), parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
+        start, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
     )
 
 

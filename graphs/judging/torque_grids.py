@@ -28,8 +28,8 @@ def hypotheses_on_motion(robot: Robot, rows: Sequence[TorqueRows]) -> list[Effec
     found = []
     for _, group in groupby(hypotheses_of(robot), key=lambda h: h.label):
         alike = list(group)
-        if alike[0].shapes and alike[0].here.owner in own:
-            grids = _grids(alike, own[alike[0].here.owner], robot)
+        grids = _grids(alike, own[alike[0].here.owner], robot) if alike[0].here.owner in own else {}
+        if grids:
             names, values = list(grids), product(*grids.values())
             found += [replace(alike[0], shapes=dict(zip(names, map(float, v), strict=True))) for v in values]
         else:

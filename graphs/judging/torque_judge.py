@@ -39,7 +39,7 @@ class TorqueJudgement:
         hypothesis: with its best shapes.
         net: score at the yardstick noise less what sizes and shapes cost.
         score: the same without these costs.
-        sizes, sigmas: shape (k,).
+        sizes, sigmas: shape (k,); zero and infinite where the other sizes and base parameters imitate one.
         share, common: of the squared missing torque on blocks left out, in its own equations and in all.
         helped, blocks: on how many of how many blocks.
         harm: largest ratio of missing torques on a block.
@@ -59,6 +59,11 @@ class TorqueJudgement:
     harm: float
     removed: float
     refused: str = ""
+
+    @property
+    def dof(self) -> int:
+        """Number of sizes that are told."""
+        return int(np.sum(np.isfinite(self.sigmas)))
 
 
 class TorqueJudge:
@@ -99,7 +104,7 @@ class TorqueJudge:
             C = np.vstack(columns)
             found = self._score(C, hypothesis)
             if best is None or found[0] > best[0]:
-                best = (found[0], hypothesis, found[1], found[2], C)
+                best = (found[0], hypothesis, found[1], found[2], C[:, np.isfinite(found[2])])
         assert best is not None
         score, hypothesis, sizes, sigmas, C = best
         net = score - C.shape[1] * np.log(self.samples) - 2.0 * np.log(len(hypotheses))
@@ -180,18 +185,19 @@ class TorqueJudge:
         (Q, r), priors = self._beside_base, len(self.equations.sigma)
         Z = np.vstack([self._white(C), np.zeros((priors, k))])
         rest = Z - Q @ (Q.T @ Z)
-        if np.any(np.sum(rest**2, axis=0) <= GAUGE * np.sum(Z**2, axis=0)):
-            return none
-        S = rest.T @ rest + np.diag([1.0 / p.prior_sigma**2 for p in hypothesis.sizes])
+        told = _told(rest, np.sum(Z**2, axis=0))
+        rest = rest[:, told]
+        S = rest.T @ rest + np.diag([1.0 / hypothesis.sizes[i].prior_sigma ** 2 for i in told])
         s = rest.T @ r
         covariance = np.linalg.pinv(S, hermitian=True)
-        sizes = covariance @ s
+        sizes, sigmas = np.zeros(k), np.full(k, np.inf)
+        sizes[told], sigmas[told] = covariance @ s, np.sqrt(np.diag(covariance))
         possible = all(size >= 0.0 for size, p in zip(sizes, hypothesis.sizes, strict=True) if p.sign == "+")
         # no effect is larger than the drive that overcomes it
         acts = [_rms(part @ sizes) for part in self._split(C)]
-        if not possible or k == 0 or np.any(np.array(acts) > self.drive):
+        if not possible or not told or np.any(np.array(acts) > self.drive):
             return none
-        return float(s @ sizes), sizes, np.sqrt(np.diag(covariance))
+        return float(s @ sizes[told]), sizes, sigmas
 
     def _left_out(self, C: Array) -> Array:
         """Missing torque with base parameters and columns fitted on the other folds, shape (m,)."""
@@ -230,6 +236,17 @@ class TorqueJudge:
         """Share that free curves over position or over speed explain on blocks left out; 0 where they run away."""
         curves = ([_hats(r.q, KNOTS) for r in self.rows], [_over_speed(r.v) for r in self.rows])
         return max(0.0, *(self._common(self._left_out(_stacked(c))) for c in curves))
+
+
+def _told(rest: Array, whole: Array) -> list[int]:
+    """Columns of which base parameters, and those before, leave something; of these the squares, shape (k,)."""
+    kept, basis = list[int](), np.zeros((len(rest), 0))
+    for i, column in enumerate(rest.T):
+        own = column - basis @ (basis.T @ column)
+        square = float(own @ own)
+        if square > GAUGE * whole[i]:
+            kept, basis = [*kept, i], np.column_stack([basis, own / np.sqrt(square)])
+    return kept
 
 
 def _blocks(rows: TorqueRows) -> NDArray[np.intp]:

@@ -9,7 +9,7 @@ so nothing of these leaks into the others.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,9 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.priors import DynamicsPrior
 from jointscope.graphs.problem.standstill import near, slowest_speed
-from jointscope.graphs.scoring.columns.column import Column
+from jointscope.graphs.scoring.columns.column import Column, SensorPart
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 
@@ -80,12 +81,15 @@ class TorqueEquations:
         segments: linearised pieces of the recordings.
         windows: by segment, by equation.
         rows: one entry for each joint.
+        signals: of each segment, with accelerations of the motion and the commands that these ask for, not those that
+            were logged: they hold what is missing, and in a loop the disturbances, too.
         expected, sigma: change of the base parameters that their prior expects, and its standard deviation, shape (p,).
     """
 
     segments: Sequence[Segment]
     windows: list[list[Window]]
     rows: list[TorqueRows]
+    signals: list[ScoreSignals]
     expected: Array
     sigma: Array
 
@@ -99,21 +103,20 @@ class TorqueEquations:
         """
         robot = segments[0].problem.robot
         windows = [[_window(s, j, band) for j in range(robot.n)] for s in segments]
-        driven = [
-            _steps(s, [Column(in_steps=np.einsum("krn,kn->kr", s.signals.response, s.signals.u))]) for s in segments
-        ]
+        driven = [_steps(s, [Column(in_steps=by) for by in np.moveaxis(s.signals.response, 2, 0)]) for s in segments]
         found, start = [], np.cumsum([0.0, *(float(np.ptp(s.signals.ticks)) + 10.0 for s in segments)])
         for j, joint in enumerate(robot.joints):
             parts = []
             for i, s in enumerate(segments):
                 window, x, layout = windows[i][j], s.signals.x, s.signals.model.layout
-                row, (missing, base, drive) = int(layout.joint_link[j]), driven[i]
+                row, (missing, base, by_command) = int(layout.joint_link[j]), driven[i]
+                drive = by_command[:, row, j] * s.signals.u[:, j]
                 parts.append(
                     (
                         start[i] + s.signals.ticks[window.kept] - s.signals.ticks[0],
                         window.averaged(missing[:, row]),
                         window.averaged(base[:, row]),
-                        window.averaged(drive[:, row, 0]),
+                        window.averaged(drive),
                         x[window.kept, layout.joint_q[j]],
                         x[window.kept, layout.joint_v[j]],
                     )
@@ -123,14 +126,15 @@ class TorqueEquations:
             found.append(TorqueRows(joint, times, missing, base, drive, q, v, slowest))
         prior = DynamicsPrior.of(robot)
         expected = -prior.residual((), segments[0].calibration)[0]
-        return TorqueEquations(segments, windows, found, expected, prior.sigma)
+        signals = [_asked_for(s, missing, gains) for s, (missing, _, gains) in zip(segments, driven, strict=True)]
+        return TorqueEquations(segments, windows, found, signals, expected, prior.sigma)
 
     def columns(self, hypothesis: EffectHypothesis) -> list[Array] | None:
-        """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for readings."""
+        """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for numerics."""
         by_segment = []
-        for s in self.segments:
-            columns = columns_of(hypothesis, s.signals)
-            if not columns or any(c.at_ticks is None and c.in_steps is None for c in columns):
+        for s, signals in zip(self.segments, self.signals, strict=True):
+            columns = columns_of(hypothesis, signals)
+            if not columns or any(c.better_integrator for c in columns):
                 return None
             by_segment.append(_steps(s, columns)[2])
         layout = self.segments[0].signals.model.layout
@@ -152,13 +156,37 @@ def _steps(segment: Segment, columns: Sequence[Column]) -> tuple[Array, Array, A
             alone[0, int(segment.signals.model.layout.joint_link[j])] += segment.signals.inertia[j]
     missing, base, by_size = [], [], []
     dynamics = [f for f, _, _ in segment.linearized if isinstance(f, DynamicsFactor)]
+    torques, moved = [replace(c, reading=None) for c in columns], _moved(segment, columns)
     # the first rows come from the dynamics, in the order of their pieces
-    for factor, part in zip(dynamics, rows_of(segment, columns), strict=False):
+    for factor, part in zip(dynamics, rows_of(segment, torques), strict=False):
         scale = np.broadcast_to(factor.sigmas, part.residual.shape)[:, :r] * alone / factor.steps.h[:, None]
+        change = part.by_size + sum(J @ moved[part.ticks + i] for i, J in enumerate(part.by_state))
         missing.append(part.residual[:, :r] * scale)
         base.append(-part.by_block[DYNAMICS][:, :r] * scale[:, :, None])
-        by_size.append(-part.by_size[:, :r] * scale[:, :, None])
+        by_size.append(-change[:, :r] * scale[:, :, None])
     return np.concatenate(missing), np.concatenate(base), np.concatenate(by_size)
+
+
+def _moved(segment: Segment, columns: Sequence[Column]) -> Array:
+    """How far errors of readings move the states, which follow fine encoders, shape (m + 1, d, k)."""
+    s, encoder = segment.signals, segment.problem.robot.motor_encoder
+    q, v = s.model.layout.joint_q, s.model.layout.joint_v
+    part = SensorPart(encoder.name, np.arange(len(q)), s.ticks, s.x[:, q], s.x[:, v])
+    found = np.zeros((*s.x.shape, len(columns)))
+    for i, column in enumerate(columns):
+        if column.reading is not None:
+            error = column.reading(part)
+            found[:, q, i] = -error
+            found[:, v, i] = -np.gradient(error, s.ticks, axis=0, edge_order=2)
+    return found
+
+
+def _asked_for(segment: Segment, missing: Array, gains: Array) -> ScoreSignals:
+    """Signals with the commands that the motion asks for; missing torque (m, r), torque per command (m, r, n)."""
+    s, u = segment.signals, segment.signals.u.copy()
+    for j, row in enumerate(s.model.layout.joint_link):
+        u[:, j] += missing[:, row] / gains[:, row, j]
+    return replace(s, u=u, a_link=s.rate[:, s.model.layout.v_link], shared={})
 
 
 def _slowest(segment: Segment, j: int) -> float:

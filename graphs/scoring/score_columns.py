@@ -15,7 +15,7 @@ from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.command import command_columns
 from jointscope.graphs.scoring.columns.elasticity import elasticity_column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.columns.inertia import coriolis_columns, inertia_columns
+from jointscope.graphs.scoring.columns.inertia import coriolis_columns, gravity_columns, inertia_columns
 from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
 from jointscope.graphs.scoring.columns.reading import late_column, reading_column
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
@@ -55,4 +55,6 @@ def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
         return [Column(better_integrator=True)]
     if effect.form == "coriolis":
         return coriolis_columns(s)
+    if effect.form == "gravity":
+        return gravity_columns(s)
     return [Column(reading=elasticity_column(hypothesis.here, s))] if effect.form == "elasticity" else []

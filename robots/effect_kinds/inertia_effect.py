@@ -23,9 +23,9 @@ class InertiaEffect(Effect):
     """A change of the body that the owner joint moves.
 
     Attributes:
-        change: maps the body's present inertia about the origin of its joint frame, shape (3, 3) [kg m2], to the
-            change of the ten dynamic parameters per unit of each effect parameter, by name, shape (10,): mass, first
-            moments (x, y, z), Ixx, Ixy, Iyy, Ixz, Iyz, Izz (about the origin of the joint frame, pinocchio's order).
+        change: maps the ten dynamic parameters that the body has, shape (10,), to their change per unit of each effect
+            parameter, by name, shape (10,): mass, first moments (x, y, z), Ixx, Ixy, Iyy, Ixz, Iyz, Izz (about the
+            origin of the joint frame, pinocchio's order).
         last_only: whether only the last joint can be the owner.
     """
 
@@ -36,3 +36,9 @@ class InertiaEffect(Effect):
         """All joints, or the last one."""
         owners = super().owners_of(robot)
         return tuple(joint for joint in owners if not self.last_only or joint == robot.joints[-1])
+
+
+def about_origin(parameters: Array) -> Array:
+    """The inertia among the ten dynamic parameters of a body, about its joint's origin, shape (3, 3) [kg m2]."""
+    xx, xy, yy, xz, yz, zz = parameters[4:]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

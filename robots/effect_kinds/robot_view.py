@@ -9,7 +9,7 @@ from typing import Protocol
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
-from jointscope.robots.parts.sensors import Gyro, LinkEncoder, Topic
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, Topic
 
 
 class RobotView(Protocol):
@@ -48,11 +48,22 @@ class RobotView(Protocol):
         """All gyroscopes."""
 
     @property
+    def accelerometers(self) -> Sequence[Accelerometer]:
+        """All accelerometers."""
+
+    @property
     def link_encoder(self) -> LinkEncoder | None:
         """The encoders on the links, if there are any."""
 
     def parameter(self, name: str) -> Parameter:
         """A parameter by full name."""
+
+    @property
+    def drive_gain(self) -> str | None:
+        """Name of the parameter that turns commands into torques; None where the command is a torque."""
+
+    def drive_parameter(self, joint: str, name: str) -> Parameter:
+        """A parameter of a joint's drive: the joint's own, or the one all motors share."""
 
     def unit_at(self, owner: str, unit: str) -> str:
         """The unit of something at an owner, where joints may slide."""

@@ -41,6 +41,9 @@ EFFECT = JointTorque(
             "asymmetric_friction": "near one position the weight is a constant torque, as friction is while moving",
             "cogging": "at order 1 both are a sine of the position",
             "inertia_error": "where gravity acts, a wrong first moment comes with a wrong inertia",
+            "encoder_offset": "weight in another posture differs by a sine of the angle",
+            "link_mass": "at one joint a wrong first moment is a weight that turns with the angle",
+            "gravity_direction": "at one joint a turned weight is a sine of the angle",
         },
     ),
 )

@@ -13,11 +13,11 @@ Array = NDArray[np.float64]
 PLACES = {"ixx": 4, "iyy": 6, "izz": 9}  # among the ten dynamic parameters
 
 
-def change(inertia: Array) -> dict[str, Array]:
+def change(body: Array) -> dict[str, Array]:
     """One moment of inertia each.
 
     Args:
-        inertia: of the body about the origin of its joint frame, shape (3, 3) [kg m2]; does not matter here.
+        body: its ten dynamic parameters, shape (10,); they do not matter here.
 
     Returns:
         Change of the ten dynamic parameters by each moment, shape (10,).
@@ -46,6 +46,7 @@ EFFECT = InertiaEffect(
             "gravity_imbalance": "where gravity acts, a wrong first moment comes with a wrong inertia",
             "kinematic_coupling": "a wrong product of inertia couples the joints, too, but with the acceleration",
             "coriolis": "a wrong inertia matters most in the same fast motion",
+            "link_mass": "where little gravity acts, a heavier link is one with more inertia",
         },
     ),
 )

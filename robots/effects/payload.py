@@ -7,21 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
-from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 
 Array = NDArray[np.float64]
 
 
-def change(inertia: Array) -> dict[str, Array]:
+def change(body: Array) -> dict[str, Array]:
     """A point mass on the long axis n: m l^2 (1 - n n^T), per m l^2.
 
     Args:
-        inertia: of the body about the origin of its joint frame, shape (3, 3) [kg m2].
+        body: its ten dynamic parameters, shape (10,).
 
     Returns:
         Change of the ten dynamic parameters, shape (10,).
     """
-    n = np.linalg.eigh(inertia)[1][:, 0]
+    n = np.linalg.eigh(about_origin(body))[1][:, 0]
     xx, xy, xz, yy, yz, zz = (np.eye(3) - np.outer(n, n))[np.triu_indices(3)]
     return {"inertia": np.array([0.0, 0.0, 0.0, 0.0, xx, xy, yy, xz, yz, zz])}
 

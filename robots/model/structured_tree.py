@@ -16,7 +16,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
+from jointscope.robots.bodies.turned_gravity import turned_gravity
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 from jointscope.robots.effect_kinds.structure import Structure
 
 if TYPE_CHECKING:
@@ -69,12 +70,14 @@ class StructuredTree:
             if joint not in robot.layout.motors
         ]
         self.coriolis_scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
+        tilted = [e for e in robot.effects if _form(e.effect) == "gravity"]
+        self._tilt = tuple(e.parameter(p.name) for e in tilted for p in e.effect.parameters)
         self._cache: tuple[tuple[float, ...], RigidTree] | None = None
 
     @property
     def varies(self) -> bool:
         """Whether any parameter changes the tree."""
-        return bool(self._changes or self._armature or self.coriolis_scale)
+        return bool(self._changes or self._armature or self.coriolis_scale or self._tilt)
 
     def acceleration(self, q: Array, v: Array, tau: Array, values: Mapping[str, float]) -> Array:
         """Accelerations, shape (m, n_link) [rad/s^2]; arguments as those of `RigidTree.acceleration`."""
@@ -111,15 +114,20 @@ class StructuredTree:
             found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         for name, link, _ in self._armature:
             found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]
+        if self._tilt:
+            torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
+            for name, torque in zip(self._tilt, torques, strict=True):
+                found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         if self.coriolis_scale is not None:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
         return found
 
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
-        if not (self._changes or self._armature):
+        if not (self._changes or self._armature or self._tilt):
             return self.kinematics
-        key = tuple([values[c.name] for c in self._changes] + [values[name] for name, *_ in self._armature])
+        names = [*(c.name for c in self._changes), *(name for name, *_ in self._armature), *self._tilt]
+        key = tuple(values[name] for name in names)
         if self._cache is None or self._cache[0] != key:
             model = self.kinematics.model.copy()
             for change in self._changes:
@@ -128,6 +136,9 @@ class StructuredTree:
             for name, _, coordinate in self._armature:
                 armature[coordinate] = values[name]
             model.armature = armature
+            if self._tilt:
+                tilt = np.array([values[name] for name in self._tilt])
+                model.gravity = pin.Motion(turned_gravity(self.kinematics.gravity, tilt)[0], np.zeros(3))
             self._cache = (key, self.kinematics.with_model(model))
         return self._cache[1]
 
@@ -149,13 +160,30 @@ def inertia_torque(tree: RigidTree, change: InertiaChange, q: Array, v: Array, a
     return still if share == 0.0 else still + share * (more(v) - still)  # linear in the share, beyond 0 and 1, too
 
 
+def tilt_torques(kinematics: RigidTree, bodies: RigidTree, q: Array, angles: Array) -> list[Array]:
+    """Torque that a unit of each tilt of gravity asks for, shape (m, n_link) each [N m/rad].
+
+    Args:
+        kinematics: with gravity as the model has it.
+        bodies: with their inertias.
+        q: positions, shape (m, n_link) [rad].
+        angles: present tilts, shape (2,) [rad].
+    """
+    still, found = np.zeros_like(q), []
+    for slope in turned_gravity(kinematics.gravity, angles)[1]:
+        model = bodies.model.copy()
+        model.gravity = pin.Motion(slope, np.zeros(3))
+        found.append(bodies.with_model(model).torque(q, still, still))
+    return found
+
+
 def inertia_changes(robot: Robot, model: pin.Model) -> list[InertiaChange]:
     """All parameters of the robot's effects that change a body."""
     found = []
     for here in robot.effects:
         joint = model.getJointId(here.owner) if model.existJointName(here.owner) else 0
         if isinstance(here.effect, InertiaEffect):
-            present = inertia_about_joint(model, joint)
+            present = model.inertias[joint].toDynamicParameters()
             for name, direction in here.effect.change(present).items():
                 found.append(InertiaChange(here.parameter(name), joint, np.asarray(direction, float)))
         elif _form(here.effect) == "bearing":
@@ -179,8 +207,7 @@ def hidden_inertias(model: pin.Model, joint: int) -> dict[str, tuple[int, int]]:
 
 def inertia_about_joint(model: pin.Model, joint: int) -> Array:
     """Inertia of the body that a joint moves, about the origin of its joint frame, shape (3, 3) [kg m2]."""
-    xx, xy, yy, xz, yz, zz = model.inertias[joint].toDynamicParameters()[4:]
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return about_origin(model.inertias[joint].toDynamicParameters())
 
 
 def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:

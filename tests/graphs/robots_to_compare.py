@@ -45,6 +45,11 @@ def coupled(robot):
     return replace(robot, transmission=T, parameters={**robot.parameters, **elements})
 
 
+def _known_drives(robot):
+    known = replace(robot.parameters["motor.k_pwm"], fixed=True)
+    return replace(robot, parameters={**robot.parameters, known.name: known})
+
+
 def _with(effect, robot):
     owner = effect.owners_of(robot)[-1]
     return add_effect(robot, f"{effect.id}@{owner}", dict(effect.example))
@@ -57,7 +62,12 @@ def _every():
     yield "without Coriolis terms", _without_coriolis(READY)
     yield "joint 2 rigid", _rigid(READY, "joint2")
     yield "all joints rigid", _rigid(READY, *READY.joints)
-    bases = {"coriolis": _without_coriolis(READY), "joint_elasticity": _rigid(READY, "joint3")}
+    bases = {
+        "coriolis": _without_coriolis(READY),
+        "joint_elasticity": _rigid(READY, "joint3"),
+        "gravity_direction": mimicking(READY, READY.joints),
+        "torque_constant_error": _known_drives(READY),
+    }
     for effect in catalogue().values():
         if effect.id != "integration_error":  # it is a choice of the rule, not a term of the equations
             yield effect.id, _with(effect, bases.get(effect.id, READY))
@@ -65,7 +75,7 @@ def _every():
     yield "mimic joints", follows
     yield "mimic joints in another order", mimicking(READY, ("joint3", "joint1", "joint2"))
     yield "mimic joints and rigid ones", _rigid(follows, "joint1", "joint3")
-    for name in ("payload", "inertia_error", "bearing_flexibility"):
+    for name in ("payload", "inertia_error", "link_mass", "bearing_flexibility"):
         yield f"mimic joints and {name}", _with(catalogue()[name], follows)
     follows = _without_coriolis(follows)
     yield "mimic joints without Coriolis terms", follows

@@ -18,6 +18,7 @@ EXAMPLES = {
     "last joint": "the last joint",
     "imu": "imu1",
     "robot": "robot",
+    "upright robot": "robot (upright)",
 }
 WIDTH = 100
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of the rigid bodies: changed inertias, and Coriolis torques that a model leaves out."""
+"""Columns of the rigid bodies: changed inertias, turned gravity, and Coriolis torques that a model leaves out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
-from jointscope.robots.model.structured_tree import InertiaChange, inertia_about_joint, inertia_torque
+from jointscope.robots.model.structured_tree import InertiaChange, inertia_torque, tilt_torques
 
 
 def inertia_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
@@ -17,7 +17,7 @@ def inertia_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Colum
     effect, tree, layout = hypothesis.here.effect, s.robot.kinematic_tree, s.model.layout
     assert isinstance(effect, InertiaEffect)
     joint = tree.model.getJointId(hypothesis.here.owner)
-    directions = effect.change(inertia_about_joint(tree.model, joint))
+    directions = effect.change(tree.model.inertias[joint].toDynamicParameters())
     q, v = s.x[:, layout.q_link], s.x[:, layout.v_link]
     found = []
     for size in hypothesis.sizes:
@@ -36,3 +36,14 @@ def coriolis_columns(s: ScoreSignals) -> list[Column]:
     tau = np.zeros((len(s.ticks), layout.n_rates))
     tau[:, : layout.n_link] = tree.torque(q, still, still) - tree.torque(q, v, still)
     return [Column(at_ticks=s.accelerations(tau))]
+
+
+def gravity_columns(s: ScoreSignals) -> list[Column]:
+    """Accelerations by each tilt of gravity."""
+    layout, tree = s.model.layout, s.robot.kinematic_tree
+    found = []
+    for torque in tilt_torques(tree, tree, s.x[:, layout.q_link], np.zeros(2)):
+        tau = np.zeros((len(s.ticks), layout.n_rates))
+        tau[:, : layout.n_link] = -torque
+        found.append(Column(at_ticks=s.accelerations(tau)))
+    return found

@@ -51,12 +51,13 @@ class Equations:
         self.expected, self.sigma = np.zeros(count), np.full(count, 100.0)
 
     def columns(self, hypothesis):
-        return [hypothesis.column(self.rows[0].q, self.rows[0].v)[:, None]]
+        return [np.column_stack([c(self.rows[0].q, self.rows[0].v) for c in hypothesis.columns])]
 
 
-def hypothesis(column, sign=None, effect="torque_offset"):
+def hypothesis(*columns, sign=None, effect="torque_offset"):
     size = SimpleNamespace(name="torque", sign=sign, prior_sigma=100.0)
-    return SimpleNamespace(column=column, sizes=(size,), here=SimpleNamespace(effect=SimpleNamespace(id=effect)))
+    here = SimpleNamespace(effect=SimpleNamespace(id=effect))
+    return SimpleNamespace(columns=columns, sizes=(size,) * len(columns), here=here)
 
 
 def one(q, v):
@@ -100,6 +101,15 @@ def test_what_base_parameters_imitate_is_no_candidate():
     found = axis(3, one).judge([hypothesis(lambda q, v: -v)])
     assert "imitate" in found.refused
     assert found.score == 0.0
+
+
+def test_a_group_loses_the_sizes_that_others_imitate_and_zeros():
+    found = axis(3, lambda q, v: 3.2 + 0.0 * v).judge([hypothesis(lambda q, v: v, one, lambda q, v: 0.0 * v, one)])
+    assert found.refused == ""
+    assert found.dof == 1
+    assert list(np.isfinite(found.sigmas)) == [False, True, False, False]
+    np.testing.assert_array_equal(found.sizes[[0, 2, 3]], 0.0)
+    assert abs(found.sizes[1] - 3.2) < 3.0 * found.sigmas[1]
 
 
 def test_an_impossible_sign_is_no_candidate():

@@ -84,6 +84,15 @@ def test_friction_takes_energy(effect):
     assert np.all(effect.law(s, example(effect)) * speed <= 0.0)
 
 
+def test_friction_by_direction_has_four_numbers():
+    v = np.array([-2.0, -0.5, 0.5, 2.0])
+    s = JointSignals(q_link=v, v_link=v, q_motor=v, v_motor=v, tau_spring=v, stiffness=150.0, sharpness=1e3)
+    found = catalogue()["friction_by_direction"].law(s, {"torque": 0.4, "coefficient": 0.3})
+    base = -(1.0 * np.sign(v) + 0.5 * v)
+    forwards, backwards = -(1.4 * np.sign(v) + 0.8 * v), -(0.6 * np.sign(v) + 0.2 * v)
+    np.testing.assert_allclose(base + found, np.where(v > 0.0, forwards, backwards))
+
+
 def test_backlash_leaves_the_gap_free_and_spring_and_damper_beyond_it():
     q, rate = np.array([-0.05, -0.004, 0.004, 0.05]), np.array([0.3, -0.4, 0.5, -0.6])
     base = 150.0 * q + 2.0 * rate
@@ -108,16 +117,26 @@ def test_hysteresis_takes_another_way_back():
 # inertia
 
 
+BODY = np.array([2.0, 0.1, 0.2, 0.6, 0.5, 0.0, 0.52, 0.0, 0.0, 0.02])
+
+
 @of([effect for effect in EFFECTS if isinstance(effect, InertiaEffect)])
-def test_changes_of_inertia_are_symmetric_and_leave_the_mass(effect):
-    changes = effect.change(np.diag([0.5, 0.52, 0.02]))
+def test_changes_of_a_body_are_those_of_its_parameters_and_only_a_wrong_mass_changes_the_mass(effect):
+    changes = effect.change(BODY)
     assert set(changes) == {p.name for p in effect.parameters}
     for change in changes.values():
-        assert change.shape == (10,) and np.all(change[:4] == 0.0)
+        assert change.shape == (10,)
+        assert effect.id == "link_mass" or np.all(change[:4] == 0.0)
+
+
+def test_a_heavier_link_has_more_of_its_own_material():
+    changes = catalogue()["link_mass"].change(BODY)
+    np.testing.assert_allclose(BODY + 2.0 * changes["mass"], 2.0 * BODY)
+    np.testing.assert_allclose(changes["y"], np.eye(10)[2])
 
 
 def test_a_payload_sits_on_the_axis_of_least_inertia():
-    change = catalogue()["payload"].change(np.diag([0.5, 0.52, 0.02]))["inertia"]
+    change = catalogue()["payload"].change(BODY)["inertia"]
     np.testing.assert_allclose(change, [0, 0, 0, 0, 1, 0, 1, 0, 0, 0], atol=1e-12)
     assert catalogue()["payload"].owners_of(DOGGY) == ("joint3",)
 

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """No simulated effect is made for Doggy: an arm with gravity, torque commands, turned frames and other names."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from tilted_arm import URDF
 
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.errors import EffectError
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.structured_tree import StructuredTree
 from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
 from jointscope.tools.simulator import simulate
 from jointscope.tools.simulator.effects import make_effect, simulated_effects
@@ -80,6 +86,31 @@ def test_a_payload_sits_on_the_long_axis_and_has_weight(arm):
     expected = pin.aba(model, model.createData(), q, v, np.zeros(2))
     engine = Engine(arm, [make_effect("payload@elbow:inertia=0.05", arm)])
     np.testing.assert_allclose(accelerations(engine, q, v), expected, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("label", "values"),
+    [
+        ("gravity_direction@robot", {"x": 0.2, "y": -0.1}),
+        ("link_mass@shoulder", {"mass": 1.2, "x": 0.01, "y": -0.02, "z": 0.02}),
+        ("link_mass@elbow", {"mass": -0.5, "x": 0.005, "y": 0.01, "z": 0.01}),
+    ],
+)
+def test_settings_of_the_simulator_are_those_of_the_catalogue(arm, label, values):
+    effect = make_effect(f"{label}:{','.join(f'{name}={value}' for name, value in values.items())}", arm)
+    robot = add_effect(arm, label, values)
+    bodies = StructuredTree(robot).bodies({name: p.value for name, p in robot.parameters.items()})
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        q, v = rng.uniform(-1.5, 1.5, (2, 2))
+        expected = bodies.acceleration(q[None], v[None], np.zeros((1, 2)))[0]
+        np.testing.assert_allclose(accelerations(Engine(arm, [effect]), q, v), expected, rtol=1e-6, atol=1e-6)
+
+
+def test_a_slanted_robot_is_not_turned_about_axes_that_are_not_level(arm):
+    slanted = replace(arm, tree=RigidTree(arm.tree.urdf, arm.joints, np.array([0.0, 3.0, -9.0])))
+    with pytest.raises(EffectError, match="needs an upright robot, and there is none"):
+        make_effect("gravity_direction@robot", slanted)
 
 
 def test_without_a_gear_ratio_one_period_per_turn_of_the_joint_is_assumed(arm):
