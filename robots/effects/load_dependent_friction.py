@@ -38,6 +38,7 @@ EFFECT = JointTorque(
         look_alikes={
             "motor_stribeck": "at a reversal speed is low and load is high at once",
             "hysteresis": "both take energy out of every change of the load",
+            "weight_dependent_friction": "in slow motion the spring transmits the weight and nothing else",
         },
     ),
 )

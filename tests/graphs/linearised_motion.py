@@ -18,6 +18,7 @@ from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.solving.normal_equations import states_of
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
@@ -61,6 +62,7 @@ ROBOTS = {
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
     "accelerometer": with_an_accelerometer(),
+    "heavy": replace(DOGGY, tree=RigidTree(DOGGY.tree.urdf, DOGGY.joints, np.array([0.5, 0.0, -9.81]))),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 
