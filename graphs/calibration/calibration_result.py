@@ -33,6 +33,7 @@ class ParameterEstimate:
         prior, prior_sigma: prior mean and standard deviation.
         published: value from the literature; None where there is none.
         note: "" or what the user must know: at a bound, held by its prior.
+        derived: whether it follows from parameters and is none itself.
     """
 
     name: str
@@ -44,6 +45,7 @@ class ParameterEstimate:
     prior_sigma: float
     published: float | None = None
     note: str = ""
+    derived: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,7 @@ class CalibrationResult:
         converged: False where the model contradicts the recordings so much that the values never came to rest.
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
+        derived: results in other words and units, which follow from the parameters.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -187,6 +190,7 @@ class CalibrationResult:
     unsettled: float = 0.0
     timing: DriveTiming | None = None
     regressed: Mapping[str, Value] = field(default_factory=dict)
+    derived: tuple[ParameterEstimate, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
@@ -224,6 +228,8 @@ class CalibrationResult:
             for p in self.parameters
             if p.name in self.robot.parameters
         }
+        for p in self.derived:
+            found[p.name] = {"value": p.value, "sigma": p.sigma, "unit": p.unit, "derived": True}
         for sensor in self.robot.biased:
             found[f"{sensor.name}.bias"] = {
                 "value": sensor.bias.tolist(),

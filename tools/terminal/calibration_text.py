@@ -42,7 +42,7 @@ def _verdict(result: CalibrationResult) -> str:
 def _parameters(result: CalibrationResult) -> str:
     with_source = any(p.published is not None for p in result.parameters)
     head = ["parameter", "start", "value", "± sigma", "unit", *(["published"] if with_source else []), ""]
-    rows = [_row(parameter, with_source) for parameter in result.parameters]
+    rows = [_row(parameter, with_source) for parameter in (*result.parameters, *result.derived)]
     return text_table(head, rows, "<>>><" + (">" if with_source else "") + "<")
 
 
