@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
@@ -167,6 +168,7 @@ class CalibrationResult:
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         derived: results in other words and units, which follow from the parameters.
+        sets: recordings of other kinds with their states.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -191,6 +193,7 @@ class CalibrationResult:
     timing: DriveTiming | None = None
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
+    sets: tuple[tuple[SetProblem, Array], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""

@@ -127,6 +127,7 @@ def summarize(
         channels=_channels(solved.robot, bags),
         noise=noise,
         derived=derived_results(robot, calibration, covariance),
+        sets=tuple(zip(solved.sets, solution.estimate.states[len(solved.problems) :], strict=True)),
         sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
         iterations=iterations,
         cost=solution.cost,

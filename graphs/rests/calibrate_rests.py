@@ -49,6 +49,7 @@ class RestCalibration:
         parameters: of which the rests say anything.
         derived: what follows from them.
         silent: names of the parameters of which they say nothing.
+        covariance: of the values of all free parameters, shape (p, p).
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.
@@ -62,11 +63,17 @@ class RestCalibration:
     parameters: tuple[ParameterEstimate, ...]
     derived: tuple[ParameterEstimate, ...]
     silent: tuple[str, ...]
+    covariance: Array
     before: RestErrors
     errors: RestErrors
     iterations: int
     cost: float
     wall_seconds: float
+
+    @property
+    def sets(self) -> tuple[tuple[RestSet, Array], ...]:
+        """The rests of each recording with their states, as a calibration with motion has them."""
+        return tuple(zip(self.problems, self.states, strict=True))
 
     @property
     def count(self) -> int:
@@ -108,7 +115,7 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
     _, covariance = posteriors(list(problems), solution)
     calibration = solution.estimate.calibrations[0]
     index = calibration.columns[DYNAMICS]
-    sigmas = np.sqrt(np.diag(covariance)[index])
+    sigmas, scale = np.sqrt(np.diag(covariance)[index]), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
     told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
@@ -130,6 +137,7 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
         parameters=tuple(told),
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
+        covariance=covariance[index, index] * np.outer(scale, scale),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,

@@ -49,6 +49,11 @@ class RestErrors:
         """Root mean square missing torque of each joint [N m]."""
         return {joint: _rms(self.torque[:, i]) for i, joint in enumerate(robot.joints)}
 
+    def beyond(self, robot: Robot) -> dict[str, float]:
+        """Largest torque of each joint that friction would have to hold beyond its band [N m]."""
+        largest = self.friction.max(axis=0, initial=0.0)
+        return {joint: float(largest[i]) for i, joint in enumerate(robot.joints)}
+
 
 def rest_errors(problems: Sequence[RestSet]) -> RestErrors:
     """Errors of the robot's own values; nothing is fitted."""

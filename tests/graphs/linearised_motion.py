@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -56,13 +57,19 @@ def with_an_accelerometer():
     return replace(DOGGY, sensors={**DOGGY.sensors, "acc": sensor}, parameters={**DOGGY.parameters, **place})
 
 
+def with_a_weight():
+    """On other bodies: its own weigh nothing about its joints."""
+    urdf = Path(__file__).with_name("mimicking_doggy.urdf")
+    return replace(DOGGY, tree=RigidTree(urdf, DOGGY.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7}))
+
+
 ROBOTS = {
     "doggy": DOGGY,
     "without Coriolis terms": without_coriolis(),
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
     "accelerometer": with_an_accelerometer(),
-    "heavy": replace(DOGGY, tree=RigidTree(DOGGY.tree.urdf, DOGGY.joints, np.array([0.5, 0.0, -9.81]))),
+    "heavy": with_a_weight(),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 

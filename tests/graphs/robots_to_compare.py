@@ -45,11 +45,6 @@ def coupled(robot):
     return replace(robot, transmission=T, parameters={**robot.parameters, **elements})
 
 
-def _heavy(robot):
-    """The robot without springs that carry its weight."""
-    return replace(robot, tree=RigidTree(robot.tree.urdf, robot.joints, np.array([0.5, 0.0, -9.81])))
-
-
 def _with(effect, robot):
     owner = effect.owners_of(robot)[-1]
     return add_effect(robot, f"{effect.id}@{owner}", dict(effect.example))
@@ -63,7 +58,7 @@ def _every():
     yield "joint 2 rigid", _rigid(READY, "joint2")
     yield "all joints rigid", _rigid(READY, *READY.joints)
     bases = {"coriolis": _without_coriolis(READY), "joint_elasticity": _rigid(READY, "joint3")}
-    bases["weight_dependent_friction"] = _heavy(READY)
+    bases["weight_dependent_friction"] = mimicking(READY, READY.joints)  # its own bodies weigh nothing about its joints
     for effect in catalogue().values():
         if effect.id != "integration_error":  # it is a choice of the rule, not a term of the equations
             yield effect.id, _with(effect, bases.get(effect.id, READY))
@@ -86,7 +81,8 @@ def _every():
     laws = ("load_dependent_friction", "spring_cubic", "hysteresis", "link_viscous", "kinematic_coupling")
     yield "coupled joints and laws", reduce(lambda robot, law: _with(catalogue()[law], robot), laws, coupled(READY))
     yield "coupled joints and bearing", _with(bearing, coupled(READY))
-    yield "coupled joints and weight", _with(catalogue()["weight_dependent_friction"], coupled(_heavy(READY)))
+    heavy = coupled(mimicking(READY, READY.joints))
+    yield "coupled joints and weight", _with(catalogue()["weight_dependent_friction"], heavy)
 
 
 ROBOTS = dict(_every())

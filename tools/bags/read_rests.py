@@ -19,7 +19,7 @@ from jointscope.tools.bags.read_recording import read_recording
 
 LOAD = "/load"
 LOAD_TYPE = "geometry_msgs/msg/WrenchStamped"
-HEAVY = 50.0  # times what the robot weighs: no weight that hangs on it
+HEAVY = 3.0  # times what the robot weighs: no arm holds that
 
 
 def read_rests(path: str | Path, robot: Robot, progress: Progress | None = None) -> Rests:
@@ -59,13 +59,18 @@ def _loads(path: Path, robot: Robot, start_ns: int, shortened: bool) -> LoadHist
     forces = np.array([[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in messages], dtype=float)
     torques = np.array([[m.wrench.torque.x, m.wrench.torque.y, m.wrench.torque.z] for m in messages], dtype=float)
     links = [str(m.header.frame_id) for m in messages]
-    _check(path, robot, forces, torques, links)
+    check_loads(path, robot, forces, torques, links)
     order = np.argsort(stamps, kind="stable")
     times = (stamps[order] - start_ns) / 1e9
     return LoadHistory(times, forces[order], tuple(links[i] for i in order))
 
 
-def _check(path: Path, robot: Robot, forces: np.ndarray, torques: np.ndarray, links: list[str]) -> None:
+def check_loads(path: Path, robot: Robot, forces: np.ndarray, torques: np.ndarray, links: list[str]) -> None:
+    """Loads that can hang on a robot.
+
+    Raises:
+        RecordingError: no numbers, torques, links that are not there, weights in grams.
+    """
     if not np.all(np.isfinite(forces)):
         raise RecordingError(f"{path}: topic {LOAD}: a force is no number; remove these messages")
     if np.any(torques != 0.0):

@@ -184,9 +184,17 @@ def provenance(result: Any) -> dict[str, Any]:
     """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
     return {
         **origin(result.start.path.name, [bag.recording for bag in result.bags]),
+        **other_kinds(result),
         "samples": int(result.samples),
         "cost": float(result.cost),
     }
+
+
+def other_kinds(result: Any) -> dict[str, Any]:
+    """Rests that a calibration used beside motion."""
+    rests = [problem.rests for problem, _ in result.sets if problem.kind == "rests"]
+    found = [{"path": each.path, "sha256": each.sha256, "count": len(each)} for each in rests]
+    return {"rests": found} if found else {}
 
 
 def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
@@ -200,12 +208,19 @@ def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Reco
     }
 
 
-def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
-    """Version, date, name of the start model's file, and bags with hashes."""
+def version_and_date(start: str) -> dict[str, Any]:
+    """What every robot file that was calibrated says, with the name of the start model's file."""
     return {
         "version": jointscope.__version__,
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "start": start,
+    }
+
+
+def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
+    """Version, date, name of the start model's file, and bags with hashes."""
+    return {
+        **version_and_date(start),
         "bags": [
             {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
             | ({"left_out": [list(stretch) for stretch in recording.left_out]} if recording.left_out else {})

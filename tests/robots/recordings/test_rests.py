@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def recording(q_motor, q_link=None, u=None):
 def steps(*levels, seconds=2.0, ramp=0.5):
     """Stands at each level and moves evenly in between."""
     found = [np.full(int(seconds * RATE), levels[0])]
-    for a, b in zip(levels[:-1], levels[1:], strict=True):
+    for a, b in pairwise(levels):
         found += [np.linspace(a, b, int(ramp * RATE)), np.full(int(seconds * RATE), b)]
     return np.concatenate(found)
 
@@ -83,7 +84,7 @@ def test_motion_has_no_rests_and_weights_in_a_hurry_have_none():
     )
     times = np.arange(0.0, 4.0, 0.3)
     hurried = LoadHistory(times, np.outer(times, [0, 1, 0]), ("attachment",) * len(times))
-    with pytest.raises(RecordingError, match="the load changes within 0.5 s wherever the motors stand"):
+    with pytest.raises(RecordingError, match=r"the load changes within 0\.5 s wherever the motors stand"):
         find_rests(recording(np.zeros(400)), ROBOT, hurried)
     t = np.arange(400) / RATE
     with pytest.raises(RecordingError, match="a link swings through each; hold every weight for longer"):
@@ -93,7 +94,7 @@ def test_motion_has_no_rests_and_weights_in_a_hurry_have_none():
 def test_a_stretch_ends_where_a_channel_leaves_its_range_or_samples_are_missing():
     times = np.array([*np.arange(0.0, 1.0, 0.1), *np.arange(3.0, 4.0, 0.1)])
     values = np.zeros((20, 1))
-    assert still_stretches(times, values, np.array([0.1])) == pytest.approx([(0.0, 0.9), (3.0, 3.9)])
+    np.testing.assert_allclose(still_stretches(times, values, np.array([0.1])), [(0.0, 0.9), (3.0, 3.9)])
     values[5:, 0] = 0.05
     assert len(still_stretches(times, values, np.array([0.01]))) == 1  # half a second is too short before the step
 

@@ -15,6 +15,7 @@ class SpringCurve(SimulatedEffect):
 
     id = "spring_curve"
     acts_on = ("elastic joint",)
+    built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"quadratic": 600.0, "cubic": 20000.0}  # [N m/rad^2], [N m/rad^3]
 
     def edit(self, spec: Any) -> None:
