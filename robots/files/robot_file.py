@@ -110,11 +110,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
     )
     if poses is not None:
         robot = with_poses(robot, poses)
-    robot = replace(robot, held_at_mean=_held_at_mean(top, locked))
-    robot = with_effects(robot, top.texts("effects", ()))
-    if "derived" in top:
-        results = top.section("derived").build(lambda s: derived_results(s, robot))
-        robot = replace(robot, derived=results)
+    robot = with_effects(replace(robot, held_at_mean=_held_at_mean(top, locked)), top.texts("effects", ()))
+    robot = replace(robot, derived=top.section("derived", {}).build(lambda s: derived_results(s, robot)))
     if motion:
         robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
