@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
@@ -33,6 +34,7 @@ class ParameterEstimate:
         prior, prior_sigma: prior mean and standard deviation.
         published: value from the literature; None where there is none.
         note: "" or what the user must know: at a bound, held by its prior.
+        derived: whether it follows from parameters and is none itself.
     """
 
     name: str
@@ -44,6 +46,7 @@ class ParameterEstimate:
     prior_sigma: float
     published: float | None = None
     note: str = ""
+    derived: bool = False
 
 
 @dataclass(frozen=True)
@@ -164,6 +167,8 @@ class CalibrationResult:
         converged: False where the model contradicts the recordings so much that the values never came to rest.
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
+        derived: results in other words and units, which follow from the parameters.
+        sets: recordings of other kinds with their states.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -187,6 +192,8 @@ class CalibrationResult:
     unsettled: float = 0.0
     timing: DriveTiming | None = None
     regressed: Mapping[str, Value] = field(default_factory=dict)
+    derived: tuple[ParameterEstimate, ...] = ()
+    sets: tuple[tuple[SetProblem, Array], ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
@@ -224,6 +231,8 @@ class CalibrationResult:
             for p in self.parameters
             if p.name in self.robot.parameters
         }
+        for p in self.derived:
+            found[p.name] = {"value": p.value, "sigma": p.sigma, "unit": p.unit, "derived": True}
         for sensor in self.robot.biased:
             found[f"{sensor.name}.bias"] = {
                 "value": sensor.bias.tolist(),

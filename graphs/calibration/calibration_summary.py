@@ -18,6 +18,7 @@ from jointscope.graphs.calibration.calibration_result import (
     IterationRecord,
     ParameterEstimate,
 )
+from jointscope.graphs.calibration.derived_results import derived_results
 from jointscope.graphs.calibration.encoder_noise import EncoderFit, estimated_sigmas
 from jointscope.graphs.calibration.external_torque import external_torques_of
 from jointscope.graphs.calibration.findings import findings
@@ -125,6 +126,8 @@ def summarize(
         weak_directions=weak,
         channels=_channels(solved.robot, bags),
         noise=noise,
+        derived=derived_results(robot, calibration, covariance),
+        sets=tuple(zip(solved.sets, solution.estimate.states[len(solved.problems) :], strict=True)),
         sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
         iterations=iterations,
         cost=solution.cost,
@@ -202,16 +205,7 @@ def _parameters(
     robot: Robot, calibration: Calibration, sigmas: Array, shared: SharedLayout
 ) -> tuple[ParameterEstimate, ...]:
     """The table of all shared values (biases of the first recording)."""
-    found = []
-    slopes = calibration.value_by_coordinate
-    for i, name in enumerate(calibration.names):
-        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
-        note = ""
-        if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
-            note = "at its bound: compatible with zero"
-        elif sigmas[i] > HELD_BY_PRIOR * p.coordinate_sigma:
-            note = "held by its prior"
-        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
+    found = dynamic_parameters(robot, calibration, sigmas)
     for gyro in robot.gyros:
         start = shared.places[0][rotation_block(gyro.name)].start
         angle = Rotation.from_matrix(gyro.R_prior.T @ calibration.rotations[gyro.name]).as_rotvec()
@@ -231,6 +225,26 @@ def _parameters(
             row = (value, sigma, biased.units[j], before_bias, before_bias, biased.bias_prior_sigma, None, note)
             found.append(ParameterEstimate(f"{biased.name}.bias.{axis}", *row))
     return tuple(found)
+
+
+def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
+    """The free parameters with notes.
+
+    Args:
+        robot: before the calibration.
+        calibration: the values that were found.
+        sigmas: of the shared values, the parameters' coordinates first.
+    """
+    found, slopes = [], calibration.value_by_coordinate
+    for i, name in enumerate(calibration.names):
+        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
+        note = ""
+        if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
+            note = "at its bound: compatible with zero"
+        elif sigmas[i] > HELD_BY_PRIOR * p.coordinate_sigma:
+            note = "held by its prior"
+        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
+    return found
 
 
 def _calibrated(

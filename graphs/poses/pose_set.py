@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from jointscope.factors.block import POINT, Block
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
+from jointscope.graphs.solving.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
@@ -151,19 +152,13 @@ class PoseSet:
         """Normal equations at transmission errors of shape (m, n)."""
         assert self.robot.poses is not None
         point, sigma = self.point(calibration, x), self.robot.poses.target_sigma
-        r, J, P = (
-            self.misses(point, calibration) / sigma,
-            point.by_joint / sigma,
-            self.columns(point, calibration) / sigma,
+        own = np.broadcast_to(np.diag(1.0 / self.sigmas), (*x.shape, x.shape[1]))
+        no = np.zeros((*x.shape, calibration.size))
+        system = of_independent_states(
+            np.hstack([self.misses(point, calibration) / sigma, x / self.sigmas]),
+            np.hstack([point.by_joint / sigma, own]),
+            np.hstack([self.columns(point, calibration) / sigma, no]),
         )
-        system = NormalEquations.zeros(len(x), x.shape[1], calibration.size)
-        system.D[:] = np.swapaxes(J, 1, 2) @ J + np.diag(self.sigmas**-2.0)
-        system.g_x[:] = np.einsum("mkn,mk->mn", J, r) + x / self.sigmas**2
-        system.B[:] = np.swapaxes(J, 1, 2) @ P
-        rows = P.reshape(-1, calibration.size)
-        system.C[:], system.g_p[:] = rows.T @ rows, rows.T @ r.reshape(-1)
-        system.costs[:] = 0.5 * (np.sum(r**2, axis=1) + np.sum((x / self.sigmas) ** 2, axis=1))
-        system.cost = float(np.sum(system.costs))
         self._add_distances(system, calibration)
         return system
 

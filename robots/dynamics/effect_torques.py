@@ -8,7 +8,7 @@ depend on is found once, when the robot is built, and costs nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ class EffectTorques:
         layout: of the state.
         names: names of the free parameters.
         sharpness: of the base model's friction for given parameters, shape (n,) [s/rad].
-        weight: what rigid joints carry, for laws that ask for their load.
+        weight: what gears carry, for laws that ask for it.
     """
 
     def __init__(
@@ -53,8 +53,17 @@ class EffectTorques:
             _LocalLaw(here, joints, layout, names, weight) for here in effects if isinstance(here.effect, JointTorque)
         ]
         self._global = [here for here in effects if isinstance(here.effect, RobotTorque)]
+        self._weight = weight if any(law.on_weight for law in self._local) else None
 
-    def add(self, terms: TorqueTerms, x: Array, springs: Springs, values: Mapping[str, float]) -> None:
+    def add(
+        self,
+        terms: TorqueTerms,
+        x: Array,
+        springs: Springs,
+        values: Mapping[str, float],
+        outside: Array | None = None,
+        sharpness: Array | None = None,
+    ) -> None:
         """Adds all torques and rates of memories.
 
         Args:
@@ -62,10 +71,18 @@ class EffectTorques:
             x: states, shape (m, d).
             springs: springs of the base model.
             values: all parameters of the robot by full name.
+            outside: torques of known loads about the joints, shape (m, n) [N m].
+            sharpness: another one than that of the robot, shape (n,) [s/rad].
         """
-        sharpness = self._sharpness(values)
+        sharpness = self._sharpness(values) if sharpness is None else sharpness
+        carried = None
+        if self._weight is not None:
+            slopes, w = terms.by_state is not None, self._weight
+            by_q = w.slopes(x, values) if slopes else None
+            by_parameter = w.by_parameter(x, values, outside) if slopes else {}
+            carried = Carried(w.torque(x, values, outside), by_q, by_parameter)
         for law in self._local:
-            law.add(terms, x, springs, values, float(sharpness[law.joint]))
+            law.add(terms, x, springs, values, float(sharpness[law.joint]), carried)
         for here in self._global:
             self._add_global(terms, here, here.own(values), self._signals(here, x, springs, sharpness), springs)
 
@@ -135,6 +152,21 @@ class EffectTorques:
                 target[:, row] += torque[:, j]
 
 
+@dataclass(frozen=True)
+class Carried:
+    """What gears carry at m samples.
+
+    Attributes:
+        torque: shape (m, n) [N m].
+        by_q: by the positions of the links, shape (m, n, n_link); None where no derivatives are wanted.
+        by_parameter: by free parameters, by index, shape (m, n).
+    """
+
+    torque: Array
+    by_q: Array | None
+    by_parameter: Mapping[int, Array]
+
+
 class _LocalLaw:
     """One effect of one joint."""
 
@@ -150,7 +182,7 @@ class _LocalLaw:
         self.here, self.effect = here, here.effect
         j = self.joint = joints.index(here.owner)
         some = {p.name: p.start for p in here.effect.parameters}
-        self._weight = weight.on(here.owner, here.effect, some)
+        self.on_weight = weight.on(here.owner, here.effect, some) is not None
         laws = [here.effect.law] if here.effect.memory is None else [here.effect.law, here.effect.memory.rate]
         self._used = {law: signals_used(law, some) for law in laws}
         self._q_link = layout.q_link
@@ -172,18 +204,25 @@ class _LocalLaw:
         self._names = {name.rsplit(".", 1)[1]: k for k, name in enumerate(names) if name.startswith(here.parameter(""))}
 
     def add(
-        self, terms: TorqueTerms, x: Array, springs: Springs, values: Mapping[str, float], sharpness: float
+        self,
+        terms: TorqueTerms,
+        x: Array,
+        springs: Springs,
+        values: Mapping[str, float],
+        sharpness: float,
+        carried: Carried | None,
     ) -> None:
         """Adds the torque, and the rate of the memory."""
         j = self.joint
         motion: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
-        load = springs.torque[:, j] if self._weight is None else self._weight.torque(x)[:, j]
+        carried = carried if self.on_weight else None
+        load = springs.torque[:, j] if carried is None else carried.torque[:, j]
         motion |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
         signals = JointSignals(**motion, sharpness=sharpness)
         p = self.here.own(values)
-        self._add_law(terms, self.effect.law, self._rows, signals, p, springs, x)
+        self._add_law(terms, self.effect.law, self._rows, signals, p, springs, carried)
         if self.effect.memory is not None:
-            self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs, x)
+            self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs, carried)
 
     def _add_law(
         self,
@@ -193,7 +232,7 @@ class _LocalLaw:
         signals: JointSignals,
         p: dict[str, float],
         springs: Springs,
-        x: Array,
+        carried: Carried | None,
     ) -> None:
         value = np.real(law(signals, p))
         for row, sign in rows:
@@ -207,10 +246,11 @@ class _LocalLaw:
             slope = np.imag(law(replace(signals, **{name: getattr(signals, name) + 1j * STEP}), p)) / STEP
             if not np.any(slope):
                 continue
-            if name == "tau_spring" and self._weight is not None:
-                by_q = slope[:, None] * self._weight.slopes(x)[:, j]
+            if name == "tau_spring" and carried is not None and carried.by_q is not None:
                 for row, sign in rows:
-                    terms.by_state[:, row, self._q_link] += sign * by_q
+                    terms.by_state[:, row, self._q_link] += sign * slope[:, None] * carried.by_q[:, j]
+                    for index, by in carried.by_parameter.items():
+                        terms.by_parameter[:, row, index] += sign * slope * by[:, j]
                 continue
             for row, sign in rows:
                 self._chain(terms, row, name, sign * slope, springs, j)

@@ -55,7 +55,7 @@ class ElasticJoints:
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
         self._bearings = BearingSprings(robot.effects, layout, self.names)
         self._transmission = Transmission.of(robot, self.names)
-        weight = CarriedWeight(robot)
+        weight = CarriedWeight(robot, self.names)
         self._behind, self._effects = (
             EffectTorques(some, robot.joints, layout, self.names, robot.friction_sharpness, weight)
             for some in parted(robot, self._transmission)
@@ -145,6 +145,25 @@ class ElasticJoints:
         """Torque of each motor per unit of its command, shape (n,) [N m / unit]."""
         return self._motors.of_command(np.ones((1, len(self.layout.joints))), self.named(parameters))[0]
 
+    def torques(
+        self, x: Array, u: Array, parameters: Array, outside: Array | None = None, sharpness: Array | None = None
+    ) -> TorqueTerms:
+        """Torques of everything but the rigid bodies, with derivatives; a command moves no column.
+
+        Args:
+            x: states, shape (m, d).
+            u: commands in their SI unit, shape (m, n).
+            parameters: values of the free parameters, shape (p,).
+            outside: torques of known loads about the joints, for what depends on them, shape (m, n) [N m].
+            sharpness: of the friction, where it is another one than the robot's, shape (n,) [s/rad].
+        """
+        values = self.named(parameters)
+        terms = self._terms(x, values, derivatives=True, outside=outside, sharpness=sharpness)
+        assert terms.by_parameter is not None
+        terms.value[:, self.layout.motor_row] += self._motors.of_command(u, values)
+        self._motors.add_command_slopes(terms.by_parameter, u)
+        return terms
+
     def motor_inertia(self, values: Mapping[str, float]) -> Array:
         """Inertia of each motor, shape (n,) [kg m2]."""
         return self._parameters.of(values, "inertia")
@@ -228,16 +247,23 @@ class ElasticJoints:
         value[:, self._own_motor] /= self.motor_inertia(values)[self._elastic]
         return value, rigid
 
-    def _terms(self, x: Array, values: Mapping[str, float], derivatives: bool) -> TorqueTerms:
+    def _terms(
+        self,
+        x: Array,
+        values: Mapping[str, float],
+        derivatives: bool,
+        outside: Array | None = None,
+        sharpness: Array | None = None,
+    ) -> TorqueTerms:
         """All torques but the command's."""
         terms = TorqueTerms.zeros(len(x), self.layout, len(self.names), derivatives)
         y = self.seen(x, values)
         springs = self._springs.at(y, values)
         self._springs.add(terms, springs)
         if self._transmission is not None:
-            self._behind.add(terms, y, springs, values)
+            self._behind.add(terms, y, springs, values, outside, sharpness)
             self._transmission.carry(terms, x, values)
-        self._motors.add(terms, x, values)
+        self._motors.add(terms, x, values, sharpness)
         self._bearings.add(terms, x, values)
-        self._effects.add(terms, x, springs, values)
+        self._effects.add(terms, x, springs, values, outside, sharpness)
         return terms

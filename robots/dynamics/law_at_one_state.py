@@ -61,7 +61,7 @@ class JointLawAtOneState:
             self._laws.append((here.effect.memory.rate, ((layout.n_link + layout.n_motor + index, 1.0),)))
         self._columns = np.array(columns, dtype=np.intp)
         self._stiffness, self._damping = float(springs.stiffness[j]), float(springs.damping[j])
-        self._weight = CarriedWeight(robot).on(here.owner, here.effect, self._p)
+        self._weight, self._values = CarriedWeight(robot).on(here.owner, here.effect, self._p), values
         self._joint, self._q_link = j, layout.q_link
         # torque of the spring by (q_link, v_link, q_motor, v_motor); a set of signals for each and for the torque
         self._spring = np.array([self._stiffness, self._damping, -self._stiffness, -self._damping])
@@ -71,7 +71,11 @@ class JointLawAtOneState:
     def add(self, x: Array, tau: Array, by_state: Array | None) -> None:
         """Adds the torque, and the rate of the memory; see `LawAtOneState`."""
         own = x[self._columns]
-        load = self._spring @ own[:4] if self._weight is None else self._weight.torque(x[None])[0, self._joint]
+        load = (
+            self._spring @ own[:4]
+            if self._weight is None
+            else self._weight.torque(x[None], self._values)[0, self._joint]
+        )
         signals = np.append(own, load)[:, None]
         if by_state is not None:
             signals = signals + self._moves
@@ -94,12 +98,14 @@ class JointLawAtOneState:
                 continue
             slopes = found[1:].imag / STEP
             by_columns = slopes[:-1].copy()
-            by_columns[:4] += slopes[-1] * self._spring
+            if self._weight is None:
+                by_columns[:4] += slopes[-1] * self._spring
             for row, sign in rows:
                 # a rigid joint has link and motor in the same columns
                 np.add.at(by_state[row], self._columns, sign * by_columns)
                 if self._weight is not None and slopes[-1] != 0.0:
-                    by_state[row, self._q_link] += sign * slopes[-1] * self._weight.slopes(x[None])[0, self._joint]
+                    by_q = self._weight.slopes(x[None], self._values)[0, self._joint]
+                    by_state[row, self._q_link] += sign * slopes[-1] * by_q
 
 
 class LawBehindTransmission:

@@ -55,12 +55,19 @@ class MotorTorques:
         for i, row in enumerate(self._layout.motor_row.tolist()):
             self._parameters.add(by_parameter, self._gain, i, row, slopes[:, i])
 
-    def add(self, terms: TorqueTerms, x: Array, values: Mapping[str, float]) -> None:
-        """Adds friction, and the back-EMF where the command is a voltage, at states of shape (m, d)."""
+    def add(self, terms: TorqueTerms, x: Array, values: Mapping[str, float], sharpness: Array | None = None) -> None:
+        """Adds friction, and the back-EMF where the command is a voltage.
+
+        Args:
+            terms: receives them.
+            x: states, shape (m, d).
+            values: all parameters by full name.
+            sharpness: of the friction, where it is another one than the robot's, shape (n,) [s/rad].
+        """
         layout, parameters = self._layout, self._parameters
         mu = parameters.of(values, "coulomb_torque")
         friction_v = layout.joint_v if self._friction_on_link else layout.motor_v
-        sharpness = self._sharpness(values)
+        sharpness = self._sharpness(values) if sharpness is None else sharpness
         smooth_sign = np.tanh(sharpness * x[:, friction_v])
         k_mi = parameters.of(values, "k_mi") if self._has_back_emf else np.zeros(len(mu))
         v_motor = x[:, layout.motor_v]

@@ -59,6 +59,7 @@ class RatesOfMany:
             self._linear = self._linear + law.linear
         self._laws = [law for law in laws if not law.is_linear]
         self._weight = weight if any(law.needs_weight for law in self._laws) else None
+        self._values = values
 
     def torque_of(self, u: Array) -> Array:
         """Torque of the motors for commands in their SI unit, shape (m, n) [N m]."""
@@ -77,7 +78,7 @@ class RatesOfMany:
         layout = self.layout
         tau = x @ self._linear
         tau[:, layout.motor_row] += command_torque - self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
-        load = None if self._weight is None else self._weight.torque(x)
+        load = None if self._weight is None else self._weight.torque(x, self._values)
         for law in self._laws:
             law.add(x, tau, load)
         n = layout.n_link
@@ -101,7 +102,7 @@ class _LawOfMany:
     """The law of one effect with fixed parameters.
 
     Attributes:
-        needs_weight: whether it asks for the weight that a rigid joint carries.
+        needs_weight: whether it asks for what its gear carries.
         is_linear: whether it is linear in the state, as viscous friction is.
         linear: its torques per state if it is linear, else zero, shape (d, r).
     """
@@ -131,7 +132,7 @@ class _LawOfMany:
         Args:
             x: states, shape (m, d).
             tau: receives them, shape (m, r).
-            load: torque of the weight that rigid joints carry, shape (m, n) [N m]; None where no law needs it.
+            load: torque of the weight that gears carry, shape (m, n) [N m]; None where no law needs it.
         """
         if self._maps is None:
             self._add(x, tau, load)

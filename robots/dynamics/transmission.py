@@ -33,6 +33,9 @@ class Transmission:
     Args:
         robot: its matrix, its parameters and effects.
         names: names of the free parameters.
+
+    Attributes:
+        free: index among the free parameters, row and column of each element that is one.
     """
 
     def __init__(self, robot: Robot, names: tuple[str, ...]):
@@ -41,7 +44,7 @@ class Transmission:
         own, added = elements(robot)
         self._own, self._added = own, added
         places = [(name, place) for part in (own, added) for name, place in part.items()]
-        self._free = [(names.index(name), place) for name, place in places if name in names]
+        self.free = [(names.index(name), place) for name, place in places if name in names]
 
     @staticmethod
     def of(robot: Robot, names: tuple[str, ...] = ()) -> Transmission | None:
@@ -99,7 +102,7 @@ class Transmission:
             return
         terms.by_state[:, rows] = A.T @ terms.by_state[:, rows]
         terms.by_parameter[:, rows] = A.T @ terms.by_parameter[:, rows]
-        for index, (i, j) in self._free:
+        for index, (i, j) in self.free:
             # dA = -A[:, i] A[j, :]; it moves what the laws see and where their torques go
             for columns in (q, v):
                 moved = x[:, columns] @ A[j]
@@ -118,7 +121,8 @@ def parted(robot: Robot, transmission: Transmission | None) -> tuple[list[Effect
 def is_behind(here: EffectAt, robot: Robot) -> bool:
     """Whether an effect acts between the transmission and a motor."""
     if isinstance(here.effect, JointTorque):
-        return here.effect.side != "link" and here.owner in robot.layout.motors
+        own = here.effect.side != "link" and here.effect.load != "weight"
+        return own and here.owner in robot.layout.motors
     return isinstance(here.effect, RobotTorque)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from jointscope.robots.effect_kinds.effect import Effect
 
 SIDES = ("motor", "link", "spring")
+LOADS = ("transmitted", "weight")
 SHARPNESS = 200.0  # [s/rad] of tanh(k v) where the robot file does not say otherwise
 
 
@@ -26,8 +27,8 @@ class JointSignals:
     Attributes:
         q_link, q_motor: positions [rad].
         v_link, v_motor: velocities [rad/s].
-        tau_spring: K (q_link - q_motor) + D (v_link - v_motor) of the base model; of a rigid joint the weight that it
-            carries [N m].
+        tau_spring: load of the gear: K (q_link - q_motor) + D (v_link - v_motor) of the base model; the weight that it
+            carries where the joint is rigid, or the effect asks for it [N m].
         stiffness: K [N m/rad].
         sharpness: k of the base model's friction law [s/rad]; complex while a derivative by it is wanted.
         memory: the effect's own state, if its kind has one.
@@ -79,11 +80,14 @@ class JointTorque(Effect):
         side: "motor": b a_motor = ... + law; "link": M a_link + ... = law; "spring": tau_c = K deflection + ... + law,
             which acts on both sides.
         law: torque [N m], shape (m,), zero at the null values; complex-safe.
+        load: what `tau_spring` of an elastic joint is: the torque that the spring transmits, or the weight behind it,
+            in motor coordinates; a law on the weight does not depend on the link.
         memory: the effect's own state; None for a law without memory.
     """
 
     side: str
     law: Law = field(repr=False)
+    load: str = "transmitted"
     memory: Memory | None = None
 
 

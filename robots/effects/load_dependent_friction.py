@@ -39,6 +39,7 @@ EFFECT = JointTorque(
             "motor_stribeck": "at a reversal speed is low and load is high at once",
             "hysteresis": "both take energy out of every change of the load",
             "torque_constant_error": "while a joint moves one way, friction of its load is a share of its torque",
+            "weight_dependent_friction": "in slow motion the spring transmits the weight and nothing else",
         },
     ),
 )

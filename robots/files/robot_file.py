@@ -19,6 +19,7 @@ from ruamel.yaml import YAML, YAMLError
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EffectError, RobotError
+from jointscope.robots.files.derived_section import derived_results
 from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.noise_section import process_noise
 from jointscope.robots.files.pose_section import check_pose_parameters, pose_setup, with_poses
@@ -109,8 +110,8 @@ def load_robot(name_or_path: str | Path) -> Robot:
     )
     if poses is not None:
         robot = with_poses(robot, poses)
-    robot = replace(robot, held_at_mean=_held_at_mean(top, locked))
-    robot = with_effects(robot, top.texts("effects", ()))
+    robot = with_effects(replace(robot, held_at_mean=_held_at_mean(top, locked)), top.texts("effects", ()))
+    robot = replace(robot, derived=top.section("derived", {}).build(lambda s: derived_results(s, robot)))
     if motion:
         robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")

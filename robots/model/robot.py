@@ -22,6 +22,7 @@ from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
+from jointscope.robots.parts.derived import Derived
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
@@ -58,6 +59,7 @@ class Robot:
         transmission: joint angles per motor angle, q_joint = T q_motor, shape (n, n); None for the identity.
         poses: what is measured of the arm at rest; None where nothing is.
         motion: whether the file describes drives and sensors, too, so that recordings of motion can be used.
+        derived: results in other words and units, which follow from the parameters.
         held_at_mean: joints in `locked` that move in recordings, and are held on the user's word.
         as_filed: the rigid bodies as the file has them, where `tree` is in another posture.
     """
@@ -81,6 +83,7 @@ class Robot:
     transmission: Array | None = None
     poses: PoseSetup | None = None
     motion: bool = True
+    derived: tuple[Derived, ...] = ()
 
     @property
     def n(self) -> int:

@@ -122,6 +122,12 @@ class StructuredTree:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
         return found
 
+    def gravity_by_parameter(self, q: Array, values: Mapping[str, float]) -> dict[str, Array]:
+        """Derivatives of the torques of gravity by parameters that change masses, by name, shape (m, n_link) each."""
+        tree, still = self.bodies(values), np.zeros_like(q)
+        heavier = [change for change in self._changes if np.any(change.direction[:4])]
+        return {change.name: inertia_torque(tree, change, q, still, still, 0.0) for change in heavier}
+
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
         if not (self._changes or self._armature or self._tilt):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.solving.normal_equations import states_of
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
@@ -55,12 +57,19 @@ def with_an_accelerometer():
     return replace(DOGGY, sensors={**DOGGY.sensors, "acc": sensor}, parameters={**DOGGY.parameters, **place})
 
 
+def with_a_weight():
+    """On other bodies: its own weigh nothing about its joints."""
+    urdf = Path(__file__).with_name("mimicking_doggy.urdf")
+    return replace(DOGGY, tree=RigidTree(urdf, DOGGY.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7}))
+
+
 ROBOTS = {
     "doggy": DOGGY,
     "without Coriolis terms": without_coriolis(),
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
     "accelerometer": with_an_accelerometer(),
+    "heavy": with_a_weight(),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 

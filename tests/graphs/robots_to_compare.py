@@ -67,6 +67,7 @@ def _every():
         "joint_elasticity": _rigid(READY, "joint3"),
         "gravity_direction": mimicking(READY, READY.joints),
         "torque_constant_error": _known_drives(READY),
+        "weight_dependent_friction": mimicking(READY, READY.joints),  # its own bodies weigh nothing about its joints
     }
     for effect in catalogue().values():
         if effect.id != "integration_error":  # it is a choice of the rule, not a term of the equations
@@ -90,6 +91,8 @@ def _every():
     laws = ("load_dependent_friction", "spring_cubic", "hysteresis", "link_viscous", "kinematic_coupling")
     yield "coupled joints and laws", reduce(lambda robot, law: _with(catalogue()[law], robot), laws, coupled(READY))
     yield "coupled joints and bearing", _with(bearing, coupled(READY))
+    heavy = coupled(mimicking(READY, READY.joints))
+    yield "coupled joints and weight", _with(catalogue()["weight_dependent_friction"], heavy)
 
 
 ROBOTS = dict(_every())

@@ -17,6 +17,7 @@ from jointscope.tools.report.sections.calibration.mounting import mounting
 from jointscope.tools.report.sections.calibration.noise import noise
 from jointscope.tools.report.sections.calibration.parameters import parameters
 from jointscope.tools.report.sections.calibration.residuals import residuals
+from jointscope.tools.report.sections.calibration.rest_pictures import rest_pictures, rests_of
 from jointscope.tools.report.sections.calibration.states import states
 from jointscope.tools.report.sections.calibration.verdict import verdict
 from jointscope.tools.report.sections.calibration.weak_directions import weak_directions
@@ -37,6 +38,7 @@ def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMIT
         verdict(result),
         *acceptance(checked),
         parameters(result),
+        *rest_pictures(*rests_of(result)),
         mounting(result),
         fits(result),
         commands(result),

@@ -6,6 +6,7 @@ from __future__ import annotations
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
+from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN_FINDINGS = 6  # the report has them all
@@ -15,6 +16,7 @@ SHOWN_DIRECTIONS = 3
 def calibration_text(result: CalibrationResult) -> str:
     """The summary of a calibration for the terminal."""
     parts = [_headline(result), _verdict(result), _parameters(result), _weak_directions(result), _channels(result)]
+    parts.append(rests_beside_motion(result))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -42,7 +44,7 @@ def _verdict(result: CalibrationResult) -> str:
 def _parameters(result: CalibrationResult) -> str:
     with_source = any(p.published is not None for p in result.parameters)
     head = ["parameter", "start", "value", "± sigma", "unit", *(["published"] if with_source else []), ""]
-    rows = [_row(parameter, with_source) for parameter in result.parameters]
+    rows = [_row(parameter, with_source) for parameter in (*result.parameters, *result.derived)]
     return text_table(head, rows, "<>>><" + (">" if with_source else "") + "<")
 
 

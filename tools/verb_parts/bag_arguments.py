@@ -55,7 +55,7 @@ def check_kind(args: argparse.Namespace) -> None:
         "--holdout-share": args.holdout_share is not None,
         "--leave-out": bool(args.leave_out),
     }
-    check_one_kind(args.bags, args.poses, of_motion)
+    check_one_kind(args.bags, args.poses, None, of_motion)
     if args.holdout_poses and not args.poses:
         raise RecordingError("--holdout-poses goes with --poses")
 

@@ -43,27 +43,42 @@ def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_one_kind(bags: Sequence[Path], poses: Sequence[Path], options: Mapping[str, bool]) -> None:
-    """One kind of recording, and no option of the other.
+def check_one_kind(
+    bags: Sequence[Path], poses: Sequence[Path], rests: Sequence[Path] | None, options: Mapping[str, bool]
+) -> None:
+    """Kinds of recordings that go together, and no option of another.
 
     Args:
         bags: as given.
         poses: as given.
+        rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
 
     Raises:
-        RecordingError: none, both, or such an option with poses.
+        RecordingError: none, kinds that do not go together, or such an option without motion.
     """
-    if not bags and not poses:
-        raise RecordingError("nothing to calibrate from; expected BAG... before the first option, or --poses FILE")
+    if not bags and not poses and not rests:
+        other = "" if rests is None else ", or --rests BAG"
+        raise RecordingError(
+            f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
+        )
+    if poses and rests:
+        raise RecordingError(
+            "poses and rests in one estimate are not on the command line yet; from Python: "
+            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...), RestSet(...)]), see docs/poses.md"
+        )
+    twice = next((path for path in bags if path in (rests or ())), None)
+    if twice is not None:
+        raise RecordingError(f"{twice} is given as motion and as rests; leave it out once")
     if bags and poses:
         raise RecordingError(
             "recordings of motion and poses in one estimate are not on the command line yet; from Python: "
             "jointscope.calibrate(robot, recordings, sets=[PoseSet(...)]), see docs/poses.md"
         )
     given = next((option for option, there in options.items() if there), None)
-    if poses and given:
-        raise RecordingError(f"{given} is for recordings of motion; leave it out with --poses")
+    if given and not bags:
+        other = "--poses" if poses else "--rests"
+        raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
 
 
 def run_pose_calibration(

@@ -184,9 +184,17 @@ def provenance(result: Any) -> dict[str, Any]:
     """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
     return {
         **origin(result.start.path.name, [bag.recording for bag in result.bags]),
+        **other_kinds(result),
         "samples": int(result.samples),
         "cost": float(result.cost),
     }
+
+
+def other_kinds(result: Any) -> dict[str, Any]:
+    """Rests that a calibration used beside motion."""
+    rests = [problem.rests for problem, _ in result.sets if problem.kind == "rests"]
+    found = [{"path": each.path, "sha256": each.sha256, "count": len(each)} for each in rests]
+    return {"rests": found} if found else {}
 
 
 def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from jointscope.tools.presentation.left_out import add_leave_out_option, leave_o
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
+from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration, weighted_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
@@ -21,6 +22,7 @@ from jointscope.tools.writing.whole_file import check_outputs
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
   jointscope calibrate tx90l --poses poses.csv -o arm.yaml --urdf arm.urdf --report arm.html
+  jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
 takes as ROBOT."""
@@ -51,6 +53,7 @@ def add_parser(subparsers: Any) -> None:
         help="stretch after stretch by iSAM2, saying what is known after each; ends where the batch ends",
     )
     add_poses_option(parser)
+    add_rests_option(parser)
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
     add_accept_option(parser)
     add_leave_out_option(parser)
@@ -65,7 +68,9 @@ def run(args: argparse.Namespace) -> int:
         raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
     files = ResultFiles.of(args)
     _check_kinds(args)
-    check_outputs([*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.effects])
+    check_outputs(
+        [*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.rests, *args.effects]
+    )
     from jointscope.graphs.calibration.calibrate import calibrate
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
@@ -80,6 +85,12 @@ def run(args: argparse.Namespace) -> int:
             text, checked = run_pose_calibration(robot, args.poses, files, args.urdf, limits, progress)
         print(text)
         print(f"\nWrote {', '.join(map(str, [*files.all, *filter(None, [args.urdf])]))}")
+        return print_acceptance(checked)
+    if args.rests and not args.bags:
+        with progress_bar() as progress:
+            text, checked = run_rest_calibration(robot, args.rests, files, limits, progress)
+        print(text)
+        print(f"\nWrote {', '.join(map(str, files.all))}")
         return print_acceptance(checked)
     if robot.free_links and (args.incremental or args.solver != "condensed"):
         raise SolveError(
@@ -98,7 +109,8 @@ def run(args: argparse.Namespace) -> int:
             text, checked = run_free_links(robot, recordings, None, files, False, progress), NO_LIMITS
         else:
             seen = None if args.incremental else progress  # what is printed and a bar would write into each other
-            result = calibrate(robot, recordings, solver=_solver(args, robot), progress=seen)
+            rests = weighted_rests(robot, args.rests, progress)
+            result = calibrate(robot, recordings, solver=_solver(args, robot), sets=rests, progress=seen)
             if files.report is not None or files.rrd is not None:
                 progress("writing", 1.0)
             checked = check_models(limits, {robot.name: result.to_json()})
@@ -123,7 +135,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--solver samples": args.solver == "samples",
         "--leave-out": bool(args.leave_out),
     }
-    check_one_kind(args.bags, args.poses, of_motion)
+    check_one_kind(args.bags, args.poses, args.rests, of_motion)
     if args.urdf is not None and not args.poses:
         raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
 

@@ -15,6 +15,7 @@ from jointscope.tools.presentation.left_out import add_leave_out_option, leave_o
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
+from jointscope.tools.verb_parts.rest_runs import add_rests_option, compare_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_comparison
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
@@ -37,6 +38,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_models_and_bag(parser)
     add_poses_option(parser)
+    add_rests_option(parser)
     add_accept_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
@@ -59,14 +61,19 @@ def run(args: argparse.Namespace) -> int:
     """Compares, writes the files, and says what was found."""
     files = ResultFiles.of(args)
     poses: list[Path] = getattr(args, "poses", [])
-    if not poses:
+    rests: list[Path] = getattr(args, "rests", [])
+    if poses and rests:
+        raise RobotError("poses and rests are compared one after the other; leave one out")
+    if not poses and not rests:
         *args.robots, bag = args.robots
         args.bag = Path(bag)
         if not args.robots:
             args.parser.error(f"expected ROBOT... BAG, got {bag} alone; to compare on poses: --poses TABLE-or-BAG")
     names = labels(args.robots)
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
-    check_outputs(files.all, inputs=[*([] if poses else [args.bag]), *poses, *robot_files, *args.effects])
+    check_outputs(
+        files.all, inputs=[*([] if poses or rests else [args.bag]), *poses, *rests, *robot_files, *args.effects]
+    )
     from jointscope.graphs.comparison.compare import compare
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
@@ -77,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
     if poses:
         return _on_poses(robots, poses, files, limits)
+    if rests:
+        return _on_rests(robots, rests, files, limits)
     check_same_streams(robots)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
@@ -99,6 +108,23 @@ def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles,
     if files.pictures:
         raise RobotError("pictures of poses come with `jointscope calibrate ROBOT --poses ... --report F.html`")
     text, content = compare_poses(robots, poses)
+    checked = check_models(limits, content["models"])
+    if files.json is not None:
+        write_json(files.json, content | acceptance_json(checked))
+    print(text)
+    return print_acceptance(checked)
+
+
+def _on_rests(robots: dict[str, Any], rests: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
+    """Compares the models on rests.
+
+    Raises:
+        RobotError: pictures were asked for.
+    """
+    if files.pictures:
+        raise RobotError("pictures of rests come with `jointscope calibrate ROBOT --rests ... --report F.html`")
+    with progress_bar() as progress:
+        text, content = compare_rests(robots, rests, progress)
     checked = check_models(limits, content["models"])
     if files.json is not None:
         write_json(files.json, content | acceptance_json(checked))

@@ -25,6 +25,8 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     j = s.robot.joints.index(hypothesis.here.owner)
     x = s.seen if is_behind(hypothesis.here, s.robot) else s.x
     signals = joint_signals(s, j, x)
+    if effect.load == "weight":
+        signals = replace(signals, tau_spring=s.weight[:, j])
     p = null_values(hypothesis)
     if effect.memory is not None:
         signals = signals_with_memory(effect, signals, p, s.ticks)

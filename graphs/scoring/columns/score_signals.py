@@ -40,6 +40,7 @@ class ScoreSignals:
         response: accelerations per unit of each command, shape (m, r, n).
         stiffness, damping: of every joint, shape (n,); zero for rigid ones.
         tau_spring: shape (m + 1, n) [N m]; of rigid joints the weight that they carry.
+        weight: what every gear carries, shape (m + 1, n) [N m].
         inertia: of each motor, shape (n,) [kg m2].
         shared: what hypotheses that differ in their shapes alone have in common, by label; they fill it.
     """
@@ -60,6 +61,7 @@ class ScoreSignals:
     stiffness: Array
     damping: Array
     tau_spring: Array
+    weight: Array
     inertia: Array
     shared: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -73,6 +75,7 @@ class ScoreSignals:
         both = np.vstack([u, u[-1:]])
         here = model.with_derivatives(x, both, parameters)
         springs, transmission = model.springs(x, values), Transmission.of(problem.robot)
+        weight = CarriedWeight(problem.robot).torque(x, values)
         return ScoreSignals(
             robot=problem.robot.with_values(values),
             model=model,
@@ -89,7 +92,8 @@ class ScoreSignals:
             response=model.command_response(here, parameters)[:-1],
             stiffness=springs.stiffness,
             damping=springs.damping,
-            tau_spring=springs.torque + CarriedWeight(problem.robot).torque(x),
+            tau_spring=np.where(springs.stiffness > 0.0, springs.torque, weight),
+            weight=weight,
             inertia=model.motor_inertia(values),
         )
 

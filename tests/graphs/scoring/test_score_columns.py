@@ -30,6 +30,7 @@ CASES += one_hypothesis_each("accelerometer", ("motor_viscous", "link_viscous", 
 CASES += one_hypothesis_each(
     "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
 )
+CASES += one_hypothesis_each("heavy", ("weight_dependent_friction",))
 
 
 def test_every_effect_has_a_case():

@@ -23,7 +23,7 @@ DOGGY = load_robot("doggy")
 T = np.array([[1.1, 0.0, 0.0], [0.3, 0.9, 0.0], [-0.1, 0.25, 1.0]])
 EFFECTS = {
     "load_dependent_friction@joint2": {"coefficient": 0.25},
-    "spring_cubic@joint3": {"stiffness": 2e4},
+    "spring_curve@joint3": {"quadratic": 600.0, "cubic": 2e4},
     "link_viscous@joint1": {"coefficient": 1.0},
     "kinematic_coupling@joint3": {"from_joint1": 0.05, "from_joint2": 0.0},
     "kinematic_coupling@joint1": {"from_joint2": -0.04, "from_joint3": 0.0},

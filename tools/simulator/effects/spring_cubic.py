@@ -6,11 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-
-from jointscope.robots.errors import SimulationError
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import add_tendon
+from jointscope.tools.simulator.world.specification import add_tendon, set_curve
 
 
 class SpringCubic(SimulatedEffect):
@@ -24,6 +21,4 @@ class SpringCubic(SimulatedEffect):
     def edit(self, spec: Any) -> None:
         """Adds a tendon between link and rotor whose stiffness is cubic only."""
         tendon = add_tendon(spec, f"{self.owner}.cubic_spring", self.owner, self.shares[self.owner])
-        if np.size(tendon.stiffness) != 3:
-            raise SimulationError("effect spring_cubic needs MuJoCo 4: pip install --upgrade 'jointscope[sim]'")
-        tendon.stiffness[:] = [0.0, 0.0, self.parameters["stiffness"]]
+        set_curve(tendon, self.id, 0.0, self.parameters["stiffness"])

@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import joint_motion_axis
 from jointscope.tools.simulator.world.inertia import full_inertia
@@ -232,6 +233,17 @@ def set_linear(element: Any, name: str, value: float) -> None:
         getattr(element, name)[:] = [value, 0.0, 0.0]
     else:
         setattr(element, name, value)
+
+
+def set_curve(tendon: Any, effect: str, quadratic: float, cubic: float) -> None:
+    """Gives a tendon the torque quadratic d^2 + cubic d^3.
+
+    Raises:
+        SimulationError: an engine that knows linear springs only.
+    """
+    if np.size(tendon.stiffness) != 3:
+        raise SimulationError(f"effect {effect} needs MuJoCo 4: pip install --upgrade 'jointscope[sim]'")
+    tendon.stiffness[:] = [0.0, quadratic, cubic]
 
 
 def add_linear(element: Any, name: str, value: float) -> None:

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Dry friction at rest: the torque y that it holds is anywhere within its band [-s, s], known up to noise.
+
+    L(y | s) = (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s)
+
+Its logarithm pulls s down, and each y outside pushes it up. It is no sum of squares: the cost is
+
+    c = -log(L sigma sqrt(2 pi)) >= 0
+
+with its gradient, and in place of the second derivatives, which vanish inside the band, the information that one rest
+gives on average (Fisher scoring). The largest y of many rests, as Ho and Kisner, eq. (46), take it, is the limit for
+small sigma; it is too small where there are few rests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, ndtr
+
+Array = NDArray[np.float64]
+LOG_2PI = float(np.log(2.0 * np.pi))
+RATIOS = np.geomspace(1e-2, 1e4, 61)  # s / sigma of the table of information
+NODES = 4001  # of the integrals behind it
+
+
+@dataclass(frozen=True)
+class BandCost:
+    """Cost of m torques and its derivatives, shape (m,) each.
+
+    Attributes:
+        cost: never negative.
+        by_torque, by_half: gradient by y and by s [1/(N m)].
+        torque_information, half_information: expected second derivatives [1/(N m)^2]; the mixed one is zero.
+    """
+
+    cost: Array
+    by_torque: Array
+    by_half: Array
+    torque_information: Array
+    half_information: Array
+
+
+def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
+    """Cost of torques within bands.
+
+    Args:
+        y: torques less the middle of their bands, shape (m,) [N m].
+        half: half widths s > 0, shape (m,) [N m].
+        sigma: noise of the torques, shape (m,) [N m].
+    """
+    a, b = (y + half) / sigma, (y - half) / sigma
+    # Phi(a) - Phi(b) on the side where both are small, without losing digits in the tails
+    log_p = _log_difference(np.where(y > 0.0, -b, a), np.where(y > 0.0, -a, b))
+    cost = np.log(2.0 * half / sigma) - log_p - 0.5 * LOG_2PI
+    phi_a, phi_b = (np.exp(-0.5 * z * z - 0.5 * LOG_2PI - log_p) for z in (a, b))
+    by_torque = -(phi_a - phi_b) / sigma
+    by_half = -(phi_a + phi_b) / sigma + 1.0 / half
+    log_ratio = np.log(np.clip(half / sigma, RATIOS[0], RATIOS[-1]))
+    of_y, of_s = (np.interp(log_ratio, np.log(RATIOS), part) for part in _information())
+    return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2)
+
+
+def _log_difference(upper: Array, lower: Array) -> Array:
+    """log(Phi(upper) - Phi(lower)) for upper > lower, of which the lower one is negative where both are far out."""
+    log_upper, log_lower = log_ndtr(upper), log_ndtr(lower)
+    return np.asarray(log_upper + np.log1p(-np.exp(np.minimum(log_lower - log_upper, -1e-300))))
+
+
+@cache
+def _information() -> tuple[Array, Array]:
+    """Logarithm of sigma^2 times the information on y and on s, at RATIOS."""
+    of_y, of_s = [], []
+    for s in RATIOS:
+        edge = np.linspace(-10.0, 10.0, NODES)
+        y = np.unique(np.concatenate([edge + s, edge - s, np.linspace(-s - 10.0, s + 10.0, NODES)]))
+        upper, lower = np.exp(-0.5 * (y + s) ** 2), np.exp(-0.5 * (y - s) ** 2)
+        upper, lower = upper / np.sqrt(2.0 * np.pi), lower / np.sqrt(2.0 * np.pi)
+        p = np.where(y > 0.0, ndtr(s - y) - ndtr(-s - y), ndtr(y + s) - ndtr(y - s))
+        kept = p > 1e-300
+        score_y = np.where(kept, (upper - lower) / np.where(kept, p, 1.0), 0.0)
+        score_s = np.where(kept, (upper + lower) / np.where(kept, p, 1.0), 0.0) - 1.0 / s
+        of_y.append(np.trapezoid(score_y**2 * p, y) / (2.0 * s))
+        of_s.append(np.trapezoid(score_s**2 * p, y) / (2.0 * s))
+    return np.log(of_y), np.log(of_s)

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Springs, friction bands and weights from rests alone, with sigmas; what rests say nothing of stays as it is.
+
+Bands have sharp edges, and a solver that begins far off sees none of them: the edges are blunt at first. How well link
+encoders repeat is found from the residuals, never better than they say themselves.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.calibration.calibration_summary import dynamic_parameters
+from jointscope.graphs.calibration.derived_results import derived_results
+from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.posterior import posteriors
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.errors import SolveError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.rests import Rests
+
+Array = NDArray[np.float64]
+EDGES = (1.0, 0.2, EDGE)  # of the friction: blur of the bands' edges, stage by stage
+PASSES = 6  # of the repeatability
+AGREES = 0.05  # relative change of it that asks for no further pass
+MOST_ITERATIONS = 150
+TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
+
+
+@dataclass(frozen=True)
+class RestCalibration:
+    """Result of a calibration from rests.
+
+    Attributes:
+        robot: with the values that were found and their sigmas.
+        start: before.
+        problems: the rests of each recording, with their weights.
+        states: where links and motors stand, shape (m, d) each.
+        parameters: of which the rests say anything.
+        derived: what follows from them.
+        silent: names of the parameters of which they say nothing.
+        covariance: of the values of all free parameters, shape (p, p).
+        before, errors: of each recording, at the start values and at those found.
+        iterations: of all stages.
+        cost: at the end.
+        wall_seconds: of the whole.
+    """
+
+    robot: Robot
+    start: Robot
+    problems: tuple[RestSet, ...]
+    states: tuple[Array, ...]
+    parameters: tuple[ParameterEstimate, ...]
+    derived: tuple[ParameterEstimate, ...]
+    silent: tuple[str, ...]
+    covariance: Array
+    before: RestErrors
+    errors: RestErrors
+    iterations: int
+    cost: float
+    wall_seconds: float
+
+    @property
+    def sets(self) -> tuple[tuple[RestSet, Array], ...]:
+        """The rests of each recording with their states, as a calibration with motion has them."""
+        return tuple(zip(self.problems, self.states, strict=True))
+
+    @property
+    def count(self) -> int:
+        """Number of rests."""
+        return sum(len(problem.rests) for problem in self.problems)
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of `--json`."""
+        table = {p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit} for p in self.parameters}
+        derived = {p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit, "derived": True} for p in self.derived}
+        return {
+            "converged": True,
+            "iterations": self.iterations,
+            "samples": sum(problem.measured for problem in self.problems),
+            "rests": self.count,
+            "wall_seconds": self.wall_seconds,
+            "cost": self.cost,
+            "parameters": table | derived,
+            "undetermined": list(self.silent),
+            "repeatability": dict(zip(self.robot.joints, self.problems[0].repeatability.tolist(), strict=True)),
+            "channels": self.errors.to_json(self.robot),
+        }
+
+
+@in_solver_context
+def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None) -> RestCalibration:
+    """Calibrates a robot from rests.
+
+    Args:
+        robot: with start values and priors.
+        recordings: rests of each.
+        progress: called with a text and the share done.
+
+    Raises:
+        SolveError: no convergence.
+    """
+    began, report = time.perf_counter(), progress or (lambda text, share: None)
+    problems, solution, iterations = settled_rests(robot, recordings, report)
+    _, covariance = posteriors(list(problems), solution)
+    calibration = solution.estimate.calibrations[0]
+    index = calibration.columns[DYNAMICS]
+    sigmas, scale = np.sqrt(np.diag(covariance)[index]), calibration.value_by_coordinate
+    table = dynamic_parameters(robot, calibration, sigmas)
+    priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
+    told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
+    known = {p.name for p in told}
+    found = robot.with_values({p.name: p.value for p in told})
+    parameters = {n: replace(p, sigma=next(t.sigma for t in told if t.name == n)) if n in known else p
+                  for n, p in found.parameters.items()}  # fmt: skip
+    found = replace(found, parameters=parameters)
+    derived = [
+        p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
+        if set(result.of) <= known
+    ]  # fmt: skip
+    report("done", 1.0)
+    return RestCalibration(
+        robot=found,
+        start=robot,
+        problems=tuple(problems),
+        states=tuple(solution.estimate.states),
+        parameters=tuple(told),
+        derived=tuple(derived),
+        silent=tuple(p.name for p in table if p.name not in known),
+        covariance=covariance[index, index] * np.outer(scale, scale),
+        before=rest_errors([problem.of_robot(robot) for problem in problems]),
+        errors=rest_errors([problem.of_robot(found) for problem in problems]),
+        iterations=iterations,
+        cost=solution.cost,
+        wall_seconds=time.perf_counter() - began,
+    )
+
+
+def settled_rests(robot: Robot, recordings: Sequence[Rests], report: Progress) -> tuple[list[RestSet], Solution, int]:
+    """Rests with the weights that they deserve, their solution, and the iterations that it took."""
+    problems = [RestSet.of(robot, rests) for rests in recordings]
+    starts = [problem.start(Calibration.of(robot)) for problem in problems]
+    estimate, iterations = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts)), 0
+    for k, edge in enumerate((*EDGES, *[EDGE] * PASSES)):
+        problems = [replace(problem, edge=edge) for problem in problems]
+        solution = solve(problems, estimate, max_iterations=MOST_ITERATIONS)
+        estimate, iterations = solution.estimate, iterations + len(solution.iterations)
+        report(f"rests, pass {k + 1}, cost {solution.cost:.6g}", min((k + 1) / 6.0, 0.95))
+        if not (solution.converged or solution.flat):
+            raise SolveError(
+                f"no convergence after {len(solution.iterations)} iterations over "
+                f"{sum(len(problem.rests) for problem in problems)} rests; loads, units, signs or names may be wrong: "
+                "look at what `jointscope compare ROBOT --rests BAG` says"
+            )
+        scale = _repeatability(problems, solution)
+        agrees = np.all(np.abs(np.log(scale / problems[0].repeatability)) < AGREES)
+        if edge == EDGE and agrees:
+            break
+        problems = [replace(problem, repeatability=scale) for problem in problems]
+    return problems, solution, iterations
+
+
+def _repeatability(problems: Sequence[RestSet], solution: Solution) -> Array:
+    """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
+    residuals = np.concatenate([p.residuals(x) for p, x in zip(problems, solution.estimate.states, strict=True)])
+    size = np.sqrt(np.mean(residuals**2, axis=0))
+    return np.maximum(problems[0].repeatability * size, 1.0)

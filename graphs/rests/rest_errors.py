@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How well a robot says where its links come to rest, from its motors and the loads alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RestErrors:
+    """Errors of m rests.
+
+    Attributes:
+        position: links measured less predicted, shape (m, n) [rad]; zero without link encoders.
+        residual: the same in sigmas of each rest.
+        torque: torques that are missing for equilibrium where links and motors were measured, shape (m, n) [N m].
+        friction: what friction holds beyond its band, of motors that had moved, shape (m, n) [N m].
+    """
+
+    position: Array
+    residual: Array
+    torque: Array
+    friction: Array
+
+    @property
+    def error(self) -> float:
+        """Root mean square residual [sigma]; 1 is expected."""
+        return _rms(self.residual)
+
+    def to_json(self, robot: Robot) -> dict[str, Any]:
+        """By channel of the link encoders, and torques by joint."""
+        return {
+            f"{joint}.link_position": {"rmse": _rms(self.position[:, i]), "chi2": _rms(self.residual[:, i]) ** 2}
+            for i, joint in enumerate(robot.joints)
+        }
+
+    def torques(self, robot: Robot) -> dict[str, float]:
+        """Root mean square missing torque of each joint [N m]."""
+        return {joint: _rms(self.torque[:, i]) for i, joint in enumerate(robot.joints)}
+
+    def beyond(self, robot: Robot) -> dict[str, float]:
+        """Largest torque of each joint that friction would have to hold beyond its band [N m]."""
+        largest = self.friction.max(axis=0, initial=0.0)
+        return {joint: float(largest[i]) for i, joint in enumerate(robot.joints)}
+
+
+def rest_errors(problems: Sequence[RestSet]) -> RestErrors:
+    """Errors of the robot's own values; nothing is fitted."""
+    found = [_of(problem) for problem in problems]
+    return RestErrors(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _of(problem: RestSet) -> tuple[Array, Array, Array, Array]:
+    robot, rests = problem.robot, problem.rests
+    measured, calibration = problem.start(Calibration.of(robot))
+    predicted = problem.predicted()
+    columns = robot.layout.joint_link
+    seen = np.zeros_like(rests.q_motor) if rests.q_link is None else rests.q_link - predicted[:, columns]
+    torques = problem.torques(measured, calibration)
+    missing = np.zeros((len(rests), robot.layout.n_link))
+    missing[:, problem.held] = torques.links.value
+    beyond = np.abs(torques.motors.value - torques.middle.value) - torques.half.value
+    friction = np.where(rests.moved, np.maximum(beyond, 0.0), 0.0)
+    # how far motors are off moves the links as well
+    motor, link = problem.encoder_sigmas()
+    sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
+    return seen, seen / sigma, missing[:, columns], friction
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2))) if x.size else 0.0

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All rests of one recording as one set of states: where links and motors stand in each.
+
+    encoders    q_measured = q + noise                                         scatter and repeatability of each rest
+    links       0 = -g(q) + J^T F - A^T tau_c(delta) + effects
+    motors      y = tau_motor(u) + tau_c(delta) + effects within the band of dry friction (factors/friction_band.py)
+
+A motor that has not moved since the last rest stands where it stood for another reason: it says nothing of its band. A
+rigid joint has one coordinate, which its motor's band holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.friction_band import band_cost
+from jointscope.graphs.solving.independent_states import of_independent_states
+from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.graphs.solving.whole_set import WholeSet
+from jointscope.robots.bodies.known_loads import known_loads
+from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes, at_rest
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.dynamics.transmission import joint_angles
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.rests import Rests
+
+Array = NDArray[np.float64]
+EXACT = 1e-4  # of the largest torque that a coordinate carries: how well equilibrium holds
+EDGE = 0.02  # no friction repeats better
+SMALLEST_BAND = 1e-6  # [N m] half width at which a band is a line
+
+
+@dataclass(frozen=True)
+class RestSet:
+    """Rests as the solver sees them (`SetProblem`).
+
+    Attributes:
+        robot: the model.
+        rests: the rests.
+        repeatability: factor on the sigmas of the link encoders, shape (n,).
+        torque_scale: what torques on links are compared with, shape (n_link,) [N m].
+        friction_scale: the same for what friction holds, shape (n,) [N m].
+        edge: of its friction, what the edges of a motor's band are blurred by.
+        owner: number of the recording; None for a whole one.
+    """
+
+    robot: Robot
+    rests: Rests
+    repeatability: Array
+    torque_scale: Array
+    friction_scale: Array
+    edge: float = EDGE
+    owner: int | None = None
+
+    kind: str = field(default="rests", init=False)
+    priors: tuple[()] = field(default=(), init=False)
+
+    @staticmethod
+    def of(robot: Robot, rests: Rests) -> RestSet:
+        """With scales from the start values of the robot."""
+        robot.need_link_dynamics()
+        ones = np.ones(robot.n)
+        plain = RestSet(robot, rests, ones, np.ones(robot.layout.n_link), ones)
+        x, calibration = plain.start(Calibration.of(robot))
+        q, tree = x[:, robot.layout.q_link], robot.kinematic_tree
+        loads = known_loads(tree, rests.links, rests.forces, q)
+        carried = np.abs(loads.torque - tree.torque(q, 0.0 * q, 0.0 * q)).max(axis=0)
+        moved = np.where(rests.moved, np.abs(plain.torques(x, calibration).motors.value), np.nan)
+        held = np.array([np.nanmedian(column) if np.any(np.isfinite(column)) else 1.0 for column in moved.T])
+        largest = max(float(carried.max()), 1e-9)
+        return replace(plain, torque_scale=np.maximum(carried, 1e-2 * largest), friction_scale=np.maximum(held, 1e-9))
+
+    @property
+    def measured(self) -> int:
+        """Number of measured values: positions, and torques that friction holds."""
+        encoders = self.robot.n + self.robot.layout.n_motor if self.rests.q_link is not None else self.robot.n
+        return len(self.rests) * encoders + int(self.rests.moved.sum())
+
+    def of_robot(self, robot: Robot) -> RestSet:
+        """The same rests of a robot with other values or effects."""
+        return replace(self, robot=robot)
+
+    @cached_property
+    def held(self) -> list[int]:
+        """Link coordinates that no motor turns itself, the rows of `AtRest.links`."""
+        return [row for row in range(self.robot.layout.n_link) if row not in self.robot.layout.motor_row]
+
+    @cached_property
+    def model(self) -> ElasticJoints:
+        """Equations of motion."""
+        return ElasticJoints(self.robot)
+
+    def start(self, common: Calibration) -> tuple[Array, Calibration]:
+        """Where the encoders say."""
+        layout, rests = self.robot.layout, self.rests
+        q_link = joint_angles(self.robot, rests.q_motor) if rests.q_link is None else rests.q_link
+        x = np.zeros((len(rests), layout.size))
+        x[:, layout.motor_q] = rests.q_motor
+        x[:, layout.joint_q] = q_link
+        return x[:, layout.positions], common.only([DYNAMICS])
+
+    def torques(self, x: Array, calibration: Calibration) -> AtRest:
+        """What holds the robot at positions of shape (m, d)."""
+        q = x[:, self.robot.layout.q_link]
+        loads = known_loads(self.robot.kinematic_tree, self.rests.links, self.rests.forces, q)
+        return at_rest(self.model, x, self.rests.u, calibration.values, loads)
+
+    def encoder_sigmas(self) -> tuple[Array, Array]:
+        """Of the means of motor and link encoders in each rest, shape (m, n) each [rad]."""
+        robot, rests = self.robot, self.rests
+        motor = np.hypot(robot.motor_encoder.sigmas, rests.motor_scatter)
+        if robot.link_encoder is None:
+            return motor, np.full_like(motor, np.inf)
+        return motor, self.repeatability * np.hypot(robot.link_encoder.sigmas, rests.link_scatter)
+
+    def residuals(self, x: Array) -> Array:
+        """Links measured less where they are in equilibrium, in sigmas, shape (m, n); zero without encoders."""
+        if self.rests.q_link is None:
+            return np.zeros_like(self.rests.q_motor)
+        return (self.rests.q_link - x[:, self.robot.layout.joint_link]) / self.encoder_sigmas()[1]
+
+    def predicted(self) -> Array:
+        """Positions that the robot's own values say from motors and loads, no link encoder read, shape (m, d)."""
+        blind = replace(self, rests=replace(self.rests, q_link=None))
+        x, calibration = self.start(Calibration.of(self.robot))
+        return WholeSet(blind, x, calibration, ()).states
+
+    def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
+        """Normal equations at positions of shape (m, d)."""
+        torques = self.torques(x, calibration)
+        parts = [*self._encoders(x, calibration), self._links(torques, calibration)]
+        r, J, P = (np.hstack([part[i] for part in parts]) for i in range(3))
+        costs = 0.5 * np.sum(r**2, axis=1)
+        of_bands, band_costs = self._bands(torques, calibration)
+        r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
+        return of_independent_states(r, J, P, costs + band_costs)
+
+    def _encoders(self, x: Array, calibration: Calibration) -> list[tuple[Array, Array, Array]]:
+        layout, rests = self.robot.layout, self.rests
+        place = {int(column): k for k, column in enumerate(layout.positions)}
+        found, sigmas = [], self.encoder_sigmas()
+        pairs = [(rests.q_motor, layout.motor_q, sigmas[0])]
+        if rests.q_link is not None:
+            pairs.append((rests.q_link, layout.joint_q, sigmas[1]))
+        for measured, columns, sigma in pairs:
+            own = [place[int(column)] for column in columns]
+            J = np.eye(x.shape[1])[own] / sigma[:, :, None]
+            found.append(((x[:, own] - measured) / sigma, J, np.zeros((*sigma.shape, calibration.size))))
+        return found
+
+    def _links(self, torques: AtRest, calibration: Calibration) -> tuple[Array, Array, Array]:
+        sigma = EXACT * self.torque_scale[self.held]
+        return self._scaled(torques.links, 1.0 / np.broadcast_to(sigma, torques.links.value.shape), calibration)
+
+    def _bands(self, torques: AtRest, calibration: Calibration) -> tuple[tuple[Array, Array, Array], Array]:
+        """Rows that have the gradient and the information of what friction holds, and its cost, shape (m,)."""
+        y, half = torques.motors.value - torques.middle.value, np.maximum(torques.half.value, SMALLEST_BAND)
+        gain = np.abs(self.model.drive_gain(calibration.values))
+        sigma = np.hypot(self.edge * self.friction_scale, gain * self.rests.u_scatter)
+        found = band_cost(y, half, sigma)
+        counts = self.rests.moved.astype(float)
+        difference = WithSlopes(
+            y,
+            torques.motors.by_position - torques.middle.by_position,
+            torques.motors.by_parameter - torques.middle.by_parameter,
+        )
+        rows = []
+        for part, gradient, information in (
+            (difference, found.by_torque, found.torque_information),
+            (torques.half, found.by_half, found.half_information),
+        ):
+            weight = counts * np.sqrt(information)
+            _, J, P = self._scaled(part, weight, calibration)
+            rows.append((counts * gradient / np.sqrt(information), J, P))
+        r, J, P = (np.hstack([row[i] for row in rows]) for i in range(3))
+        return (r, J, P), np.sum(counts * found.cost, axis=1)
+
+    def _scaled(self, part: WithSlopes, weight: Array, calibration: Calibration) -> tuple[Array, Array, Array]:
+        """Residuals with derivatives by positions and by the calibration's coordinates."""
+        P = np.zeros((*part.value.shape, calibration.size))
+        P[:, :, calibration.columns[DYNAMICS]] = part.by_parameter * calibration.value_by_coordinate
+        wide = weight[:, :, None]
+        return part.value * weight, part.by_position * wide, P * wide

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot that stands: what holds its links and motors, and the band within which dry friction holds a motor.
+
+    links       0 = -g(q) + J^T F - A^T tau_c(delta) + effects
+    motors      y = tau_motor(u) + tau_c(delta) + effects,    y + friction = 0,    low <= y <= high
+
+Laws are those of motion at v = 0. The band is what dry friction is just before the motor slips one way or the other:
+the same laws at a speed that is nearly nothing, with a friction that turns over at once, so that every law of friction
+that depends on load, position or direction says its band by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.bodies.known_loads import KnownLoads
+from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.dynamics.torque_terms import TorqueTerms
+from jointscope.robots.parts.state_layout import Columns
+
+Array = NDArray[np.float64]
+SLIPPING, AT_ONCE = 1e-9, 1e12  # [rad/s] and [s/rad]: their product is far beyond where tanh is one
+
+
+@dataclass(frozen=True)
+class WithSlopes:
+    """Torques with derivatives.
+
+    Attributes:
+        value: shape (m, k) [N m].
+        by_position: by the positions, link before motor, shape (m, k, d).
+        by_parameter: by the free parameters, shape (m, k, p).
+    """
+
+    value: Array
+    by_position: Array
+    by_parameter: Array
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """What holds a robot at m rests.
+
+    Attributes:
+        links: torques on link coordinates that no motor turns itself, which vanish in equilibrium, k = number of them.
+        motors: y, what friction has to hold, k = n.
+        middle, half: of the band of y, k = n.
+    """
+
+    links: WithSlopes
+    motors: WithSlopes
+    middle: WithSlopes
+    half: WithSlopes
+
+
+def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads) -> AtRest:
+    """Torques of a standing robot.
+
+    Args:
+        model: its equations of motion.
+        positions: of links and motors, shape (m, d) [rad].
+        u: commands in their SI unit, shape (m, n).
+        parameters: values of the free parameters, shape (p,).
+        loads: what hangs on it.
+    """
+    layout, values = model.layout, model.named(parameters)
+    x = np.zeros((len(positions), layout.size))
+    x[:, layout.positions] = positions
+    q, still = x[:, layout.q_link], np.zeros((len(x), layout.n_link))
+    outside = loads.torque[:, layout.joint_link]
+    terms = model.torques(x, u, parameters, outside)
+    assert terms.by_state is not None and terms.by_parameter is not None
+    bodies, n = model.tree.bodies(values), layout.n_link
+    plain = _rows(terms, layout.motor_row, layout.positions)
+    terms.value[:, :n] += loads.torque - bodies.torque(q, still, still)
+    terms.by_state[:, :n, layout.q_link] += loads.by_q - bodies.gravity_derivatives(q)
+    for name, weight in model.tree.gravity_by_parameter(q, values).items():
+        if name in model.names:
+            terms.by_parameter[:, :n, model.names.index(name)] -= weight
+    driven = set(layout.motor_row.tolist())
+    held = [row for row in range(n) if row not in driven]
+    sliding = []
+    for speed in (SLIPPING, -SLIPPING):
+        x[:, layout.motor_v] = speed
+        terms_there = model.torques(x, u, parameters, outside, np.full(len(layout.joints), AT_ONCE))
+        sliding.append(_rows(terms_there, layout.motor_row, layout.positions))
+    forwards, backwards = sliding
+    # the balance y is held by minus the friction that would act
+    middle = _sum((plain, 1.0), (forwards, -0.5), (backwards, -0.5))
+    half = _sum((backwards, 0.5), (forwards, -0.5))
+    return AtRest(_rows(terms, held, layout.positions), _rows(terms, layout.motor_row, layout.positions), middle, half)
+
+
+def _rows(terms: TorqueTerms, rows: Columns | list[int], positions: Columns) -> WithSlopes:
+    assert terms.by_state is not None and terms.by_parameter is not None
+    return WithSlopes(terms.value[:, rows], terms.by_state[:, rows][:, :, positions], terms.by_parameter[:, rows])
+
+
+def _sum(*parts: tuple[WithSlopes, float]) -> WithSlopes:
+    found = (
+        np.sum([factor * getattr(part, name) for part, factor in parts], axis=0)
+        for name in ("value", "by_position", "by_parameter")
+    )
+    return WithSlopes(*found)

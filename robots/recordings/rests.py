@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rests of a robot: stretches in which motors, links and load stand, each with its means and how far they may be off.
+
+A motor stands where its encoder stays within its noise. Links swing on for seconds, so the end of a stretch counts,
+and what parts of it differ by says how well its mean is known; the creep after a stop is cut off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Notice, Recording
+
+Array = NDArray[np.float64]
+WITHIN = 6.0  # [sigma] that the readings of something at rest lie apart
+SHORTEST = 0.5  # [s] of a stretch that is a rest
+SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
+PARTS = 4  # of what is looked at, whose means are compared
+SWINGING = 12.0  # [sigma] of a link encoder that these means may differ by
+LONG_PAUSE = 0.5  # [s] without a sample
+
+
+@dataclass(frozen=True)
+class LoadHistory:
+    """A known force on the arm over time; each holds until the next.
+
+    Attributes:
+        times: shape (k,) [s].
+        forces: in the axes of the base, shape (k, 3) [N].
+        links: name of the link at whose origin each acts.
+    """
+
+    times: Array
+    forces: Array
+    links: tuple[str, ...]
+
+    @staticmethod
+    def none() -> LoadHistory:
+        """Nothing hangs on the arm."""
+        return LoadHistory(np.zeros(1), np.zeros((1, 3)), ("",))
+
+    @property
+    def changes(self) -> Array:
+        """Times at which another force begins [s]."""
+        other = np.any(np.diff(self.forces, axis=0) != 0.0, axis=1)
+        other |= np.array([a != b for a, b in zip(self.links[1:], self.links[:-1], strict=True)], dtype=bool)
+        return self.times[1:][other]
+
+    def at(self, time: float) -> tuple[Array, str]:
+        """Force and link at a time."""
+        k = int(np.searchsorted(self.times, time, side="right")) - 1
+        return (np.zeros(3), "") if k < 0 else (self.forces[k], self.links[k])
+
+
+@dataclass(frozen=True)
+class Rests:
+    """The m rests of one recording.
+
+    Attributes:
+        path, sha256: of the bag.
+        times: begin and end of what is looked at, shape (m, 2) [s].
+        q_motor: mean readings of the motor encoders, shape (m, n) [rad].
+        q_link: of the link encoders, shape (m, n) [rad]; None without.
+        u: mean command in its SI unit, shape (m, n).
+        motor_scatter, link_scatter, u_scatter: by how much parts of each rest differ, shape (m, n).
+        forces, links: known load of each rest, shape (m, 3) [N], and the link that it acts on.
+        moved: whether each motor has moved since the last rest, shape (m, n).
+        notices: what was left out.
+    """
+
+    path: str
+    sha256: str
+    times: Array
+    q_motor: Array
+    q_link: Array | None
+    u: Array
+    motor_scatter: Array
+    link_scatter: Array
+    u_scatter: Array
+    forces: Array
+    links: tuple[str, ...]
+    moved: NDArray[np.bool_]
+    notices: tuple[Notice, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.q_motor)
+
+    def only(self, kept: NDArray[np.bool_]) -> Rests:
+        """Some of the rests."""
+        arrays = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved")
+        some = {name: getattr(self, name)[kept] for name in arrays}
+        links = tuple(link for link, keep in zip(self.links, kept.tolist(), strict=True) if keep)
+        return replace(self, q_link=None if self.q_link is None else self.q_link[kept], links=links, **some)
+
+
+def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
+    """Cuts the rests out of a recording.
+
+    Args:
+        recording: of the robot.
+        robot: with the sigmas of its encoders.
+        loads: what hung on the arm, on the clock of the recording.
+
+    Raises:
+        RecordingError: there is none, with the reason.
+    """
+    motor, link = robot.motor_encoder, robot.link_encoder
+    stream = recording.streams[motor.name]
+    standing = still_stretches(stream.times, stream.values - motor.zero, WITHIN * motor.sigmas)
+    stretches = _split(standing, loads.changes)
+    found, swinging = [], 0
+    for t0, t1 in stretches:
+        a = _most_settled(recording, motor.name if link is None else link.name, t0, t1)
+        q_motor, motor_scatter = _mean(recording, motor.name, a, t1)
+        u, u_scatter = _mean(recording, "command", a, t1)
+        q_link, link_scatter = (q_motor * np.nan, q_motor * 0.0) if link is None else _mean(recording, link.name, a, t1)
+        if link is not None and np.any(link_scatter > SWINGING * link.sigmas):
+            swinging += 1
+            continue
+        zero = 0.0 if link is None else link.zero
+        found.append(
+            (np.array([a, t1]), q_motor - motor.zero, q_link - zero, u, motor_scatter, link_scatter, u_scatter)
+        )
+    if not found:
+        raise RecordingError(_why_none(recording, standing, stretches, swinging))
+    times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = (np.array(p) for p in zip(*found, strict=True))
+    hung = [loads.at(float(t[1]) - 1e-9) for t in times]
+    first = stream.values[0] - motor.zero
+    moved = _moved(first, q_motor, WITHIN * motor.sigmas)
+    forces, links = np.array([force for force, _ in hung]), tuple(name for _, name in hung)
+    rests = Rests(
+        recording.path, recording.sha256, times, q_motor, None if link is None else q_link, u,
+        motor_scatter, link_scatter, u_scatter, forces, links, moved, _notices(len(found), swinging),
+    )  # fmt: skip
+    rests = rests.only(_last_of_each(rests))
+    return replace(rests, moved=_moved(first, rests.q_motor, WITHIN * motor.sigmas))
+
+
+def still_stretches(times: Array, values: Array, within: Array) -> list[tuple[float, float]]:
+    """Longest stretches in which every channel stays within a range [s].
+
+    Args:
+        times: shape (k,) [s].
+        values: shape (k, c).
+        within: of each channel, shape (c,).
+    """
+    found, start = [], 0
+    low, high = values[0].copy(), values[0].copy()
+    for k in range(1, len(times) + 1):
+        ends = k == len(times) or times[k] - times[k - 1] > LONG_PAUSE
+        if not ends:
+            lower, upper = np.minimum(low, values[k]), np.maximum(high, values[k])
+            ends = bool(np.any(upper - lower > within))
+        if not ends:
+            low, high = lower, upper
+            continue
+        if times[k - 1] - times[start] >= SHORTEST:
+            found.append((float(times[start]), float(times[k - 1])))
+        if k < len(times):
+            start, low, high = k, values[k].copy(), values[k].copy()
+    return found
+
+
+def _split(stretches: Sequence[tuple[float, float]], changes: Array) -> list[tuple[float, float]]:
+    """The stretches cut where another load begins."""
+    found = []
+    for t0, t1 in stretches:
+        edges = [t0, *(t for t in changes.tolist() if t0 < t < t1), t1]
+        found += [(a, b) for a, b in pairwise(edges) if b - a >= SHORTEST]
+    return found
+
+
+def _most_settled(recording: Recording, name: str, t0: float, t1: float) -> float:
+    """Begin of that end of a stretch whose parts agree best."""
+    begins = [t1 - share * (t1 - t0) for share in SHARES if share * (t1 - t0) >= SHORTEST]
+    return min(begins, key=lambda a: float(np.sum(_mean(recording, name, a, t1)[1] ** 2)), default=t0)
+
+
+def _mean(recording: Recording, name: str, t0: float, t1: float) -> tuple[Array, Array]:
+    """Mean of a stream in a stretch, and by how much its parts differ, shape (n,) each."""
+    stream = recording.streams[name]
+    inside = stream.values[(stream.times >= t0) & (stream.times < t1)]
+    if len(inside) < PARTS:  # commands come when they change
+        k = max(int(np.searchsorted(stream.times, t1, side="right")) - 1, 0)
+        return stream.values[k], np.zeros(stream.values.shape[1])
+    parts = np.array([part.mean(axis=0) for part in np.array_split(inside, PARTS)])
+    return inside.mean(axis=0), parts.std(axis=0)
+
+
+def _moved(first: Array, q_motor: Array, within: Array) -> NDArray[np.bool_]:
+    """Whether motors have moved since the rest before, or since the recording began."""
+    return np.asarray(np.abs(np.diff(q_motor, axis=0, prepend=first[None])) > within)
+
+
+def _last_of_each(rests: Rests) -> NDArray[np.bool_]:
+    """Of rests in a row with one load and no motor moved, the last one."""
+    same = [
+        not rests.moved[i + 1].any()
+        and np.array_equal(rests.forces[i], rests.forces[i + 1])
+        and rests.links[i] == rests.links[i + 1]
+        for i in range(len(rests) - 1)
+    ]
+    return ~np.array([*same, False], dtype=bool)
+
+
+def _notices(count: int, swinging: int) -> tuple[Notice, ...]:
+    if not swinging:
+        return ()
+    text = f"rests: left out {swinging} of {count + swinging} in which a link still swung when the next one began"
+    return (Notice("rests", "dropped", swinging, text),)
+
+
+def _why_none(
+    recording: Recording,
+    standing: Sequence[tuple[float, float]],
+    stretches: Sequence[tuple[float, float]],
+    swinging: int,
+) -> str:
+    if swinging:
+        reason = (
+            f"the motors stand {len(stretches)} times, and a link swings through each; hold every weight for longer"
+        )
+    elif standing:
+        reason = f"the load changes within {SHORTEST:g} s wherever the motors stand; hold every weight for longer"
+    else:
+        reason = f"no motor stands for {SHORTEST:g} s; a recording of motion stands before the first option"
+    return f"{recording.path}: no rests: {reason}"

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Springs, friction and gravity from rests of an arm of one joint, whose equilibria are worked out here by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.graphs.rests.rest_errors import rest_errors
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.rests import Rests
+
+URDF = """<robot name="lever"><link name="base"/>
+<joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
+ <limit effort="100" velocity="20" lower="-3" upper="3"/></joint>
+<link name="rod"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
+ <inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hook_joint" type="fixed"><parent link="rod"/><child link="hook"/><origin xyz="0 0 -0.5"/></joint>
+<link name="hook"/></robot>"""
+YAML = """
+format: 1
+name: lever
+urdf: lever.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [swing]
+model: {{rigid_joints: {rigid}}}
+command: {{topic: /u, type: sensor_msgs/msg/JointState, field: effort, unit: N m}}
+sensors:
+  motor_angle: {{kind: motor_encoder, topic: /m, type: sensor_msgs/msg/JointState, field: position, unit: rad,
+                sigma: 1.0e-5}}
+{link}
+parameters:
+  swing.coulomb_torque: {{value: 0.2, unit: N m, prior_sigma: 2.0}}
+  swing.inertia: {{value: 0.2, unit: kg m2, prior_sigma: 0.5}}
+{springs}
+effects: [{effects}]
+noise: {{link_velocity: [0.3], motor_velocity: [0.3]}}
+"""
+LINK = """  link_angle: {kind: link_encoder, topic: /l, type: sensor_msgs/msg/JointState, field: position, unit: rad,
+         sigma: 2.0e-4}"""
+SPRINGS = """  swing.stiffness: {value: 60.0, unit: N m/rad, prior_sigma: 100.0}
+  swing.damping: {value: 0.1, unit: N m s/rad, prior_sigma: 1.0}
+  swing.spring_curve.quadratic: {value: 0.0, unit: N m/rad^2, prior_sigma: 1.0e+4, positive: false}
+  swing.spring_curve.cubic: {value: 0.0, unit: N m/rad^3, prior_sigma: 1.0e+5, positive: false}
+  swing.weight_dependent_friction.coefficient: {value: 0.02, unit: '1', prior_sigma: 1.0}
+  swing.weight_dependent_friction.quadratic: {value: 0.0, unit: 1/(N m), fixed: true, positive: false}"""
+K, K2, K3, C0, C1 = 40.0, -150.0, 900.0, 0.3, 0.1
+
+
+def lever(folder, rigid=False):
+    """The robot with start values far from the truth."""
+    (folder / "lever.urdf").write_text(URDF, encoding="utf-8")
+    text = YAML.format(
+        rigid="[swing]" if rigid else "[]",
+        link="" if rigid else LINK,
+        springs="" if rigid else SPRINGS,
+        effects="" if rigid else "spring_curve@swing, weight_dependent_friction@swing",
+    )
+    (folder / "lever.yaml").write_text(text, encoding="utf-8")
+    return load_robot(folder / "lever.yaml")
+
+
+def hanging(count, seed, rigid=False):
+    """Rests with weights on the hook, pulled sideways by a rope over a pulley; friction anywhere in its band."""
+    rng = np.random.default_rng(seed)
+    pull = rng.choice([0.0, 4.0, 8.0, 12.0, -4.0, -8.0, -12.0], count)
+    motor, link, u = np.zeros((3, count, 1))
+    for k in range(count):
+        # 2 kg at 0.3 m turn the rod down, a force along x at 0.5 m turns it up against it
+        def weight(q, k=k):
+            return -2.0 * 9.81 * 0.3 * np.sin(q) - pull[k] * 0.5 * np.cos(q)
+
+        q = rng.uniform(-1.0, 1.0)
+        tau = weight(q)
+        # the spring pulls the link back: K d + K2 d^2 + K3 d^3 = tau with d = q_link - q_motor
+        d = 0.0 if rigid else brentq(lambda d, tau=tau: K * d + K2 * d**2 + K3 * d**3 - tau, -0.5, 0.5)
+        friction = (C0 + (0.0 if rigid else C1 * abs(tau))) * rng.uniform(-1.0, 1.0)
+        link[k], motor[k], u[k] = q + 2e-4 * rng.normal() * (not rigid), q - d, -tau + friction
+    zero = np.zeros((count, 1))
+    forces = np.column_stack([pull, 0.0 * pull, 0.0 * pull])
+    return Rests(
+        "bench", "", np.zeros((count, 2)), motor, None if rigid else link, u, zero, zero, zero, forces,
+        ("hook",) * count, np.ones((count, 1), dtype=bool),
+    )  # fmt: skip
+
+
+def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path):
+    robot = lever(tmp_path)
+    result = calibrate_rests(robot, [hanging(60, 1)])
+    found = {p.name: p for p in result.parameters}
+    truth = {
+        "swing.stiffness": K, "swing.spring_curve.quadratic": K2, "swing.spring_curve.cubic": K3,
+        "swing.coulomb_torque": C0, "swing.weight_dependent_friction.coefficient": C1,
+    }  # fmt: skip
+    assert set(found) == set(truth)
+    assert set(result.silent) == {"swing.inertia", "swing.damping"}
+    for name, value in truth.items():
+        assert abs(found[name].value - value) < 3.0 * found[name].sigma, name
+    assert found["swing.stiffness"].sigma < 0.01 * K and found["swing.coulomb_torque"].sigma < 0.1 * C0
+    assert 0.7 < result.errors.error < 1.3 < result.before.error
+    held_out = rest_errors([RestSet.of(result.robot, hanging(40, 2))])
+    exact = rest_errors([RestSet.of(robot.with_values(truth), hanging(40, 2))])
+    assert held_out.error < 1.05 * exact.error
+
+
+def test_gradients_are_those_of_differences(tmp_path):
+    robot = lever(tmp_path)
+    problem = RestSet.of(robot, hanging(6, 3))
+    x, calibration = problem.start(Calibration.of(robot))
+    x, h = x + 1e-3, 1e-7
+    system = problem.linearize(x, calibration)
+    for i in range(x.shape[1]):
+        step = h * np.eye(x.shape[1])[i]
+        costs = [problem.linearize(x + side * step, calibration).costs for side in (1.0, -1.0)]
+        np.testing.assert_allclose(system.g_x[:, i], (costs[0] - costs[1]) / (2.0 * h), rtol=1e-4, atol=1e-2)
+    for i, name in enumerate(calibration.names):
+        step = h * np.eye(len(calibration.names))[i]
+        there = [calibration.with_points({DYNAMICS: calibration.dynamics + side * step}) for side in (1.0, -1.0)]
+        up, down = (problem.linearize(x, point).cost for point in there)
+        assert system.g_p[i] == pytest.approx((up - down) / (2.0 * h), rel=1e-4, abs=0.1), name
+
+
+def test_a_motor_that_has_not_moved_says_nothing_of_its_band(tmp_path):
+    robot = lever(tmp_path)
+    rests = hanging(30, 4)
+    result = calibrate_rests(robot, [replace(rests, moved=np.zeros((30, 1), dtype=bool))])
+    assert "swing.coulomb_torque" in result.silent
+    assert {p.name for p in result.parameters} >= {"swing.stiffness"}
+
+
+def test_rests_of_a_rigid_joint_tell_its_friction(tmp_path):
+    robot = lever(tmp_path, rigid=True)
+    result = calibrate_rests(robot, [hanging(80, 5, rigid=True)])
+    (found,) = result.parameters
+    assert found.name == "swing.coulomb_torque" and abs(found.value - C0) < 3.0 * found.sigma < 0.1 * C0

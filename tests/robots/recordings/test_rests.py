@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rests are cut out where everything stands, and say how well their means are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.robots.recordings.rests import LoadHistory, find_rests, still_stretches
+
+ROBOT = load_robot("biorob")
+RATE = 100.0
+
+
+def recording(q_motor, q_link=None, u=None):
+    """A recording whose joints 2 to 4 stand at zero; arguments of joint 1, shape (k,)."""
+    times = np.arange(len(q_motor)) / RATE
+    rest = np.zeros((len(times), 3))
+    motor = np.column_stack([q_motor, rest])
+    link = np.column_stack([q_motor * 0.3 if q_link is None else q_link, rest])
+    command = np.column_stack([np.zeros(len(times)) if u is None else u, rest])
+    streams = {
+        "command": Stream("command", times, command, ("a", "b", "c", "d"), "V"),
+        "motor_encoder": Stream("motor_encoder", times, motor, ("a", "b", "c", "d"), "rad"),
+        "link_encoder": Stream("link_encoder", times, link, ("a", "b", "c", "d"), "rad"),
+    }
+    return Recording("bench", "", 0, streams)
+
+
+def steps(*levels, seconds=2.0, ramp=0.5):
+    """Stands at each level and moves evenly in between."""
+    found = [np.full(int(seconds * RATE), levels[0])]
+    for a, b in pairwise(levels):
+        found += [np.linspace(a, b, int(ramp * RATE)), np.full(int(seconds * RATE), b)]
+    return np.concatenate(found)
+
+
+def test_every_level_is_a_rest_with_its_means():
+    rests = find_rests(recording(steps(0.0, 0.4, -0.2)), ROBOT, LoadHistory.none())
+    np.testing.assert_allclose(rests.q_motor[:, 0], [0.0, 0.4, -0.2], atol=1e-12)
+    np.testing.assert_allclose(rests.q_link[:, 0], [0.0, 0.12, -0.06], atol=1e-12)
+    assert rests.moved[:, 0].tolist() == [False, True, True] and not rests.moved[:, 1:].any()
+    assert rests.links == ("", "", "")
+
+
+def test_a_link_that_swings_on_is_known_less_well_and_one_that_swings_far_is_left_out():
+    t = np.arange(int(4.5 * RATE)) / RATE
+    motor = steps(0.0, 0.4)
+    for amplitude, kept in ((0.004, 2), (0.2, 1)):
+        swing = np.where(t < 2.5, 0.0, amplitude * np.cos(2.0 * np.pi * 1.3 * (t - 2.5)))
+        rests = find_rests(recording(motor, 0.3 * motor + swing), ROBOT, LoadHistory.none())
+        assert len(rests) == kept and len(rests.notices) == 2 - kept
+        if kept == 2:
+            assert abs(rests.q_link[1, 0] - 0.12) < 3.0 * rests.link_scatter[1, 0] < amplitude
+            assert rests.link_scatter[0, 0] == 0.0
+
+
+def test_a_load_that_changes_ends_a_rest_and_a_motor_that_stood_has_not_moved():
+    loads = LoadHistory(np.array([0.0, 2.0]), np.array([[0.0, 0, 0], [0, 1.5, 0]]), ("attachment", "attachment"))
+    rests = find_rests(recording(np.zeros(400)), ROBOT, loads)
+    np.testing.assert_array_equal(rests.forces[:, 1], [0.0, 1.5])
+    assert rests.times[0, 1] <= 2.0 <= rests.times[1, 0] and not rests.moved.any()
+
+
+def test_rests_alike_in_a_row_are_one_the_last():
+    motor = steps(0.0, 0.4)
+    blip = motor.copy()
+    blip[350] += 0.1  # a glitch cuts the second rest in two
+    rests = find_rests(recording(blip, 0.3 * motor), ROBOT, LoadHistory.none())
+    assert len(rests) == 2 and rests.moved[1, 0] and rests.times[1, 0] > 3.5
+
+
+def test_motion_has_no_rests_and_weights_in_a_hurry_have_none():
+    with pytest.raises(RecordingError) as err:
+        find_rests(recording(np.linspace(0.0, 3.0, 500)), ROBOT, LoadHistory.none())
+    assert str(err.value) == (
+        "bench: no rests: no motor stands for 0.5 s; a recording of motion stands before the first option"
+    )
+    times = np.arange(0.0, 4.0, 0.3)
+    hurried = LoadHistory(times, np.outer(times, [0, 1, 0]), ("attachment",) * len(times))
+    with pytest.raises(RecordingError, match=r"the load changes within 0\.5 s wherever the motors stand"):
+        find_rests(recording(np.zeros(400)), ROBOT, hurried)
+    t = np.arange(400) / RATE
+    with pytest.raises(RecordingError, match="a link swings through each; hold every weight for longer"):
+        find_rests(recording(np.zeros(400), 0.5 * np.sin(2.0 * t)), ROBOT, LoadHistory.none())
+
+
+def test_a_stretch_ends_where_a_channel_leaves_its_range_or_samples_are_missing():
+    times = np.array([*np.arange(0.0, 1.0, 0.1), *np.arange(3.0, 4.0, 0.1)])
+    values = np.zeros((20, 1))
+    np.testing.assert_allclose(still_stretches(times, values, np.array([0.1])), [(0.0, 0.9), (3.0, 3.9)])
+    values[5:, 0] = 0.05
+    assert len(still_stretches(times, values, np.array([0.01]))) == 1  # half a second is too short before the step
+
+
+def test_encoders_with_another_zero_read_the_same():
+    zero = np.array([0.3, 0.0, 0.0, 0.0])
+    moved = replace(ROBOT.motor_encoder, zero=zero)
+    rests = find_rests(recording(steps(0.3, 0.7)), ROBOT.with_sensors({"motor_encoder": moved}), LoadHistory.none())
+    np.testing.assert_allclose(rests.q_motor[:, 0], [0.0, 0.4], atol=1e-12)

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A calibration from rests, and a comparison on rests, on one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.rests.calibrate_rests import RestCalibration
+from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.model.robot import Robot
+from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.terminal.text_table import text_table
+
+AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
+
+
+def rest_calibration_text(result: RestCalibration) -> str:
+    """The summary of a calibration."""
+    paths = ", ".join(problem.rests.path for problem in result.problems)
+    lines = [
+        f"{result.robot.name} from {paths}: {result.count} rests, calibrated in {result.wall_seconds:.1f} s, "
+        f"{result.iterations} iterations",
+        "",
+        verdict(result.errors),
+        f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads say, "
+        f"{significant(result.before.error, 3)} before; 1 is expected",
+    ]
+    lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.rests.notices]
+    table = text_table(
+        ["parameter", "start", "value", "± sigma", "unit", ""],
+        [_row(p) for p in (*result.parameters, *result.derived)],
+        "<>>><<",
+    )
+    silent = f"\n\nThe rests say nothing about {', '.join(result.silent)}." if result.silent else ""
+    return "\n".join(lines) + f"\n\n{table}{silent}\n\n{_errors({result.robot.name: result.errors}, result.robot)}"
+
+
+def rest_errors_text(by_label: Mapping[str, RestErrors], robots: Mapping[str, Robot], count: int) -> str:
+    """Errors of some models, by label."""
+    robot = next(iter(robots.values()))
+    return f"{count} rests, links measured against where motors and loads say\n{_errors(by_label, robot)}"
+
+
+def rests_beside_motion(result: CalibrationResult) -> str:
+    """What rests say of a calibration with motion; empty without rests."""
+    problems = [problem.of_robot(result.robot) for problem, _ in result.sets if isinstance(problem, RestSet)]
+    if not problems:
+        return ""
+    errors, count = rest_errors(problems), sum(len(problem.rests) for problem in problems)
+    return (
+        f"{count} rests in the same estimate: links rest {significant(errors.error, 2)} sigma (rms) from where motors "
+        f"and loads say.\n{_errors({result.robot.name: errors}, result.robot)}"
+    )
+
+
+def verdict(errors: RestErrors) -> str:
+    """Whether the model holds at rest."""
+    if errors.error <= AS_EXPECTED:
+        return "Yes, the model holds at these rests."
+    if errors.error <= DOUBTFUL:
+        return "Usable, with reservations: links rest further from where the model says than their encoders explain."
+    return "No, do not rely on this yet: links do not rest where the model says."
+
+
+def _errors(by_label: Mapping[str, RestErrors], robot: Robot) -> str:
+    rows = []
+    for label, errors in by_label.items():
+        torques, beyond, channels = errors.torques(robot), errors.beyond(robot), errors.to_json(robot)
+        for joint in robot.joints:
+            fit = channels[f"{joint}.link_position"]
+            cells = (1e3 * fit["rmse"], fit["chi2"] ** 0.5, 1e3 * torques[joint], 1e3 * beyond[joint])
+            rows.append([label, joint, *(significant(cell, 3) for cell in cells)])
+    head = ["model", "joint", "link [mrad]", "in sigmas", "missing torque [mN m]", "friction beyond its band [mN m]"]
+    return text_table(head, rows, "<<>>>>")
+
+
+def _row(p: ParameterEstimate) -> list[str]:
+    value, sigma = with_sigma(p.value, p.sigma)
+    return [p.name, significant(p.start, 4), value, sigma, p.unit, p.note]

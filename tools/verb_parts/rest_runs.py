@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`calibrate` and `compare` with --rests: rests in, robot file, report and JSON out."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.rests import Rests
+from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
+from jointscope.tools.acceptance.limits import Limit
+from jointscope.tools.terminal.progress import Progress
+from jointscope.tools.verb_parts.result_files import ResultFiles, other_kinds, made_from
+from jointscope.tools.writing.whole_file import whole_file, write_json
+
+
+def add_rests_option(parser: argparse.ArgumentParser) -> None:
+    """Adds --rests."""
+    parser.add_argument(
+        "--rests",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="BAG",
+        help="recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
+    )
+
+
+def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> list[Rests]:
+    """The rests of some recordings."""
+    from jointscope.tools.bags.read_rests import read_rests
+
+    found = []
+    for i, path in enumerate(paths):
+        progress(f"reading rests of {path}", i / len(paths))
+        found.append(read_rests(path, robot))
+    return found
+
+
+def run_rest_calibration(
+    robot: Robot, paths: Sequence[Path], files: ResultFiles, limits: Sequence[Limit], progress: Progress
+) -> tuple[str, AcceptedBy]:
+    """Calibrates from rests alone, writes the files, and returns what the screen says, and which limits are kept.
+
+    Raises:
+        RobotError: a viewer recording was asked for.
+        JointscopeError: the rests cannot be used, or a file cannot be written; then none is.
+    """
+    from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+    from jointscope.tools.terminal.rests_text import rest_calibration_text
+
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
+    result = calibrate_rests(robot, read_all_rests(paths, robot, progress), progress)
+    content = result.to_json()
+    checked = check_models(limits, {robot.name: content})
+    with ExitStack() as stack:
+        if files.robot is not None:
+            from jointscope.robots.files.robot_writer import robot_text
+
+            origin = made_from(robot.path.name) | other_kinds(result)
+            text = robot_text(result.robot, files.robot.parent, origin)
+            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        if files.report is not None:
+            from jointscope.tools.report.rests_report import rests_report
+
+            html = rests_report(result, checked=checked)
+            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+    return rest_calibration_text(result), checked
+
+
+def weighted_rests(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[Any]:
+    """Rests for an estimate with motion, each with the weight that it deserves; none without paths."""
+    if not paths:
+        return []
+    from jointscope.graphs.rests.calibrate_rests import settled_rests
+
+    return list(settled_rests(robot, read_all_rests(paths, robot, progress), progress)[0])
+
+
+def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: Progress) -> tuple[str, dict[str, Any]]:
+    """Errors of some models on rests, for the screen and for JSON."""
+    from jointscope.graphs.rests.rest_errors import rest_errors
+    from jointscope.graphs.rests.rest_set import RestSet
+    from jointscope.tools.terminal.rests_text import rest_errors_text
+
+    by_label, content, count = {}, {}, 0
+    for label, robot in robots.items():
+        recordings = read_all_rests(paths, robot, progress)
+        count = sum(map(len, recordings))
+        by_label[label] = found = rest_errors([RestSet.of(robot, rests) for rests in recordings])
+        content[label] = {
+            "error": found.error,
+            "floor": 1.0,
+            "by_kind": {"rests": found.error},
+            "channels": found.to_json(robot),
+            "rests": {"torque_rms": found.torques(robot), "friction_beyond": found.beyond(robot)},
+        }
+    return rest_errors_text(by_label, robots, count), {"models": content}
