@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,17 +68,17 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class MotorEncoder:
-    """Encoders on all motors, in link units: theta_measured = q_motor + zero + noise (eq. 20).
+class Encoder:
+    """Encoders on all joints, in link units: theta_measured = q + zero + noise.
 
     Attributes:
         name: key in the robot file.
         source: topic.
         sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
-        zero: reading at q_motor = 0, shape (n_joints,) [rad or m].
+        zero: reading at q = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
-        zero_known: False for an incremental encoder, whose zero is another one in each recording.
         estimate_sigma: whether a calibration may find other sigmas.
+        zero_known: False for an incremental encoder, whose zero is another one in each recording.
     """
 
     name: str
@@ -85,13 +86,15 @@ class MotorEncoder:
     sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
-    zero_known: bool = True
     estimate_sigma: bool = True
+    zero_known: bool = True
+
+    side: ClassVar[str]
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Channel names, one per joint."""
-        return tuple(f"{joint}.motor_position" for joint in self.joints)
+        return tuple(f"{joint}.{self.side}_position" for joint in self.joints)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -100,34 +103,17 @@ class MotorEncoder:
 
 
 @dataclass(frozen=True)
-class LinkEncoder:
-    """Encoders on all links, behind the transmission: theta_measured = q_link + zero + noise.
+class MotorEncoder(Encoder):
+    """On the motors, q = q_motor (eq. 20)."""
 
-    Attributes:
-        name: key in the robot file.
-        source: topic.
-        sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
-        zero: reading at q_link = 0, shape (n_joints,) [rad or m].
-        joints: names of the joints.
-        estimate_sigma: whether a calibration may find other sigmas.
-    """
+    side = "motor"
 
-    name: str
-    source: Topic
-    sigmas: NDArray[np.float64]
-    zero: NDArray[np.float64]
-    joints: tuple[str, ...]
-    estimate_sigma: bool = True
 
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Channel names, one per joint."""
-        return tuple(f"{joint}.link_position" for joint in self.joints)
+@dataclass(frozen=True)
+class LinkEncoder(Encoder):
+    """On the links, behind the transmission, q = q_link."""
 
-    @property
-    def units(self) -> tuple[str, ...]:
-        """SI unit of each channel."""
-        return self.source.si_units(len(self.joints))
+    side = "link"
 
 
 @dataclass(frozen=True)
