@@ -15,7 +15,7 @@ from jointscope.tools.presentation.left_out import add_leave_out_option, leave_o
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_comparison
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_comparison
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
     check_outputs(files.all, inputs=[*([] if poses else [args.bag]), *poses, *robot_files, *args.effects])
     from jointscope.graphs.comparison.compare import compare
+    from jointscope.graphs.transmission.compare_links import compare_links
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.terminal.comparison_text import comparison_text
@@ -78,10 +79,12 @@ def run(args: argparse.Namespace) -> int:
     if poses:
         return _on_poses(robots, poses, files, limits)
     check_same_streams(robots)
+    for robot in robots.values():
+        check_viewer(robot, files)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
         (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
-        result = compare(robots, recording, progress=progress)
+        result = (compare_links if first.free_links else compare)(robots, recording, progress=progress)
         checked = check_models(limits, result.to_json()["models"])
         write_comparison(result, files, checked)
     print(comparison_text(result))
@@ -128,6 +131,10 @@ def check_same_streams(robots: dict[str, Any]) -> None:
     """
     from jointscope.tools.bags.needed_streams import needed_streams
 
+    if len({robot.free_links for robot in robots.values()}) > 1:
+        raise RobotError(
+            f"{', '.join(robots)}: some have link_dynamics: free, some a model of their links; compare those alike"
+        )
     (first, reference), *others = ((label, needed_streams(robot)) for label, robot in robots.items())
     for label, needed in others:
         if needed != reference:
