@@ -118,7 +118,7 @@ class LinkEncoder(Encoder):
 
 @dataclass(frozen=True)
 class TorqueSensor:
-    """Torques that the transmissions pass on to their links, measured behind the friction of the motors.
+    """Torques that the springs pass on to their links: theta = scale tau + offset + noise, behind the motors' friction.
 
     Attributes:
         name: key in the robot file.
@@ -141,6 +141,22 @@ class TorqueSensor:
     def units(self) -> tuple[str, ...]:
         """SI unit of each channel."""
         return ("N m",) * len(self.joints)
+
+    @property
+    def parameters(self) -> tuple[tuple[str, str], ...]:
+        """Full names of scale [1] and offset [N m] of each joint, which a robot file may have."""
+        return tuple((f"{self.name}.scale_{joint}", f"{self.name}.offset_{joint}") for joint in self.joints)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """All of these names."""
+        return tuple(name for pair in self.parameters for name in pair)
+
+    def scale_and_offset(self, values: Mapping[str, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Scale and offset of each joint, shape (n_joints,); 1 and 0 [N m] where no parameter says another."""
+        pairs = [(values.get(scale, 1.0), values.get(offset, 0.0)) for scale, offset in self.parameters]
+        scale, offset = np.array(pairs).T
+        return scale, offset
 
     @property
     def sigmas(self) -> NDArray[np.float64]:
@@ -249,6 +265,8 @@ class Accelerometer:
     def lever(self) -> tuple[str, ...]:
         """Names of the parameters with its place on the body."""
         return tuple(f"{self.name}.lever_{axis}" for axis in AXES)
+
+    own = lever
 
     def place(self, parameters: Mapping[str, Parameter]) -> NDArray[np.float64]:
         """Where it sits on its body, p_body, shape (3,) [m]."""
