@@ -7,7 +7,7 @@ import numpy as np
 from real_recordings import MILLI, halves, left, recording, waterfall
 from tables import Section, Table
 
-from jointscope.graphs.transmission.transmission_search import discover_transmission
+from jointscope.graphs.transmission.discover_links import discover_links
 from jointscope.robots.files.robot_file import load_robot
 
 FOLDER = "hebi_arms_mit"
@@ -49,24 +49,24 @@ def _one_way(section: Section, robot: str, bag: str, share: float) -> list[tuple
     """The search with its table; delays of gyros that were found."""
     whole = recording(load_robot(robot), f"{FOLDER}/{bag}")
     train, held = halves(whole, share)
-    result = discover_transmission(load_robot(robot), [train], held)
+    result = discover_links(load_robot(robot), [train], held)
     section.tables.append(waterfall(f"{bag} ({robot}), held-out part, step by step", result))
-    springs = [c for c in result.model.chosen if c.effect == "joint_elasticity"]
     rows = []
-    for spring in springs:
-        parameter = result.robot.parameters[spring.sizes[0]]
+    for spring in [here for here in result.robot.effects if here.effect.id == "joint_elasticity"]:
+        parameter = result.robot.parameters[spring.parameter("compliance")]
         sigma = parameter.sigma or float("nan")
         rows.append((spring.owner, f"{1 / parameter.value:.1f}", f"{sigma / parameter.value**2:.1f}"))
     if rows:
         head = ("joint", "stiffness found [N m/rad]", "sigma")
         section.tables.append(Table(f"{bag}: springs (the device's own calibration: 70, 120 or 130)", head, rows))
     section.numbers[bag] = result.to_json()
-    found = [c for c in result.model.chosen if c.effect == "gyro_delay"]
-    missed = [g.name for g in load_robot(robot).gyros if g.name not in {c.owner for c in found}]
+    found = [here for here in result.robot.effects if here.effect.id == "gyro_delay"]
+    last = result.steps[-1].diagnosis
+    missed = [c for c in last.candidates if c.effect == "gyro_delay"] if last is not None else []
     if missed:
-        why = "; ".join(f"{name}: {result.refused.get(f'gyro_delay@{name}', 'not tried')}" for name in missed)
+        why = "; ".join(f"{c.owner}: {c.reasons[0]}" for c in missed)
         section.notes.append(f"{bag}, no delay found: {why}")
-    return [(bag, c.owner, result.model.size(c.sizes[0])) for c in found]
+    return [(bag, here.owner, result.robot.parameters[here.parameter("delay")].value) for here in found]
 
 
 def _both_ways(robot: str, bag: str, share: float) -> tuple[float, float]:
@@ -74,7 +74,7 @@ def _both_ways(robot: str, bag: str, share: float) -> tuple[float, float]:
     first, second = halves(recording(load_robot(robot), f"{FOLDER}/{bag}"), share)
     squares, weights = [], []
     for train, held in ((first, second), (second, first)):
-        result = discover_transmission(load_robot(robot), [train], held)
+        result = discover_links(load_robot(robot), [train], held)
         squares.append([left(result, "joint1.gear", step) ** 2 for step in (0, -1)])
         weights.append(held.duration)
     before, after = np.sqrt(np.average(squares, axis=0, weights=weights))

@@ -108,7 +108,7 @@ def _calibrated(
     history = History()
     if near is None:
         blunt = blunt_sharpness(seen, recordings)[:1]
-        plain = [problem.of_robot(problem.robot.without_accelerometers()) for problem in problems]
+        plain = [problem.of_robot(problem.robot.without(seen.accelerometers)) for problem in problems]
         plain = plain if seen.accelerometers else problems
         first = [blunted(problem, sharpness) for problem in plain for sharpness in blunt] or plain
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))

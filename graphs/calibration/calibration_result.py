@@ -209,7 +209,9 @@ class CalibrationResult:
             "channels": {
                 name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
             },
-            "noise": {
+            "noise": {}
+            if self.robot.free_links
+            else {
                 "unit": "rad/s/sqrt(s), of joints that slide m/s/sqrt(s)"
                 if self.robot.tree.slides
                 else "rad/s/sqrt(s)",

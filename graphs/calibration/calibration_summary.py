@@ -32,6 +32,7 @@ from jointscope.graphs.solving.posterior import StatePosterior, posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
 
@@ -109,15 +110,15 @@ def summarize(
     factor = inflation([c.scores for c in collected], solved.covariance) if not hold else np.ones(shared.size)
     covariance = solved.covariance * np.outer(factor, factor)
     bags = tuple(_bag_fit(solved, i, c, factor) for i, c in enumerate(collected))
-    names = _names(solution.estimate.calibrations, shared)
+    names = shared_names(solution.estimate.calibrations, shared)
     sigmas = np.sqrt(np.diag(covariance))
     calibration = solution.estimate.calibrations[0]
-    parameters = _parameters(robot, calibration, sigmas, shared)
+    parameters = parameter_table(robot, calibration, sigmas, shared)
     weak = () if hold else weak_directions(robot, calibration, shared, covariance)
     correlation = covariance / np.maximum(np.outer(sigmas, sigmas), 1e-300)
     noise = solved.problems[0].dynamics.steps.noise
     result = CalibrationResult(
-        robot=_calibrated(robot, parameters, calibration, sigmas, solved),
+        robot=calibrated_robot(robot, parameters, calibration, solved.robot, noise),
         start=robot,
         bags=bags,
         parameters=parameters,
@@ -184,7 +185,7 @@ def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
     return found
 
 
-def _names(calibrations: Sequence[Calibration], shared: SharedLayout) -> tuple[str, ...]:
+def shared_names(calibrations: Sequence[Calibration], shared: SharedLayout) -> tuple[str, ...]:
     """Name of every shared value, with the number of the recording where several have their own."""
     names = [""] * shared.size
     starts: dict[str, set[int]] = {}
@@ -201,7 +202,7 @@ def _names(calibrations: Sequence[Calibration], shared: SharedLayout) -> tuple[s
     return tuple(names)
 
 
-def _parameters(
+def parameter_table(
     robot: Robot, calibration: Calibration, sigmas: Array, shared: SharedLayout
 ) -> tuple[ParameterEstimate, ...]:
     """The table of all shared values (biases of the first recording)."""
@@ -247,14 +248,22 @@ def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) ->
     return found
 
 
-def _calibrated(
+def calibrated_robot(
     robot: Robot,
     parameters: Sequence[ParameterEstimate],
     calibration: Calibration,
-    sigmas: Array,
-    solved: Solved,
+    used: Robot,
+    noise: ProcessNoise,
 ) -> Robot:
-    """The robot with values, sigmas and noise found."""
+    """The robot with values, sigmas and noise found.
+
+    Args:
+        robot: before.
+        parameters: the table of values.
+        calibration: biases and mountings.
+        used: the robot with the noise of sensors that was used.
+        noise: of the motion.
+    """
     table = {p.name: p for p in parameters}
     new = {
         name: replace(p, value=table[name].value, sigma=table[name].sigma) if name in table else p
@@ -268,9 +277,7 @@ def _calibrated(
             bias_sigma = np.array([table[f"{name}.bias.{axis}"].sigma for axis in AXES])
             sensors[name] = replace(sensor, bias=calibration.biases[name], bias_sigma=bias_sigma)
         elif isinstance(sensor, MotorEncoder | LinkEncoder):
-            used = solved.robot.sensors[name]
-            sensors[name] = replace(sensor, sigmas=used.sigmas)
-    noise = solved.problems[0].dynamics.steps.noise
+            sensors[name] = replace(sensor, sigmas=used.sensors[name].sigmas)
     return replace(robot, parameters=new, noise=noise).with_sensors(sensors)
 
 

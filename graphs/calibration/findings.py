@@ -110,6 +110,8 @@ def _sensor_noise(result: CalibrationResult) -> list[str]:
 def _process_noise(result: CalibrationResult) -> list[str]:
     """How much unexplained torque the noise stands for, against what the motors do."""
     robot, said = result.robot, []
+    if robot.free_links:
+        return []
     densities = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
     bag = result.bags[0]
     layout = robot.layout

@@ -90,7 +90,7 @@ def collect(
     for part in residual_parts(linearize_all(problem, x, calibration), calibration, posterior):
         evidence.add(part)
         if part.factor.states:
-            scores.add(ticks[part.ticks], part)
+            scores.add(ticks[part.ticks], part.residual, part.by_shared)
         if isinstance(part.factor, DynamicsFactor):
             sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
             expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))

@@ -172,9 +172,10 @@ def approach(
     Accelerometers wait: an acceleration is a second difference of positions, and far from the solution its rows lead
     astray.
     """
-    plain = problems[0].robot.without_accelerometers()
+    accelerometers = problems[0].robot.accelerometers
+    plain = problems[0].robot.without(accelerometers)
     if plain is not problems[0].robot:
-        without = [p.of_robot(p.robot.without_accelerometers()) for p in problems]
+        without = [p.of_robot(p.robot.without(accelerometers)) for p in problems]
         known = [c.carried_to(Calibration.of(plain)) for c in calibrations]
         near = approach(without, noise, known, hold)
         return Estimate(

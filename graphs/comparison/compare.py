@@ -7,7 +7,7 @@ model's own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -62,13 +62,23 @@ def compare(robots: Mapping[str, Robot], recording: Recording, *, progress: Prog
         RobotError: no robot given.
         SolveError: the states of the recording cannot be estimated.
     """
+    return compared(robots, recording, compare_model, progress)
+
+
+def compared(
+    robots: Mapping[str, Robot],
+    recording: Recording,
+    one: Callable[[str, Robot, Recording], ModelComparison],
+    progress: Progress | None,
+) -> ComparisonResult:
+    """Compares models, each by a function; arguments and errors as of `compare`."""
     if not robots:
         raise RobotError("no robot given; pass at least one")
     models = []
     for i, (label, robot) in enumerate(robots.items()):
         if progress:
             progress(f"comparing {label}", i / len(robots))
-        models.append(compare_model(label, robot, recording))
+        models.append(one(label, robot, recording))
     return ComparisonResult(recording, tuple(models))
 
 
@@ -99,7 +109,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         error=error,
         floor=float(np.sqrt(np.mean(np.square(list(floors.values()))))),
         channels=channels,
-        worst=_worst_windows(sensors),
+        worst=worst_windows(sensors),
         sensors=sensors,
         floors=floors,
         motion=JointStates.of(robot, problem.timeline.ticks, states),
@@ -196,7 +206,7 @@ def _rms(error: Array) -> float:
         return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
-def _worst_windows(sensors: dict[str, SensorPrediction]) -> tuple[WorstWindow, ...]:
+def worst_windows(sensors: dict[str, SensorPrediction]) -> tuple[WorstWindow, ...]:
     """The windows with the largest share of the squared error in sigmas."""
     found, total = [], 0.0
     for sensor in sensors.values():

@@ -19,7 +19,8 @@ from jointscope.robots.recordings.recording import Recording
 Array = NDArray[np.float64]
 
 OPEN_LOOP = "open_loop"
-AHEAD, LOOP = "0.1 s ahead", "of the loop simulated from its goals"  # what a model is judged by
+AHEAD, LOOP = "0.1 s ahead", "of the loop simulated from its goals"  # what a model is judged by ...
+BETWEEN = "of each sensor from the others"  # ... and where links are free
 SENSOR_NOISE = 1.0  # [sigma]
 
 
@@ -115,8 +116,13 @@ class ModelComparison:
 
     @property
     def judged_by(self) -> str:
-        """Whose error tells how good the model is: predictions, or the loop where it was simulated."""
-        return AHEAD if self.free_run is None else LOOP
+        """Whose error tells how good the model is."""
+        return self.predicted if self.free_run is None else LOOP
+
+    @property
+    def predicted(self) -> str:
+        """What `error` is the error of."""
+        return BETWEEN if self.robot.free_links else AHEAD
 
     @property
     def judged_error(self) -> float:

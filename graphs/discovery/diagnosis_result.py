@@ -122,7 +122,7 @@ class Diagnosis:
 
     @property
     def judged_by(self) -> str:
-        """Whose error `error` is: "0.1 s ahead", or of a simulated loop."""
+        """Whose error `error` is, as of `ModelComparison`."""
         return self.comparison.judged_by if self.comparison is not None else AHEAD
 
     def to_json(self) -> dict[str, Any]:

@@ -8,11 +8,13 @@ out. The held-out recording is scored once per step and never chooses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 from jointscope.graphs.calibration.base_model import BaseModel, with_full_gyros
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.comparison.compare import compare_model
+from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, diagnose, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
@@ -29,6 +31,71 @@ from jointscope.robots.recordings.recording import Recording
 
 MAX_STEPS = 8
 Save = Callable[[int, DiscoveryStep], str]
+
+
+class Errors(Protocol):
+    """How large the error of a model is on its training recordings."""
+
+    @property
+    def error(self) -> float:
+        """Root mean square [sensor sigma]."""
+
+
+class Kind(Protocol):
+    """What a search does with a model; how, depends on the kind of recordings."""
+
+    @property
+    def must_explain(self) -> float:
+        """Share of the squared training error that an effect must take away in the end."""
+
+    def calibrated(self, robot: Robot, start: Any = None) -> Any:
+        """A model, which has its robot, calibrated with the training recordings; near another one if one is given."""
+
+    def errors(self, model: Any) -> Errors:
+        """Errors of a model on the training recordings."""
+
+    def compared(self, label: str, robot: Robot) -> ModelComparison:
+        """A model against the held-out recording, else against the first training recording."""
+
+    def diagnosed(self, model: Any, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
+        """What a model lacks."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Recordings of motion (`Kind`); attributes as the arguments of `discover`."""
+
+    recordings: tuple[Recording, ...]
+    holdout: Recording | None
+    missing_torque: bool
+    side_by_side: SideBySide | None
+    must_explain: float = MATTERS
+
+    def calibrated(self, robot: Robot, start: BaseModel | None = None) -> BaseModel:
+        """All components of every gyro are predicted."""
+        return BaseModel.of(robot if start is not None else with_full_gyros(robot), self.recordings, start)
+
+    def errors(self, model: BaseModel) -> ValidationError:
+        """On the pieces where a diagnosis validates."""
+        return judged_error(model, model.robot, model.calibrations, fit_and_judge(model)[1])
+
+    def compared(self, label: str, robot: Robot) -> ModelComparison:
+        """Predictions from causal states."""
+        return compare_model(label, robot, self.holdout or self.recordings[0])
+
+    def diagnosed(self, model: BaseModel, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
+        """The catalogue, scored and refitted."""
+        return diagnose(
+            model.robot,
+            self.recordings,
+            self.holdout,
+            base=model,
+            comparison=comparison,
+            validation=errors,
+            missing_torque=self.missing_torque,
+            side_by_side=self.side_by_side,
+            progress=report,
+        )
 
 
 @in_solver_context
@@ -62,61 +129,52 @@ def discover(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    report = progress or (lambda text, share: None)
-    search = _Search(recordings, holdout, save, report, max_steps, missing_torque, side_by_side)
-    return search.run(robot, resume or ())
+    if side_by_side is not None:
+        side_by_side.begin(LEADERS)
+    kind = Motion(tuple(recordings), holdout, missing_torque, side_by_side)
+    return search(kind, robot, holdout is not None, save, resume or (), max_steps, progress)
+
+
+def search(
+    kind: Kind,
+    robot: Robot,
+    held_out: bool,
+    save: Save | None,
+    resume: Sequence[SavedStep],
+    max_steps: int,
+    progress: Progress | None,
+) -> Discovery:
+    """Finds the effects that a model lacks in recordings of a kind; `held_out`: whether one chooses nothing."""
+    return _Search(kind, held_out, save, progress or (lambda text, share: None), max_steps).run(robot, resume)
 
 
 class _Search:
     """One discovery."""
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        holdout: Recording | None,
-        save: Save | None,
-        report: Progress,
-        max_steps: int,
-        missing_torque: bool,
-        side_by_side: SideBySide | None,
-    ):
-        self.recordings, self.holdout, self.save, self.report = tuple(recordings), holdout, save, report
-        self.max_steps, self.missing_torque, self.steps = max_steps, missing_torque, list[DiscoveryStep]()
-        self.side_by_side = side_by_side
-        self.errors: ValidationError | None = None  # of the last step; unknown after a resumed one
+    def __init__(self, kind: Kind, held_out: bool, save: Save | None, report: Progress, max_steps: int):
+        self.kind, self.held_out, self.save, self.report = kind, held_out, save, report
+        self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
+        self.last_errors: Errors | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
         """All steps."""
         for saved in resume:
             self._restore(saved)
-        if self.side_by_side is not None:
-            self.side_by_side.begin(LEADERS)
         self.report("calibrating the base model", 0.0)
-        start = self.steps[-1].robot if self.steps else with_full_gyros(robot)
-        base = BaseModel.of(start, self.recordings)
+        base = self.kind.calibrated(self.steps[-1].robot if self.steps else robot)
         if not self.steps:
-            self._add_step(None, None, base, "The base model.", self._training_errors(base))
+            self._add_step(None, None, base, "The base model.", self.kind.errors(base))
         stop, diagnosis = self._loop(base)
         last = self.steps[-1]
         adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE
-        return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.holdout is not None)
+        return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.held_out)
 
-    def _loop(self, base: BaseModel) -> tuple[str, Diagnosis | None]:
+    def _loop(self, base: Any) -> tuple[str, Diagnosis | None]:
         added = sum(step.added is not None for step in self.steps)
         refused: set[str] = set()
         while True:
             share = added / self.max_steps
-            diagnosis = diagnose(
-                base.robot,
-                self.recordings,
-                self.holdout,
-                base=base,
-                comparison=self.steps[-1].comparison,
-                validation=self.errors,
-                missing_torque=self.missing_torque,
-                side_by_side=self.side_by_side,
-                progress=self._part(share),
-            )
+            diagnosis = self.kind.diagnosed(base, self.steps[-1].comparison, self.last_errors, self._part(share))
             self._attach(diagnosis)
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
             if not chosen:
@@ -130,32 +188,32 @@ class _Search:
             refused.clear()
             added += 1
 
-    def _try(self, base: BaseModel, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> BaseModel | None:
+    def _try(self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> Any:
         """The model with a candidate, calibrated with all training recordings; None if that makes it worse."""
         self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
         try:
-            grown = BaseModel.of(diagnosis.refits[candidate.label], self.recordings, start=base)
-            errors = self._training_errors(grown)
+            grown = self.kind.calibrated(diagnosis.refits[candidate.label], base)
+            errors = self.kind.errors(grown)
         except JointscopeError:
             errors = None
         before = self.steps[-1].train_error
         # what left-out blocks said about the torque is not asked again of predictions in sigmas of a fine sensor
-        helps = errors is not None and errors.error**2 < (1.0 - MATTERS) * before**2
+        helps = errors is not None and errors.error**2 < (1.0 - self.kind.must_explain) * before**2
         if errors is None or not (helps or diagnosis.missing_torque_percent is not None):
             refused.add(candidate.label)
             return None
         self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, before, errors.error), errors)
         return grown
 
-    def _without_idle(self, base: BaseModel) -> BaseModel:
+    def _without_idle(self, base: Any) -> Any:
         """Takes out effects whose sizes fell back to null after another one came in."""
         found_before = {step.added for step in self.steps[:-1]}
         for here in base.robot.effects:
             if here.label not in found_before or not _is_idle(base.robot, here):
                 continue
             try:
-                smaller = BaseModel.of(remove_effect(base.robot, here.label), self.recordings, start=base)
-                errors = self._training_errors(smaller)
+                smaller = self.kind.calibrated(remove_effect(base.robot, here.label), base)
+                errors = self.kind.errors(smaller)
             except JointscopeError:
                 continue
             if errors.error**2 <= (1.0 + MATTERS) * self.steps[-1].train_error ** 2:
@@ -163,16 +221,14 @@ class _Search:
                 base = smaller
         return base
 
-    def _add_step(
-        self, added: str | None, removed: str | None, base: BaseModel, paragraph: str, errors: ValidationError
-    ) -> None:
-        comparison = compare_model(f"step {len(self.steps)}", base.robot, self.holdout or self.recordings[0])
+    def _add_step(self, added: str | None, removed: str | None, base: Any, paragraph: str, errors: Errors) -> None:
+        comparison = self.kind.compared(f"step {len(self.steps)}", base.robot)
         step = DiscoveryStep(
             added=added,
             removed=removed,
             robot=base.robot,
             train_error=errors.error,
-            heldout_error=comparison.judged_error if self.holdout is not None else float("nan"),
+            heldout_error=comparison.judged_error if self.held_out else float("nan"),
             floor=comparison.judged_floor,
             diagnosis=None,
             comparison=comparison,
@@ -181,10 +237,10 @@ class _Search:
         if self.save is not None:
             step = replace(step, robot_file=self.save(len(self.steps), step))
         self.steps.append(step)
-        self.errors = errors
+        self.last_errors = errors
 
     def _restore(self, saved: SavedStep) -> None:
-        comparison = compare_model(f"step {len(self.steps)}", saved.robot, self.holdout or self.recordings[0])
+        comparison = self.kind.compared(f"step {len(self.steps)}", saved.robot)
         self.steps.append(
             DiscoveryStep(
                 added=saved.added,
@@ -203,9 +259,6 @@ class _Search:
     def _attach(self, diagnosis: Diagnosis) -> None:
         """The last step learns what was found with it as the base."""
         self.steps[-1] = replace(self.steps[-1], diagnosis=diagnosis)
-
-    def _training_errors(self, base: BaseModel) -> ValidationError:
-        return judged_error(base, base.robot, base.calibrations, fit_and_judge(base)[1])
 
     def _part(self, start: float) -> Progress:
         width = 1.0 / (self.max_steps + 1)
@@ -236,4 +289,5 @@ def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> s
     own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
     values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
     what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
-    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma."
+    why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0]}."
+    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"

@@ -95,7 +95,7 @@ class Discovery:
 
     @property
     def judged_by(self) -> str:
-        """Whose errors the steps tell: "0.1 s ahead", or of a simulated loop."""
+        """Whose errors the steps tell, as of `ModelComparison`."""
         return self.steps[0].comparison.judged_by
 
     @property

@@ -16,8 +16,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.solving.posterior import ResidualPart
-
 Array = NDArray[np.float64]
 
 BLOCK = 0.5  # [s] longer than the memory of the smoother and of most disturbances
@@ -31,24 +29,31 @@ class BlockScores:
         t0, t1: limits of the recording [s].
         indices: global indices of the recording's shared values.
         size: number of all shared values.
+        length: of a block [s].
     """
 
-    def __init__(self, t0: float, t1: float, indices: NDArray[np.intp], size: int):
-        self._t0 = t0
+    def __init__(self, t0: float, t1: float, indices: NDArray[np.intp], size: int, length: float = BLOCK):
+        self._t0, self._length = t0, length
         self._indices = indices
         self.size = size
-        count = max(int(np.ceil((t1 - t0) / BLOCK)), 1)
+        count = max(int(np.ceil((t1 - t0) / length - 1e-9)), 1)
         self._scores = np.zeros((count, len(indices)))
         self._information = np.zeros((count, len(indices), len(indices)))
 
-    def add(self, times: Array, part: ResidualPart) -> None:
-        """Adds samples in the order of time; times have shape (m,) [s]."""
-        block = np.clip(((times - self._t0) / BLOCK).astype(int), 0, len(self._scores) - 1)
+    def add(self, times: Array, residual: Array, by_shared: Array) -> None:
+        """Adds samples in the order of time.
+
+        Args:
+            times: shape (m,) [s].
+            residual: whitened, shape (m, r).
+            by_shared: its derivative by the recording's shared values, states following along, shape (m, r, p).
+        """
+        block = np.clip(((times - self._t0) / self._length).astype(int), 0, len(self._scores) - 1)
         edges = np.flatnonzero(np.diff(block)) + 1
         for members in np.split(np.arange(len(block)), edges):
-            J = part.by_shared[members].reshape(-1, len(self._indices))
+            J = by_shared[members].reshape(-1, len(self._indices))
             b = block[members[0]]
-            self._scores[b] += J.T @ part.residual[members].ravel()
+            self._scores[b] += J.T @ residual[members].ravel()
             self._information[b] += J.T @ J
 
     def jackknife(self, H: Array) -> Array:

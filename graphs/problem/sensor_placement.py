@@ -17,6 +17,7 @@ from jointscope.factors.distorted import DistortedFactor
 from jointscope.factors.factor import Factor
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.interpolated import InterpolatedFactor
+from jointscope.factors.joint_torque import JointTorqueFactor
 from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.relative_gyro import RelativeGyroFactor
@@ -25,6 +26,7 @@ from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.problem.coarse_encoder import shared_error
 from jointscope.graphs.problem.timeline import Timeline
+from jointscope.robots.dynamics.spring_torques import SpringTorques
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
@@ -159,7 +161,7 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
     if isinstance(sensor, MotorEncoder | LinkEncoder):
         factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)
         return factor if shared is None else RescaledFactor(factor, shared[chosen])
-    if isinstance(sensor, Accelerometer) or (isinstance(sensor, Gyro) and sensor.form == "full"):
+    if isinstance(sensor, Accelerometer | TorqueSensor) or (isinstance(sensor, Gyro) and sensor.form == "full"):
         return factor_on_state(robot, name, values, times)
     assert isinstance(sensor, Gyro)
     if sensor.form == "vertical":
@@ -190,7 +192,8 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
         body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
         seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
         return AccelerometerFactor(sensor, values, *seat, _values(robot))
-    assert not isinstance(sensor, TorqueSensor)
+    if isinstance(sensor, TorqueSensor):
+        return JointTorqueFactor(sensor, values, SpringTorques(robot))
     if isinstance(sensor, MotorEncoder):
         inner = MotorEncoderFactor(sensor, values, robot.layout)
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}

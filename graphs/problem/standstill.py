@@ -11,24 +11,11 @@ Mask = NDArray[np.bool_]
 
 SATURATED = 3.0  # tanh of this is 1 to half a percent: dry friction is a sign from here on
 SLOW = 1e-3  # of the 95 % speed
-LOOK = 0.02  # [s] over which a speed is measured
-RESOLVED = 3.0  # [sigma] of such a speed
-LASTING = 0.05  # [s] a joint that is slow for less time turns over
-EDGE = 0.003  # [s] around a standstill
 
 
 def slowest_speed(v: Array, sharpness: float) -> float:
     """Speed below which friction is not known [rad/s, m/s]; v of shape (m,)."""
     return max(SATURATED / sharpness, SLOW * float(np.quantile(np.abs(v), 0.95)))
-
-
-def lasting(mask: Mask, steps: int) -> Mask:
-    """Those runs of a mask that last at least a number of steps, shape (m,)."""
-    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int)))
-    found = np.zeros_like(mask)
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        found[first:last] = last - first >= steps
-    return found
 
 
 def near(mask: Mask, steps: int) -> Mask:

@@ -3,37 +3,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from jointscope.graphs.transmission.equation import ELASTICITY, RIPPLE
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
 
+SPRING = "joint_elasticity"
 SIZES = {
-    "joint_elasticity": ("compliance",),
+    SPRING: ("compliance",),
     "encoder_delay": ("delay",),
     "gyro_delay": ("delay",),
-    "encoder_eccentricity": ("cos", "sin"),
+    RIPPLE: ("cos", "sin"),
     "backlash": ("half_gap",),
     "spring_cubic": ("stiffness",),
     "motor_viscous": ("coefficient",),
 }
-ONE_SIDED = ("joint_elasticity", "encoder_delay", "gyro_delay", "backlash", "motor_viscous")
+ONE_SIDED = (SPRING, "encoder_delay", "gyro_delay", "backlash", "motor_viscous")
 OF_A_SPRING = ("backlash", "spring_cubic", "motor_viscous")  # nothing of them shows while the gear is rigid
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Hypothesis:
     """An effect that may be missing.
 
     Attributes:
         effect: id.
         owner: joint, gyro or link encoder.
-        order: periods per turn of an effect that repeats with the position; the same effect at any order.
+        order: periods per turn of an effect that repeats with the position.
+        friction: whether dry friction, in the model already, shows with it: nothing sees it before a spring.
     """
 
     effect: str
     owner: str
-    order: float = field(default=1.0, compare=False)
+    order: float = 1.0
+    friction: bool = False
 
     @property
     def label(self) -> str:
@@ -42,52 +46,54 @@ class Candidate:
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """Full names of its columns."""
+        """Full names of its parameters that have a null value."""
         return tuple(f"{self.owner}.{self.effect}.{size}" for size in SIZES[self.effect])
+
+    @property
+    def mark(self) -> str:
+        """How names of columns end that stand beside those of order one."""
+        return "" if self.order == 1.0 else f"@{self.order:g}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its columns, those of its own sizes first."""
+        own = tuple(name + self.mark for name in self.sizes)
+        return (*own, f"{self.owner}.coulomb_torque") if self.friction else own
 
     @property
     def one_sided(self) -> bool:
         """Whether only sizes above zero are physical."""
         return self.effect in ONE_SIDED
 
+    def added_to(self, robot: Robot, values: dict[str, float], friction: float) -> Robot:
+        """The robot with this effect.
 
-def candidates(robot: Robot) -> list[Candidate]:
-    """All effects that could show in a robot, those it has included."""
+        Args:
+            robot: without it.
+            values: of its sizes, by the last part of their names.
+            friction: dry friction that shows with it [N m].
+        """
+        values = values | ({"order": self.order} if self.effect == RIPPLE else {})
+        robot = add_effect(robot, self.label, values)
+        return robot.with_values({f"{self.owner}.coulomb_torque": max(friction, 1e-9)}) if self.friction else robot
+
+
+def hypotheses(robot: Robot) -> list[Hypothesis]:
+    """All effects that a robot may lack."""
     encoder = robot.link_encoder
     assert encoder is not None
     measured = robot.torque_sensor is not None or robot.command.unit == "N m"
-    own = ["encoder_delay", "encoder_eccentricity"]
-    own += ["joint_elasticity", "backlash", "spring_cubic"] if measured else []
+    own = ["encoder_delay", RIPPLE]
+    own += [SPRING, "backlash", "spring_cubic"] if measured else []
     own += ["motor_viscous"] if measured and robot.torque_sensor is None else []
-    found = [Candidate("encoder_delay", encoder.name)]
-    found += [Candidate(effect, joint) for joint in robot.joints for effect in own]
-    return found + [Candidate("gyro_delay", gyro.name) for gyro in robot.gyros]
+    found = [Hypothesis("encoder_delay", encoder.name)]
+    for joint in robot.joints:
+        dry = robot.torque_sensor is None and f"{joint}.coulomb_torque" in robot.parameters
+        found += [Hypothesis(effect, joint, friction=dry and effect == SPRING) for effect in own]
+    found += [Hypothesis("gyro_delay", gyro.name) for gyro in robot.gyros]
+    return [h for h in found if not robot.has_effect(h.effect, h.owner)]
 
 
-def present(robot: Robot) -> list[Candidate]:
-    """The effects that a robot has."""
-    found = []
-    for here in robot.effects:
-        if here.effect.id in SIZES:
-            order = robot.parameters.get(here.parameter("order"))
-            found.append(Candidate(here.effect.id, here.owner, 1.0 if order is None else order.value))
-    return found
-
-
-def columns_of(robot: Robot, chosen: Sequence[Candidate]) -> list[str]:
-    """Names of all columns of a model: its effects, mountings of gyros, dry friction before measured springs."""
-    names = [f"{gyro.name}.R_imu_body.{axis}" for gyro in robot.gyros for axis in "xyz"]
-    for candidate in chosen:
-        names += candidate.sizes
-        friction = f"{candidate.owner}.coulomb_torque"
-        if candidate.effect == "joint_elasticity" and robot.torque_sensor is None and friction in robot.parameters:
-            names.append(friction)
-    return names
-
-
-def may_be_added(candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
-    """Whether an effect is not there yet and has what it needs."""
-    if candidate in chosen:
-        return False
-    spring = Candidate("joint_elasticity", candidate.owner)
-    return candidate.effect not in OF_A_SPRING or spring in chosen
+def may_be_added(h: Hypothesis, robot: Robot) -> bool:
+    """Whether an effect has what it needs."""
+    return h.effect not in OF_A_SPRING or f"{h.owner}.{ELASTICITY}" in robot.parameters

@@ -12,86 +12,62 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from jointscope.graphs.transmission.candidates import Candidate, candidates
-from jointscope.graphs.transmission.equation import Equation
-from jointscope.graphs.transmission.position_ripple import with_order
-from jointscope.graphs.transmission.regression import fitted, parts, spread
-from jointscope.graphs.transmission.transmission_model import TransmissionModel
-from jointscope.robots.recordings.recording import Recording
-
-Array = NDArray[np.float64]
+from jointscope.graphs.transmission.candidates import Hypothesis
+from jointscope.graphs.transmission.linear_equations import LinearEquations, solved_products
 
 PARALLEL = 0.95
+ONE_TIME = 0.25  # relative difference of joints that may still share one lateness
 
 
 def look_alikes(
-    model: TransmissionModel, recordings: Sequence[Recording], found: Candidate
-) -> tuple[tuple[str, ...], str]:
-    """Labels of the effects that cannot be told from `found`, and a sentence about what it is."""
-    equations = with_order(model.equations(recordings), found)
-    labels = []
-    for other in candidates(model.robot):
-        if other == found or other in model.chosen:
-            continue
-        if _parallel(equations, model.names, found, other) > PARALLEL:
-            labels.append(other.label)
-    encoder = model.robot.link_encoder
-    if encoder is not None and found.owner == encoder.name:
-        return tuple(labels), _lateness_sentence(equations, model, found)
-    alike = f"; in these recordings {', '.join(labels)} would explain the same" if labels else ""
-    order = f" with {found.order:.4g} periods per turn of the joint" if found.order != 1.0 else ""
-    return tuple(labels), f"{found.label} added{order}{alike}."
+    equations: LinearEquations, names: Sequence[str], found: Hypothesis, others: Sequence[Hypothesis]
+) -> tuple[str, ...]:
+    """Labels of the effects that cannot be told from one that was found.
+
+    Args:
+        equations: of all recordings.
+        names: columns of the model.
+        found: the effect.
+        others: all that may be missing.
+    """
+    labels = [h.label for h in others if h.label != found.label and _parallel(equations, names, found, h) > PARALLEL]
+    return tuple(dict.fromkeys(labels))
 
 
-def per_joint(equations: Sequence[Equation], names: Sequence[str], size: str) -> dict[str, tuple[float, float]]:
-    """A shared size found by each joint alone, with its standard deviation, by joint."""
-    found = {}
-    for gear in sorted({e.name for e in equations if size in e.columns}):
-        own = [e for e in equations if e.name == gear]
-        columns = [name for name in [*names, size] if any(name in e.columns for e in own)]
-        k = columns.index(size)
-        found[gear.removesuffix(".gear")] = float(fitted(parts(own, columns))[k]), float(spread(own, columns)[k])
-    return found
-
-
-def _parallel(equations: Sequence[Equation], names: Sequence[str], one: Candidate, other: Candidate) -> float:
-    """Smallest share of the other's columns that those of one explain, over the equations that the other is in."""
-    shares = []
-    for name in sorted({e.name for e in equations}):
-        own = [e for e in equations if e.name == name]
-        if not any(size in e.columns for e in own for size in other.sizes):
-            continue
-        left = np.vstack([p.columns for p in parts(own, [*names, *one.sizes, *other.sizes])])
-        base, first, second = np.split(left, [len(names), len(names) + len(one.sizes)], axis=1)
-        first, second = _without(first, base), _without(second, base)
-        size = np.linalg.norm(second)
-        shares.append(1.0 - float(np.linalg.norm(_without(second, first)) / size) ** 2 if size > 0.0 else 0.0)
-    return float(np.sqrt(min(shares, default=0.0)))
-
-
-def _without(columns: Array, base: Array) -> Array:
-    """Columns without their parts along a base."""
-    used = base[:, np.linalg.norm(base, axis=0) > 0.0]
-    if not used.shape[1]:
-        return columns
-    used = used / np.linalg.norm(used, axis=0)
-    return columns - used @ np.linalg.lstsq(used, columns, rcond=1e-9)[0]
-
-
-def _lateness_sentence(equations: Sequence[Equation], model: TransmissionModel, found: Candidate) -> str:
+def lateness_sentence(equations: LinearEquations, names: Sequence[str], found: Hypothesis) -> str:
     """One lateness for all joints, or friction: what the joints say one by one."""
-    by_joint = per_joint(equations, model.names, found.sizes[0])
+    (size,) = found.sizes
+    by_joint = {}
+    for gear in sorted({place.name for place in equations.places if place.name.endswith(".gear")}):
+        own = equations.only(gear)
+        late, sigma = own.fitted([*names, size])[-1], np.sqrt(own.spread([*names, size])[-1, -1])
+        by_joint[gear.removesuffix(".gear")] = float(late), float(sigma)
     said = ", ".join(f"{joint} {1e3 * late:.2f} +- {1e3 * sigma:.2f} ms" for joint, (late, sigma) in by_joint.items())
     late = np.array([value for value, _ in by_joint.values()])
     sentence = (
         f"{found.owner} is late against the motor encoders: {said}, joint by joint. A part that goes with the speed "
         "looks like viscous friction or damping before the spring, too, and the two cannot be told apart in one joint"
     )
-    if np.all(late > 0.0) and len(late) > 1 and np.ptp(late) < 0.25 * np.mean(late):
+    if np.all(late > 0.0) and len(late) > 1 and np.ptp(late) < ONE_TIME * np.mean(late):
         return (
             f"{sentence}; one time for all joints, and a sign that friction would not have (it holds the motor back), "
-            "say that it is time."
+            "say that it is time"
         )
-    return f"{sentence}; here the joints do not agree on one time, so damping remains possible."
+    return f"{sentence}; here the joints do not agree on one time, so damping remains possible"
+
+
+def _parallel(equations: LinearEquations, names: Sequence[str], one: Hypothesis, other: Hypothesis) -> float:
+    """Smallest share of the other's columns that those of one explain, over the equations that the other is in."""
+    shares, k = [], len(names)
+    for name in sorted({place.name for place in equations.places}):
+        first, second = one.columns[: len(one.sizes)], other.columns[: len(other.sizes)]
+        G = equations.only(name).reduced([*names, *first, *second])[1:, 1:]
+        if not np.any(np.diag(G)[k + len(first) :]):
+            continue
+        beside = G[k:, k:] - G[k:, :k] @ solved_products(G[:k, :k], G[:k, k:])
+        a, b = np.split(np.arange(len(beside)), [len(first)])
+        size = float(np.trace(beside[np.ix_(b, b)]))
+        explained = beside[np.ix_(b, a)] @ solved_products(beside[np.ix_(a, a)], beside[np.ix_(a, b)])
+        shares.append(float(np.trace(explained)) / size if size > 0.0 else 0.0)
+    return float(np.sqrt(max(min(shares, default=0.0), 0.0)))

@@ -41,16 +41,16 @@ class Transmission:
     def __init__(self, robot: Robot, names: tuple[str, ...]):
         self._layout: StateLayout = robot.layout
         self._fixed = np.eye(robot.n) if robot.transmission is None else robot.transmission
-        own, added = elements(robot)
-        self._own, self._added = own, added
+        own, added = self._own, self._added = elements(robot)
+        self._T, self._A = np.eye(robot.n), np.eye(robot.n)
         places = [(name, place) for part in (own, added) for name, place in part.items()]
         self.free = [(names.index(name), place) for name, place in places if name in names]
 
     @staticmethod
     def of(robot: Robot, names: tuple[str, ...] = ()) -> Transmission | None:
         """The transmission; None where every motor moves its own joint alone."""
-        plain = robot.transmission is None and not any(elements(robot))
-        return None if plain else Transmission(robot, names)
+        found = Transmission(robot, names)
+        return None if robot.transmission is None and not found._own and not found._added else found
 
     def matrix(self, values: Mapping[str, float]) -> Array:
         """T, shape (n, n)."""
@@ -62,8 +62,11 @@ class Transmission:
         return T
 
     def inverse(self, values: Mapping[str, float]) -> Array:
-        """A = T^-1, shape (n, n)."""
-        return np.asarray(np.linalg.inv(self.matrix(values)), dtype=np.float64)
+        """A = T^-1, shape (n, n); laws ask several times at the same values."""
+        T = self.matrix(values)
+        if not np.array_equal(T, self._T):
+            self._T, self._A = T, np.asarray(np.linalg.inv(T), dtype=np.float64)
+        return self._A
 
     def seen(self, x: Array, values: Mapping[str, float]) -> Array:
         """States whose link coordinates are those that the motors see, shape (m, d)."""

@@ -92,11 +92,15 @@ def _check_links(robot: Robot, place: str) -> None:
         return
     if not robot.motor_encoder.zero_known:
         raise RobotError(f"{place}: sensors.{robot.motor_encoder.name}.zero: unknown needs link_dynamics: free")
-    if robot.torque_sensor is not None:
+    sensor, rigid = robot.torque_sensor, [joint for joint in robot.joints if joint not in robot.layout.motors]
+    if sensor is not None and rigid:
+        label = " ".join(f"joint_elasticity@{joint}" for joint in rigid)
         raise RobotError(
-            f"{place}: sensors.{robot.torque_sensor.name}: joint_torque is used with link_dynamics: free only; "
-            "remove the sensor, or set model.link_dynamics"
+            f"{place}: sensors.{sensor.name}: a torque is measured at the spring of a joint, and {', '.join(rigid)} "
+            f"has none; remove the sensor, then `jointscope add {robot.path.name} {label} -o OUT.yaml` and put it back"
         )
+    if sensor is not None and robot.transmission is not None:
+        raise RobotError(f"{place}: sensors.{sensor.name}: not used with a section transmission; remove the sensor")
 
 
 def _check_springs(robot: Robot, place: str) -> None:
@@ -192,6 +196,10 @@ def _check_parameters(robot: Robot, place: str) -> None:
     }
     units |= of_effects | element_units(robot)
     units |= {name: "m" for sensor in robot.accelerometers for name in sensor.lever}
+    if robot.torque_sensor is not None:
+        units |= {
+            name: unit for pair in robot.torque_sensor.parameters for name, unit in zip(pair, ("1", "N m"), strict=True)
+        }
     of_poses = {} if robot.poses is None else effect_units(robot.joints) | pose_units(robot.joints)
     units = of_poses | units
     for name, parameter in robot.parameters.items():

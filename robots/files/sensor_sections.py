@@ -117,7 +117,7 @@ def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> Moto
     source, sigmas = _position(section, joints)
     zero_known = section.raw("zero") != UNKNOWN
     zero = section.array("zero", (len(joints),), np.zeros(len(joints))) if zero_known else np.zeros(len(joints))
-    return MotorEncoder(name, source, sigmas, zero, joints, zero_known, section.flag("estimate_sigma", True))
+    return MotorEncoder(name, source, sigmas, zero, joints, section.flag("estimate_sigma", True), zero_known)
 
 
 def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkEncoder:

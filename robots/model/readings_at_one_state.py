@@ -4,13 +4,14 @@
     encoder  q_motor + zero + errors of effects, or q_link + zero
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
     accelerometer  R_imu_body f_body(q_link, v_link, a_link), to which a bias is added
+    torque   scale times that of the springs, and offset
 
 A test holds it against the factors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,9 +31,11 @@ class ReadingsAtOneState:
 
     Args:
         robot: sensors, effects and their parameters.
+        torques: reading and derivative of its torque sensor at a state of shape (d,), where it has one.
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, torques: Callable[[Array], tuple[Array, Array]] | None = None):
+        self._torques = {} if robot.torque_sensor is None or torques is None else {robot.torque_sensor.name: torques}
         self._layout, tree = robot.layout, robot.kinematic_tree
         self._model, self._data = tree.model, tree.model.createData()
         self._zeros, self._coupling = np.zeros(tree.model.nv), tree.coupling
@@ -67,6 +70,8 @@ class ReadingsAtOneState:
         """
         if name in self._accelerometers:
             return self._force(self._accelerometers[name], x)
+        if name in self._torques:
+            return self._torques[name](x)
         if name in self._gyros:
             reading, J = self._rate(name, x)
             offset: Array | float = 0.0

@@ -6,7 +6,7 @@ A Robot is immutable; a calibration returns a new one. It is read from and writt
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -145,15 +145,14 @@ class Robot:
         """The sensors whose offset is another one in each recording: gyros first."""
         return (*self.gyros, *self.accelerometers)
 
-    def without_accelerometers(self) -> Robot:
-        """The robot for what does not ask its accelerometers; their places stay as they are."""
-        if not self.accelerometers:
+    def without(self, sensors: Sequence[Accelerometer | TorqueSensor]) -> Robot:
+        """The robot for what does not ask some sensors; their own parameters stay as they are."""
+        if not sensors:
             return self
-        gone = {sensor.name for sensor in self.accelerometers}
-        places = {name for sensor in self.accelerometers for name in sensor.lever}
-        parameters = {n: replace(p, fixed=True) if n in places else p for n, p in self.parameters.items()}
-        sensors = {name: sensor for name, sensor in self.sensors.items() if name not in gone}
-        return replace(self, sensors=sensors, parameters=parameters)
+        gone, own = {s.name for s in sensors}, {name for s in sensors for name in s.own}
+        parameters = {n: replace(p, fixed=True) if n in own else p for n, p in self.parameters.items()}
+        kept = {name: sensor for name, sensor in self.sensors.items() if name not in gone}
+        return replace(self, sensors=kept, parameters=parameters)
 
     def gravity_at(self, accelerometer: Accelerometer) -> Array:
         """Gravity as an accelerometer feels it, in the base frame, shape (3,) [m/s^2]."""

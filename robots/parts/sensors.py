@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,17 +68,17 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class MotorEncoder:
-    """Encoders on all motors, in link units: theta_measured = q_motor + zero + noise (eq. 20).
+class Encoder:
+    """Encoders on all joints, in link units: theta_measured = q + zero + noise.
 
     Attributes:
         name: key in the robot file.
         source: topic.
         sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
-        zero: reading at q_motor = 0, shape (n_joints,) [rad or m].
+        zero: reading at q = 0, shape (n_joints,) [rad or m].
         joints: names of the joints.
-        zero_known: False for an incremental encoder, whose zero is another one in each recording.
         estimate_sigma: whether a calibration may find other sigmas.
+        zero_known: False for an incremental encoder, whose zero is another one in each recording.
     """
 
     name: str
@@ -85,13 +86,15 @@ class MotorEncoder:
     sigmas: NDArray[np.float64]
     zero: NDArray[np.float64]
     joints: tuple[str, ...]
-    zero_known: bool = True
     estimate_sigma: bool = True
+    zero_known: bool = True
+
+    side: ClassVar[str]
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Channel names, one per joint."""
-        return tuple(f"{joint}.motor_position" for joint in self.joints)
+        return tuple(f"{joint}.{self.side}_position" for joint in self.joints)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -100,39 +103,22 @@ class MotorEncoder:
 
 
 @dataclass(frozen=True)
-class LinkEncoder:
-    """Encoders on all links, behind the transmission: theta_measured = q_link + zero + noise.
+class MotorEncoder(Encoder):
+    """On the motors, q = q_motor (eq. 20)."""
 
-    Attributes:
-        name: key in the robot file.
-        source: topic.
-        sigmas: standard deviation of the noise of each joint, shape (n_joints,) [rad, of a prismatic joint m].
-        zero: reading at q_link = 0, shape (n_joints,) [rad or m].
-        joints: names of the joints.
-        estimate_sigma: whether a calibration may find other sigmas.
-    """
+    side = "motor"
 
-    name: str
-    source: Topic
-    sigmas: NDArray[np.float64]
-    zero: NDArray[np.float64]
-    joints: tuple[str, ...]
-    estimate_sigma: bool = True
 
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Channel names, one per joint."""
-        return tuple(f"{joint}.link_position" for joint in self.joints)
+@dataclass(frozen=True)
+class LinkEncoder(Encoder):
+    """On the links, behind the transmission, q = q_link."""
 
-    @property
-    def units(self) -> tuple[str, ...]:
-        """SI unit of each channel."""
-        return self.source.si_units(len(self.joints))
+    side = "link"
 
 
 @dataclass(frozen=True)
 class TorqueSensor:
-    """Torques that the transmissions pass on to their links, measured behind the friction of the motors.
+    """Torques that the springs pass on to their links: theta = scale tau + offset + noise, behind the motors' friction.
 
     Attributes:
         name: key in the robot file.
@@ -155,6 +141,22 @@ class TorqueSensor:
     def units(self) -> tuple[str, ...]:
         """SI unit of each channel."""
         return ("N m",) * len(self.joints)
+
+    @property
+    def parameters(self) -> tuple[tuple[str, str], ...]:
+        """Full names of scale [1] and offset [N m] of each joint, which a robot file may have."""
+        return tuple((f"{self.name}.scale_{joint}", f"{self.name}.offset_{joint}") for joint in self.joints)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """All of these names."""
+        return tuple(name for pair in self.parameters for name in pair)
+
+    def scale_and_offset(self, values: Mapping[str, float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Scale and offset of each joint, shape (n_joints,); 1 and 0 [N m] where no parameter says another."""
+        pairs = [(values.get(scale, 1.0), values.get(offset, 0.0)) for scale, offset in self.parameters]
+        scale, offset = np.array(pairs).T
+        return scale, offset
 
     @property
     def sigmas(self) -> NDArray[np.float64]:
@@ -263,6 +265,8 @@ class Accelerometer:
     def lever(self) -> tuple[str, ...]:
         """Names of the parameters with its place on the body."""
         return tuple(f"{self.name}.lever_{axis}" for axis in AXES)
+
+    own = lever
 
     def place(self, parameters: Mapping[str, Parameter]) -> NDArray[np.float64]:
         """Where it sits on its body, p_body, shape (3,) [m]."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robot files of robots whose masses are not known, and encoders whose zero is not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -67,7 +68,6 @@ TORQUE = """  torque:
     ("change", "message"),
     [
         (("sigma: 6.9259e-5", "zero: unknown\n    sigma: 6.9259e-5"), "zero: unknown needs link_dynamics: free"),
-        (("  imu1:\n", TORQUE), "joint_torque is used with link_dynamics: free only"),
     ],
 )
 def test_what_belongs_to_free_links_is_refused_where_masses_are_known(tmp_path, change, message):
@@ -77,6 +77,15 @@ def test_what_belongs_to_free_links_is_refused_where_masses_are_known(tmp_path, 
     (tmp_path / "doggy.yaml").write_text(text.replace(*change), encoding="utf-8")
     with pytest.raises(RobotError, match=message):
         load_robot(tmp_path / "doggy.yaml")
+
+
+def test_a_torque_sensor_needs_a_spring_at_every_joint(tmp_path):
+    text = ready_robots()["xl330_pendulum"].read_text(encoding="utf-8")
+    text = text.replace("urdf: xl330", "urdf: ready:xl330_pendulum/xl330")
+    sensor = TORQUE.removesuffix("  imu1:\n")
+    (tmp_path / "x.yaml").write_text(re.sub(r"(?m)^sensors:.*\n", f"sensors:\n{sensor}", text), encoding="utf-8")
+    with pytest.raises(RobotError, match=r"measured at the spring of a joint, and .* has none; .*joint_elasticity@"):
+        load_robot(tmp_path / "x.yaml")
 
 
 def test_what_needs_equations_of_motion_says_so():

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jointscope.robots.errors import JointscopeError
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
-from jointscope.tools.report import calibration_report, comparison_report, write_report
+from jointscope.tools.report import calibration_report, comparison_report
 from jointscope.tools.report.page.decimate import min_max
 from jointscope.tools.report.page.page import sentence
 from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, path, plot
@@ -243,35 +242,6 @@ def test_a_plot_survives_empty_constant_and_diverging_curves():
     svg = plot(Axes("all <sorts>", y_range=(0.0, 2.0)), marks)
     assert "nan" not in svg and "inf" not in svg.replace("all &lt;sorts&gt;", "")
     assert "all &lt;sorts&gt;" in svg
-
-
-def test_a_report_is_written_whole(tmp_path):
-    write_report(tmp_path / "r.html", "old")
-    write_report(tmp_path / "r.html", "new ±")
-    assert (tmp_path / "r.html").read_text(encoding="utf-8") == "new ±"
-    assert [p.name for p in tmp_path.iterdir()] == ["r.html"]
-
-
-def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path):
-    with pytest.raises(JointscopeError, match=r"cannot write .*r\.html: No such file or directory"):
-        write_report(tmp_path / "no" / "r.html", "page")
-    with pytest.raises(JointscopeError, match="cannot write"):
-        write_report(tmp_path, "page")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_full_disk_is_one_line_and_the_old_report_stays(tmp_path, monkeypatch):
-    write_report(tmp_path / "r.html", "old")
-
-    def full(self, *args, **kwargs):
-        self.touch()
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_text", full)
-    with pytest.raises(JointscopeError, match="No space left on device"):
-        write_report(tmp_path / "r.html", "new")
-    assert (tmp_path / "r.html").read_bytes() == b"old"
-    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_calibration_with_a_bearing_and_a_memory_is_reported_by_joint_and_by_hinge():

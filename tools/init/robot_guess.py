@@ -250,5 +250,6 @@ def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
     used = {*whole, *(part for topic in whole for part in parts_of(topic))}
     said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]
     if roles.joint_torque is not None and masses:
-        said.append(f"{roles.joint_torque.signal.topic}, effort: measured joint torques need link_dynamics: free")
+        topic = roles.joint_torque.signal.topic
+        said.append(f"{topic}, effort: torques of joints are measured at springs, and joints are rigid here")
     return said

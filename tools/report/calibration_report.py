@@ -34,19 +34,18 @@ def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMIT
         HTML without references to anything outside of itself.
     """
     recordings = [bag.recording for bag in result.bags]
+    motion = not result.robot.free_links
     sections = [
         verdict(result),
         *acceptance(checked),
         parameters(result),
         *rest_pictures(*rests_of(result)),
         mounting(result),
-        fits(result),
-        commands(result),
+        *([fits(result), commands(result)] if motion else []),
         residuals(result),
         weak_directions(result),
         correlation(result),
-        noise(result),
-        states(result),
+        *([noise(result), states(result)] if motion else []),
         convergence(result),
         notices(recordings),
         provenance(recordings, [result.robot], result.wall_seconds),

@@ -26,6 +26,7 @@ from jointscope.tools.simulator.loop.sampled_sensor import (
     SampledEncoder,
     SampledGyro,
     SampledSensor,
+    SampledTorque,
 )
 from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling
 from jointscope.tools.simulator.truth import effect_records, true_parameters, true_robot
@@ -138,6 +139,10 @@ class Occasion:
             times = stamps(links.name, sampling.encoder_rate)
             noise = self.random("noise", links.name).standard_normal((len(times), self._robot.n))
             found[links.name] = SampledEncoder(links, self.engine, sampling, times, seed, noise)
+        torque = self._robot.torque_sensor
+        if torque is not None:
+            times = stamps(torque.name, sampling.encoder_rate)
+            found[torque.name] = SampledTorque(torque, self.engine, sampling, times, seed, self.truth)
         for gyro in self.gyros:
             times = stamps(gyro.sensor.name, sampling.gyro_rate)
             found[gyro.sensor.name] = SampledGyro(gyro, self.engine, sampling, times, seed)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.presentation.judgement import Judgement, judge
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
@@ -13,10 +13,16 @@ SHOWN_FINDINGS = 6  # the report has them all
 SHOWN_DIRECTIONS = 3
 
 
-def calibration_text(result: CalibrationResult) -> str:
-    """The summary of a calibration for the terminal."""
-    parts = [_headline(result), _verdict(result), _parameters(result), _weak_directions(result), _channels(result)]
-    parts.append(rests_beside_motion(result))
+def calibration_text(result: CalibrationResult, judgement: Judgement | None = None) -> str:
+    """The summary of a calibration for the terminal, with its judgement where that is known."""
+    parts = [
+        _headline(result),
+        _verdict(result, judgement or judge(result)),
+        _parameters(result),
+        _weak_directions(result),
+        _channels(result),
+        rests_beside_motion(result),
+    ]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -29,8 +35,7 @@ def _headline(result: CalibrationResult) -> str:
     )
 
 
-def _verdict(result: CalibrationResult) -> str:
-    judgement = judge(result)
+def _verdict(result: CalibrationResult, judgement: Judgement) -> str:
     lines = [judgement.headline]
     doubts = [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
     told_below = {direction.text for direction in result.weak_directions}

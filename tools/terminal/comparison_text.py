@@ -37,7 +37,7 @@ def _models(result: ComparisonResult) -> str:
         for m in result.models
     ]
     table = text_table(["model", "error", "floor", "unexplained"], rows, "<>>>")
-    return f"Error 0.1 s ahead in sensor sigmas, and the floor that noise alone would give:\n{table}"
+    return f"Error {result.models[0].predicted} in sensor sigmas, and the floor that noise alone would give:\n{table}"
 
 
 def _channels(result: ComparisonResult) -> str:

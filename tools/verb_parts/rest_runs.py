@@ -15,7 +15,7 @@ from jointscope.robots.recordings.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, other_kinds, made_from
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import jointscope
+from jointscope.robots.errors import RobotError
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.outside_modules import need_module
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json
@@ -64,6 +66,16 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
     parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+
+
+def check_viewer(robot: Robot, files: ResultFiles) -> None:
+    """The viewer shows states of links, which a robot with free links has not.
+
+    Raises:
+        RobotError: a viewer recording was asked for.
+    """
+    if robot.free_links and files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd is not available with link_dynamics: free; use --report")
 
 
 def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:

@@ -8,14 +8,14 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RecordingError, RobotError, SolveError
-from jointscope.tools.acceptance.evaluation import NO_LIMITS, check_models
+from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration, weighted_rests
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_calibration
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
 
@@ -72,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
         [*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.rests, *args.effects]
     )
     from jointscope.graphs.calibration.calibrate import calibrate
+    from jointscope.graphs.transmission.calibrate_links import calibrate_links
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.presentation.judgement import judge
@@ -92,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
         print(text)
         print(f"\nWrote {', '.join(map(str, files.all))}")
         return print_acceptance(checked)
+    check_viewer(robot, files)
     if robot.free_links and (args.incremental or args.solver != "condensed"):
         raise SolveError(
             f"{robot.name}: its links are free, so there are no states to estimate one by one; leave out "
@@ -102,23 +104,19 @@ def run(args: argparse.Namespace) -> int:
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
         if robot.free_links:
-            if limits:
-                raise RobotError(f"{robot.name}: --accept is not available with link_dynamics: free; leave it out")
-            from jointscope.tools.verb_parts.free_links import run_free_links
-
-            text, checked = run_free_links(robot, recordings, None, files, False, progress), NO_LIMITS
+            result = calibrate_links(robot, recordings, progress=progress)
         else:
             seen = None if args.incremental else progress  # what is printed and a bar would write into each other
             rests = weighted_rests(robot, args.rests, progress)
             result = calibrate(robot, recordings, solver=_solver(args, robot), sets=rests, progress=seen)
-            if files.report is not None or files.rrd is not None:
-                progress("writing", 1.0)
-            checked = check_models(limits, {robot.name: result.to_json()})
-            write_calibration(result, files, checked)
-            text = calibration_text(result)
-    print(text)
+        if files.report is not None or files.rrd is not None:
+            progress("writing", 1.0)
+        checked = check_models(limits, {robot.name: result.to_json()})
+        write_calibration(result, files, checked)
+    judgement = judge(result)
+    print(calibration_text(result, judgement))
     print(f"\nWrote {', '.join(map(str, files.all))}")
-    if not robot.free_links and judge(result).level != "good":
+    if judgement.level != "good":
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
     return print_acceptance(checked)

@@ -15,7 +15,7 @@ from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.named_recordings import discovery_of
 from jointscope.tools.verb_parts.pose_runs import run_pose_search
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_discovery
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
@@ -25,10 +25,10 @@ EXAMPLE = """example:
   jointscope discover tx90l --poses poses.csv --holdout-poses others.csv -o found.yaml
 
 Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
-after the last finished step; found.discovery.json remembers what it started from. Robots with link_dynamics:
-free are searched in one go, without files of steps."""
+after the last finished step; found.discovery.json remembers what it started from."""
 
 MAX_STEPS = 8
+MOST_STEPS = 12  # of robots with free links, whose sensors show one effect for each joint and gyro
 
 
 def add_parser(subparsers: Any) -> None:
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
     files = ResultFiles.of(args)
     check_kind(args)
-    beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MAX_STEPS + 1))]
+    beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MOST_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
     load_user_effects(args.effects)
     from jointscope.robots.files.robot_file import load_robot
@@ -68,19 +68,14 @@ def run(args: argparse.Namespace) -> int:
             print(run_pose_search(robot, args.poses, args.holdout_poses, files, True, progress))
         print(f"\nWrote {', '.join(map(str, files.all))}")
         return 0
+    check_viewer(robot, files)
     with progress_bar() as progress:
         recordings, holdout = read_bags(args, robot, progress)
-        if robot.free_links:
-            from jointscope.tools.verb_parts.free_links import run_free_links
-
-            text = run_free_links(robot, recordings, holdout, files, True, progress)
-        else:
-            result = _discover(args, robot, recordings, holdout, progress)
-            if files.pictures:
-                progress("writing", 1.0)
-            write_discovery(result, files, robot.path.name)
-            text = discovery_text(result)
-    print(text)
+        result = _discover(args, robot, recordings, holdout, progress)
+        if files.pictures:
+            progress("writing", 1.0)
+        write_discovery(result, files, robot.path.name)
+    print(discovery_text(result))
     print(f"\nWrote {', '.join(map(str, files.all))}")
     return 0
 
@@ -90,6 +85,7 @@ def _discover(
 ) -> Any:
     """The computation; whatever ends it, finished steps stay on disk."""
     from jointscope.graphs.discovery.discover import discover
+    from jointscope.graphs.transmission.discover_links import discover_links
     from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
     hashes = hashes_of(robot, recordings, holdout, args.effects)
@@ -97,14 +93,18 @@ def _discover(
     saved = () if args.restart else state.resume()
     if saved:
         print(f"Continuing after step {len(saved) - 1}, {saved[-1].robot_file}; --restart starts anew.\n", flush=True)
+    resume = saved or None
     try:
+        if robot.free_links:
+            result = discover_links(robot, recordings, holdout, save=state.save, resume=resume, progress=progress)
+            return discovery_of(replace(result, robot_file=str(args.output)), recordings, holdout)
         with workers_of(args) as workers:
             result = discover(
                 robot,
                 recordings,
                 holdout,
                 save=state.save,
-                resume=saved or None,
+                resume=resume,
                 max_steps=MAX_STEPS,
                 missing_torque=ResultFiles.of(args).pictures,
                 side_by_side=workers,

@@ -27,6 +27,7 @@ from jointscope.graphs.fixed_lag.window.sample_judge import SampleJudge
 from jointscope.graphs.fixed_lag.window.smoother_window import Rows, SmootherWindow
 from jointscope.graphs.fixed_lag.window.users_factor import rows_of, ticks_of
 from jointscope.graphs.problem.timeline import LONGEST_STEP
+from jointscope.robots.dynamics.spring_torques import torque_reading
 from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.model.robot import Robot
 
@@ -55,7 +56,7 @@ class TickEngine:
             np.repeat([s.bias_prior_sigma for s in robot.biased], 3),
         )
         self._process = ProcessModel(robot, self.layout, adapt, bias_walk)
-        self._readings = ReadingsAtOneState(robot)
+        self._readings = ReadingsAtOneState(robot, torque_reading(robot))
         self._judge = SampleJudge({name: sensor.channels for name, sensor in robot.sensors.items()})
         self.past: deque[PastTick] = deque()
         self._uncommitted: list[tuple[PastTick, int]] = []  # ticks and the places of their rows among the new factors

@@ -39,12 +39,36 @@ def test_the_last_part_of_a_recording_can_be_held_out(tmp_path, capsys):
     assert "--holdout-share: expected a single BAG, got 2" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verb", [["compare", "kr300", KR[0]], ["diagnose", "kr300", KR[0]]])
-def test_verbs_that_need_masses_say_so_in_one_line(verb, capsys):
-    assert main(verb) == 1
+def test_diagnose_and_compare_have_report_and_json_as_of_every_robot(tmp_path, capsys):
+    report, numbers = tmp_path / "r.html", tmp_path / "n.json"
+    assert main(["diagnose", "kr300", *KR, "--report", str(report), "--json", str(numbers)]) == 0
+    assert "it lacks encoder_delay@link_encoder" in capsys.readouterr().out
+    best = json.loads(numbers.read_text(encoding="utf-8"))["candidates"][0]
+    assert best["effect"] == "encoder_delay" and best["verdict"] == "missing"
+    assert best["parameters"]["delay"]["value"] == pytest.approx(3e-3, abs=2e-4)
+    assert main(["compare", "kr300", KR[0], "--report", str(report), "--json", str(numbers)]) == 0
+    assert "of each sensor from the others" in capsys.readouterr().out
+    horizons = json.loads(numbers.read_text(encoding="utf-8"))["models"]["kr300"]["channels"]["joint_a1.gear"][
+        "horizons"
+    ]
+    assert horizons["0.1"] == horizons["open_loop"] > 1e-4
+
+
+def test_models_with_and_without_masses_are_not_compared(capsys):
+    assert main(["compare", "kr300", "doggy", KR[0]]) == 1
     said = capsys.readouterr().err
-    assert "no equations of motion" in said
-    assert len(said.splitlines()) == 1
+    assert "compare those alike" in said and len(said.splitlines()) == 1
+
+
+def test_a_search_that_was_interrupted_goes_on(tmp_path, capsys):
+    args = ["discover", "kr300", *KR, "-o", str(tmp_path / "found.yaml")]
+    assert main(args) == 0
+    first = capsys.readouterr().out
+    assert main(args) == 0
+    assert (
+        "Continuing after step" in (again := capsys.readouterr().out)
+        and again.splitlines()[-3:] == first.splitlines()[-3:]
+    )
 
 
 def test_a_viewer_recording_is_refused_before_anything_is_written(tmp_path, capsys):

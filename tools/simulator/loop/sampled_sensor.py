@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import joined
 from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling, read_encoder
 from jointscope.tools.simulator.world.engine import Engine
 from jointscope.tools.simulator.world.hooks import age, distort, logged, taken_at
+from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.random_streams import random_stream
 from jointscope.tools.simulator.world.trajectory import Trajectory
 
@@ -127,3 +129,33 @@ class SampledAccelerometer(SampledSensor):
         forces = self._engine.specific_forces(sensor.name, self._gravity, *motion)
         forces = distort(self._effects, sensor, self.stamps[rows], forces @ mounted.R_imu_body.T)
         return forces + mounted.bias + sensor.sigma * self._noise[rows]
+
+
+class SampledTorque(SampledSensor):
+    """The torque sensors of the joints, by the engine's inverse dynamics of the links.
+
+    Nothing but its spring acts on a link that has no effects of its own; scale and offset are those of `robot`.
+    """
+
+    def __init__(
+        self, sensor: TorqueSensor, engine: Engine, sampling: Sampling, stamps: Array, seed: int, robot: Robot
+    ):
+        super().__init__(sensor, engine, sampling, stamps, seed)
+        self._mujoco, self._model, self._link, self._sigmas = load_mujoco(), engine.model, engine.link, sensor.sigmas
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._scale, self._offset = sensor.scale_and_offset(values)
+        self._noise = random_stream(seed, "noise", sensor.name).standard_normal((len(stamps), len(sensor.joints)))
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Torques, shape (k, n_joints) [N m]."""
+        times = self.taken[rows] - self._age[0]
+        (q, v), a = trajectory.at(times), trajectory.acceleration(times)
+        mujoco, data = self._mujoco, self._mujoco.MjData(self._model)
+        torques, found = np.empty((len(q), len(self._link))), np.empty(self._model.nv)
+        for k in range(len(q)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+            mujoco.mj_fwdPosition(self._model, data)
+            mujoco.mj_fwdVelocity(self._model, data)
+            mujoco.mj_rne(self._model, data, 1, found)
+            torques[k] = found[self._link]
+        return self._scale * torques + self._offset + self._sigmas * self._noise[rows]

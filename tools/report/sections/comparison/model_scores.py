@@ -28,8 +28,9 @@ def model_scores(result: ComparisonResult) -> Section:
     body = (
         f'<div class="verdict {level}"><p class="answer">{escape(_answer(best, len(result.models)))}</p>'
         f'<p class="why">{escape(_reason(best))}</p><div class="figures">{models}</div>{_bars(result)}</div>'
-        '<p class="quiet" style="margin-top:12px">Error: root mean square over all channels of the 0.1 s ahead error, '
-        "in sigmas of the sensor. Floor: what sensor noise and the uncertainty of the state alone would give.</p>"
+        '<p class="quiet" style="margin-top:12px">Error: root mean square over all channels of the error '
+        f"{escape(result.models[0].predicted)}, in sigmas of the sensor. Floor: what sensor noise and the uncertainty "
+        "of the state alone would give.</p>"
     )
     return Section("scores", "How good are the predictions?", body)
 
@@ -55,7 +56,7 @@ def _answer(best: ModelComparison, count: int) -> str:
 def _reason(best: ModelComparison) -> str:
     ratio = best.error / best.floor
     share = max(1.0 - 1.0 / ratio**2, 0.0)
-    text = f"0.1 s ahead its error is {significant(ratio)} times the floor"
+    text = f"Its error {best.predicted} is {significant(ratio)} times the floor"
     if share > 0.01:
         text += f"; {percent(share)} of the squared error is not explained by noise"
     if best.worst and share > 0.05:
