@@ -123,10 +123,14 @@ class StructuredTree:
         return found
 
     def gravity_by_parameter(self, q: Array, values: Mapping[str, float]) -> dict[str, Array]:
-        """Derivatives of the torques of gravity by parameters that change masses, by name, shape (m, n_link) each."""
+        """Derivatives of the torques of gravity by masses and its own direction, by name, shape (m, n_link) each."""
         tree, still = self.bodies(values), np.zeros_like(q)
         heavier = [change for change in self._changes if np.any(change.direction[:4])]
-        return {change.name: inertia_torque(tree, change, q, still, still, 0.0) for change in heavier}
+        found = {change.name: inertia_torque(tree, change, q, still, still, 0.0) for change in heavier}
+        if self._tilt:
+            torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
+            found |= dict(zip(self._tilt, torques, strict=True))
+        return found
 
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
