@@ -26,6 +26,7 @@ from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import SetProblem
@@ -125,8 +126,13 @@ def _calibrated(
         return result
     estimate = solved.solution.estimate
     motions = len(solved.problems)
-    timing = drive_timing(solved.problems, estimate.states[:motions], estimate.calibrations[:motions])
-    return replace(result, timing=timing, regressed=regressed_values(result.robot, recordings))
+    moving = solved.problems, estimate.states[:motions], estimate.calibrations[:motions]
+    return replace(
+        result,
+        timing=drive_timing(*moving),
+        masses=wrong_masses(*moving),
+        regressed=regressed_values(result.robot, recordings),
+    )
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
+from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.model.robot import Robot
@@ -166,6 +167,7 @@ class CalibrationResult:
         findings: sentences for the user, most important first.
         converged: False where the model contradicts the recordings so much that the values never came to rest.
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
+        masses: what the recordings say about the mass of each link, surest first.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states.
@@ -191,6 +193,7 @@ class CalibrationResult:
     converged: bool = True
     unsettled: float = 0.0
     timing: DriveTiming | None = None
+    masses: tuple[WrongMass, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()

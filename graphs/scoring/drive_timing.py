@@ -69,12 +69,12 @@ def drive_timing(
     effect = catalogue()[EFFECT]
     hypothesis = EffectHypothesis(EffectAt(effect, OWNER), effect.parameters_at(robot, OWNER))
     segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
-    estimate, sigmas, response = ScoreTest(segments).step(hypothesis)
-    delay, sigma = float(estimate[0]), float(sigmas[0])
+    (step,) = ScoreTest(segments).steps([hypothesis])
+    delay, sigma = float(step.sizes[0]), float(step.sigmas[0])
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
     found = calibrations[0]
-    moved = found.retract({DYNAMICS: response[: len(found.names), 0] * delay})
+    moved = found.retract({DYNAMICS: step.response[: len(found.names), 0] * delay})
     changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
     return DriveTiming(delay, sigma, changes)
 

@@ -103,6 +103,25 @@ class JointScores:
         return float(np.linalg.svd(Q_a.T @ S[A, B] @ Q_b, compute_uv=False)[0])
 
 
+@dataclass(frozen=True)
+class HypothesisStep:
+    """One linear step with a hypothesis.
+
+    Attributes:
+        hypothesis: effect, owner, shapes.
+        sizes: found, shape (k,).
+        sigmas: their standard deviations, those from blocks where these scatter more, shape (k,).
+        response: of the shared values to each size, shape (shared, k).
+        p_value: block-robust.
+    """
+
+    hypothesis: EffectHypothesis
+    sizes: Array
+    sigmas: Array
+    response: Array
+    p_value: float
+
+
 class ScoreTest:
     """Scores for recordings that were solved with the base model.
 
@@ -129,18 +148,22 @@ class ScoreTest:
         p = [_robust_p(score, blocks[:, c], own) for score, c, own in zip(scores, columns, information, strict=True)]
         return JointScores(scores, np.array(p), S, s, columns)
 
-    def step(self, hypothesis: EffectHypothesis) -> tuple[Array, Array, Array]:
-        """One linear step with a hypothesis: sizes, sigmas, and the response of the shared values, shape (shared, k).
-
-        The sigmas are those from blocks where these scatter more.
-        """
-        S, s, _, response, (blocks, information) = self._profiled([hypothesis], with_blocks=True)
-        score = _score(hypothesis, S, s)
-        at_estimate = blocks + information[0] @ score.estimate
-        count = max(len(at_estimate), 2)
-        inverse = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
-        robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
-        return score.estimate, np.maximum(score.sigma, np.sqrt(np.diag(robust))), response
+    def steps(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisStep]:
+        """One linear step with each hypothesis alone."""
+        if not hypotheses:
+            return []
+        S, s, columns, response, (blocks, information) = self._profiled(hypotheses, with_blocks=True)
+        found = []
+        for hypothesis, c, own in zip(hypotheses, columns, information, strict=True):
+            score = _score(hypothesis, S[c, c], s[c])
+            at_estimate = blocks[:, c] + own @ score.estimate
+            count = max(len(at_estimate), 2)
+            inverse = np.linalg.pinv(S[c, c], rcond=1e-12, hermitian=True)
+            robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
+            sigmas = np.maximum(score.sigma, np.sqrt(np.diag(robust)))
+            p_value = _robust_p(score, blocks[:, c], own)
+            found.append(HypothesisStep(hypothesis, score.estimate, sigmas, response[:, c], p_value))
+        return found
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""

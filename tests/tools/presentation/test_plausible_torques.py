@@ -12,10 +12,13 @@ import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 from fake_results import fake_calibration
 
+from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.robots.bodies.possible_masses import impossible_masses
 from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
@@ -105,3 +108,68 @@ def test_the_verdict_asks_for_it(tmp_path):
     tree = RigidTree(heavy, robot.joints, robot.tree.gravity)
     found = judge(dataclasses.replace(good, robot=dataclasses.replace(robot, tree=tree)))
     assert next(c.level for c in found.checks if c.name == QUESTION) == "bad" == found.level
+
+
+@pytest.fixture(scope="module")
+def three_joints(tmp_path_factory):
+    """Calibrations with drives in A: with the right masses, and without 0.3 kg of the last link."""
+    folder, found, joints = tmp_path_factory.mktemp("three"), {}, (*JOINTS, "wrist")
+    urdf = write_urdf(folder / "arm.urdf", {"shoulder": None, "elbow": "shoulder", "wrist": "elbow"})
+    motion = ArmMotion(urdf, joints, seconds=8.0)
+    topics = {"/joint_states": motion.states(joints), "/motor_command": motion.commands(joints)}
+    bag = write_arm_bag(folder / "arm.mcap", motion.times, topics)
+    text = urdf.read_text()
+    last = text.index('<link name="wrist_link">')
+    for name, mass in (("right", 2.0), ("lacking", 1.7)):
+        other = folder / f"{name}.urdf"
+        other.write_text(text[:last] + text[last:].replace('value="2"', f'value="{mass}"', 1))
+        assert main(["init", str(other), str(bag), "-o", str(folder / "own.yaml"), "--unit", "A"]) == 0
+        robot = load_robot(folder / "own.yaml")
+        found[name] = calibrate(robot, [read_recording(bag, robot)])
+    return found
+
+
+@pytest.mark.slow
+def test_a_load_that_the_urdf_lacks_is_no_good_result(three_joints):
+    lacking = three_joints["lacking"]
+    constants = [p.value for p in lacking.parameters if p.name.endswith("torque_constant")]
+    assert max(abs(value - 1.0) for value in constants) > 0.08
+    assert max(channel.chi2 for channel in lacking.channels.values()) < 1.2  # no residual shows it
+    level, text = plausible_torques(lacking)
+    assert level == "bad"
+    assert "a load that lacking.urdf lacks" in text
+
+
+@pytest.mark.slow
+def test_right_masses_are_not_doubted(three_joints):
+    assert plausible_torques(three_joints["right"]) == (
+        "good",
+        "Nothing speaks against the masses of the URDF, to which all values here are in proportion.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("p_value", "change", "level"),
+    [(1e-6, 0.05, "bad"), (1e-6, 0.015, "good"), (1e-3, 0.05, "good"), (1e-6, 1e-3, "good")],
+)
+def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, change, level):
+    robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
+    result = dataclasses.replace(
+        fake_calibration(0.2),
+        robot=robot,
+        start=robot,
+        parameters=(ParameterEstimate("elbow.torque_constant", 8.0, 0.01, "N m/A", 8.0, 8.0, 8.0),),
+        masses=(WrongMass("elbow", 0.3, 0.02, p_value, {"elbow.torque_constant": 8.0 * change}),),
+    )
+    found, text = plausible_torques(result)
+    assert found == level
+    if level == "bad":
+        assert "elbow.torque_constant would be +5 %" in text and "jointscope init other.urdf" in text
+
+
+def test_masses_beside_free_torque_constants_have_no_scale(arm, tmp_path):
+    robot = add_effects(begun(arm, tmp_path, 1.0, None, "--unit", "A"), ["link_mass@elbow"]).robot
+    level, text = asked(robot, (8.0, 12.0))
+    assert level == "bad"
+    assert "link_mass@elbow" in text and "fixed: true" in text
+    assert asked(robot)[0] == "good"

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether links weigh what the URDF says: a score test after every calibration under gravity.
+
+A load that the URDF lacks is carried by torque constants, inertias and friction that are all wrong by a few percent,
+and most of it is gone from the residuals. One linear step with the mass and the first moments of a link tells how much
+heavier it would be, and by how much that would change the values. Nothing is estimated anew. It tells that a mass is
+wrong, not which: a load further out has moments of inertia that no link of the URDF has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.score_system import Segment
+from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import cannot_be_added
+
+Array = NDArray[np.float64]
+
+EFFECT = "link_mass"
+
+
+@dataclass(frozen=True)
+class WrongMass:
+    """What one step with another mass of a link says.
+
+    Attributes:
+        joint: that moves the link.
+        mass: that is missing in the URDF, with what a shift of the link's centre stands for [kg].
+        sigma: its standard deviation, from blocks of the recording where these scatter more [kg].
+        p_value: of mass and first moments together, against the scatter of blocks.
+        changes: what the mass would add to each parameter, in the parameter's unit.
+    """
+
+    joint: str
+    mass: float
+    sigma: float
+    p_value: float
+    changes: dict[str, float]
+
+
+def wrong_masses(
+    problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
+) -> tuple[WrongMass, ...]:
+    """What a solved calibration says of the mass of each link, surest first; nothing without gravity.
+
+    Args:
+        problems: whole recordings with the noise used.
+        states: their solution.
+        calibrations: the values found, with the biases of each recording.
+    """
+    robot, effect = problems[0].robot, catalogue()[EFFECT]
+    if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity):
+        return ()
+    here = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
+    hypotheses = [
+        EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)
+    ]
+    segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
+    test, start, found = ScoreTest(segments), calibrations[0], []
+    for step in test.steps(hypotheses):
+        if not (np.all(np.isfinite(step.sizes)) and np.all(np.isfinite(step.sigmas))):
+            continue
+        moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
+        changes = dict(zip(start.names, (moved.values - start.values).tolist(), strict=True))
+        found.append(
+            WrongMass(step.hypothesis.here.owner, float(step.sizes[0]), float(step.sigmas[0]), step.p_value, changes)
+        )
+    return tuple(sorted(found, key=lambda mass: mass.p_value))
