@@ -32,7 +32,7 @@ from jointscope.graphs.discovery.verdicts import (
     judge,
     worth_a_refit,
 )
-from jointscope.graphs.scoring.score_test import HypothesisScore
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import JointscopeError

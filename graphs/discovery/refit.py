@@ -17,7 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.scoring.score_test import HypothesisScore
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors

@@ -17,9 +17,10 @@ from jointscope.graphs.noise.noise_estimation import scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
 from jointscope.graphs.scoring.order_scan import scan_orders
 from jointscope.graphs.scoring.score_system import Segment
-from jointscope.graphs.scoring.score_test import HypothesisScore, JointScores, ScoreTest
+from jointscope.graphs.scoring.score_test import ScoreTest
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,6 @@ by the sum of squared scores of half-second blocks, which survives coloured ones
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +20,7 @@ from scipy.special import fdtrc
 from jointscope.factors.priors import shared_priors
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep, JointScores, fit
 from jointscope.graphs.scoring.score_columns import columns_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
 from jointscope.graphs.solving.set_problem import owners
@@ -32,94 +30,6 @@ Array = NDArray[np.float64]
 
 BATCH = 16  # columns at once: bounds the memory; with more, most of the time goes into asking for memory
 BLOCK = 0.5  # [s] of the robust variance
-DETERMINED = 0.5  # [prior sigma] a size known better than this is determined by the recordings
-
-
-@dataclass(frozen=True)
-class HypothesisScore:
-    """What the recordings say about one hypothesis without a refit.
-
-    Attributes:
-        hypothesis: effect, owner, shapes.
-        score: s' S^-1 s.
-        estimate: of the sizes, shape (k,).
-        sigma: their standard deviations, shape (k,).
-        S, s: profiled Hessian and gradient of the sizes, shape (k, k) and (k,).
-    """
-
-    hypothesis: EffectHypothesis
-    score: float
-    estimate: Array
-    sigma: Array
-    S: Array
-    s: Array
-
-    @property
-    def dof(self) -> int:
-        """Number of plausible sizes that the recordings determine; gauges are held by their prior alone."""
-        prior = np.array([size.prior_sigma for size in self.hypothesis.sizes])
-        determined = self.sigma < DETERMINED * prior
-        return max(int(np.sum(determined[list(self.plausible[1])])), 1)
-
-    @cached_property
-    def plausible(self) -> tuple[float, tuple[int, ...]]:
-        """Largest score of sizes that all have a possible sign, and which those are; (0, ()) if there are none."""
-        signed = [i for i, size in enumerate(self.hypothesis.sizes) if size.sign == "+"]
-        count = len(self.estimate)
-        if all(self.estimate[i] > 0 for i in signed):
-            return self.score, tuple(range(count))
-        best: tuple[float, tuple[int, ...]] = (0.0, ())
-        for size in range(count - 1, 0, -1):
-            for kept in combinations(range(count), size):
-                estimate, value = _fit(self.S[np.ix_(kept, kept)], self.s[list(kept)])
-                if all(estimate[kept.index(i)] > 0 for i in signed if i in kept):
-                    best = max(best, (value, kept))
-        return best
-
-
-@dataclass(frozen=True)
-class JointScores:
-    """Hypotheses scored together.
-
-    Attributes:
-        scores: one per hypothesis.
-        p_values: block-robust, shape (hypotheses,).
-        S: profiled Hessian of all sizes, shape (k, k).
-        s: profiled gradient, shape (k,).
-        columns: sizes of each hypothesis among the k.
-    """
-
-    scores: list[HypothesisScore]
-    p_values: Array
-    S: Array
-    s: Array
-    columns: list[slice]
-
-    def correlation(self, a: int, b: int) -> float:
-        """Largest correlation between what two hypotheses can explain, 0 to 1."""
-        S = self.S
-        A, B = self.columns[a], self.columns[b]
-        Q_a, Q_b = (np.linalg.pinv(_root(S[c, c])) for c in (A, B))
-        return float(np.linalg.svd(Q_a.T @ S[A, B] @ Q_b, compute_uv=False)[0])
-
-
-@dataclass(frozen=True)
-class HypothesisStep:
-    """One linear step with a hypothesis.
-
-    Attributes:
-        hypothesis: effect, owner, shapes.
-        sizes: found, shape (k,).
-        sigmas: their standard deviations, those from blocks where these scatter more, shape (k,).
-        response: of the shared values to each size, shape (shared, k).
-        p_value: block-robust.
-    """
-
-    hypothesis: EffectHypothesis
-    sizes: Array
-    sigmas: Array
-    response: Array
-    p_value: float
 
 
 class ScoreTest:
@@ -266,12 +176,6 @@ def _sums_by(block: NDArray[np.intp]) -> Callable[[Array, Array], None]:
     return add
 
 
-def _fit(S: Array, s: Array) -> tuple[Array, float]:
-    """Estimate and score of some sizes."""
-    estimate = -np.linalg.pinv(S, rcond=1e-12, hermitian=True) @ s
-    return estimate, float(-estimate @ s)
-
-
 def _score(hypothesis: EffectHypothesis, S: Array, s: Array) -> HypothesisScore:
     covariance = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
     estimate = -covariance @ s
@@ -290,7 +194,7 @@ def _robust_p(score: HypothesisScore, scores: Array, information: Array) -> floa
     kept = list(score.plausible[1])
     if not kept:
         return 1.0
-    estimate, _ = _fit(score.S[np.ix_(kept, kept)], score.s[kept])
+    estimate, _ = fit(score.S[np.ix_(kept, kept)], score.s[kept])
     scores, information = scores[:, kept], information[:, kept][:, :, kept]
     k, total = score.dof, information.sum(axis=0)
     weight = np.einsum("bii->b", information)
@@ -312,9 +216,3 @@ def _batches(hypotheses: Sequence[EffectHypothesis]) -> list[list[EffectHypothes
             batches.append([])
         batches[-1].append(hypothesis)
     return batches
-
-
-def _root(S: Array) -> Array:
-    """Symmetric square root."""
-    values, vectors = np.linalg.eigh(S)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.mimic_joints import Follower
+from jointscope.robots.urdf.mimic_joints import Follower
 
 Array = NDArray[np.float64]
 

@@ -19,15 +19,15 @@ from jointscope.robots.bodies.body_accelerations import BodyAccelerations
 from jointscope.robots.bodies.body_rates import BodyRates
 from jointscope.robots.bodies.coupling import Coupling, with_new_joints
 from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
-from jointscope.robots.bodies.mimic_joints import Follower
 from jointscope.robots.bodies.possible_inertias import check_inertias
-from jointscope.robots.bodies.urdf_bodies import UrdfBodies
-from jointscope.robots.bodies.usable_joints import (
+from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.mimic_joints import Follower
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
+from jointscope.robots.urdf.usable_joints import (
     check_locked,
     check_moving,
     check_within_limits,
 )
-from jointscope.robots.errors import RobotError
 
 Array = NDArray[np.float64]
 NOWHERE: Mapping[str, float] = MappingProxyType({})

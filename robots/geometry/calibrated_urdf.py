@@ -14,12 +14,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.urdf_tree import read_urdf, urdf_text
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, TRACKER
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 
 Array = NDArray[np.float64]
 NOTE = " geometric errors found by jointscope; sag of drives and bearings and backlash are not in this file "

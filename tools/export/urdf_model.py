@@ -16,13 +16,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from jointscope.robots.bodies.urdf_tree import read_urdf, urdf_text
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.calibrated_urdf import move_joints
 from jointscope.robots.geometry.error_parameters import error_names, pose_units
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import inertia_changes
+from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
 from jointscope.tools.export.exported import Exported, of_drives, why_not
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from jointscope.graphs.starts.drive_regression import Driven
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.bodies.urdf_bodies import UrdfBodies
-from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
+from jointscope.robots.urdf.usable_joints import moving_joints
 from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.open_bag import Progress
 from jointscope.tools.init.estimates.drive_values import TYPED, Drives, DriveValues, find_drives, find_signs

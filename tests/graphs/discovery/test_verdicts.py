@@ -12,7 +12,7 @@ from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
 from jointscope.graphs.discovery.validation import ValidationError
 from jointscope.graphs.discovery.verdicts import ValidatedRefit, excess_share, judge, worth_a_refit
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.score_test import HypothesisScore
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect

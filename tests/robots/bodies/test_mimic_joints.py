@@ -8,8 +8,8 @@ import pytest
 from robots_to_compare import MIMICKING
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.bodies.usable_joints import joints_that_matter, moving_joints
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.usable_joints import joints_that_matter, moving_joints
 
 JOINTS, ORDER = ("joint1", "joint2", "joint3"), ("joint3", "joint1", "joint2")
 GRAVITY = np.array([1.0, -2.0, -9.0])

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.bodies.urdf_bodies import UrdfBodies
-from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.errors import RobotError
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
+from jointscope.robots.urdf.usable_joints import moving_joints
 from jointscope.tools.init.estimates.position_units import UnitGuess, position_units
 from jointscope.tools.init.streams.command_order import order_by_motion
 from jointscope.tools.init.streams.encoder_noise import encoder_noise

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from jointscope.robots.bodies.urdf_bodies import UrdfBodies
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
 from jointscope.tools.init.streams.named_signal import Wish
 from jointscope.tools.init.streams.roles import Roles
 

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from jointscope.robots.bodies.mimic_joints import Follower, followers_of
-from jointscope.robots.bodies.urdf_parser import parse_urdf
-from jointscope.robots.bodies.urdf_text import UrdfText
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.mimic_joints import Follower, followers_of
+from jointscope.robots.urdf.urdf_parser import parse_urdf
+from jointscope.robots.urdf.urdf_text import UrdfText
 
 ROUND = {"JointModelRUBX": pin.JointModelRX, "JointModelRUBY": pin.JointModelRY, "JointModelRUBZ": pin.JointModelRZ}
 ROUND_SLANTED = "JointModelRevoluteUnboundedUnaligned"

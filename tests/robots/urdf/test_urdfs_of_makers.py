@@ -10,8 +10,8 @@ import pytest
 from robots_to_compare import MIMICKING
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.bodies.usable_joints import moving_joints
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.usable_joints import moving_joints
 
 DOWN = np.array([0.0, 0.0, -9.81])
 JOINTS = ("joint1", "joint2", "joint3")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jointscope.robots.bodies.urdf_bodies import UrdfBodies
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
 
 TURN = 2.0 * np.pi  # [rad]
 

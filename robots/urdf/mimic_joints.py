@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from jointscope.robots.bodies.urdf_text import UrdfText
 from jointscope.robots.errors import RobotError
+from jointscope.robots.urdf.urdf_text import UrdfText
 
 
 @dataclass(frozen=True)

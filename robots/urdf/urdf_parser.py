@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from jointscope.robots.bodies.urdf_text import UrdfText
 from jointscope.robots.errors import RobotError
 from jointscope.robots.outside_modules import need_module
+from jointscope.robots.urdf.urdf_text import UrdfText
 
 
 def parse_urdf(path: Path, text: UrdfText) -> tuple[pin.Model, tuple[str, ...]]:
