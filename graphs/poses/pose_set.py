@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from jointscope.factors.block import POINT, Block
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
-from jointscope.graphs.solving.independent_states import of_independent_states
+from jointscope.graphs.rests.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.friction_band import band_cost
-from jointscope.graphs.solving.independent_states import of_independent_states
+from jointscope.graphs.rests.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.whole_set import WholeSet
 from jointscope.robots.bodies.known_loads import known_loads

@@ -63,8 +63,14 @@ def with_a_weight():
     return replace(DOGGY, tree=RigidTree(urdf, DOGGY.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7}))
 
 
+def with_known_drives():
+    known = replace(DOGGY.parameters["motor.k_pwm"], fixed=True)
+    return replace(DOGGY, parameters={**DOGGY.parameters, known.name: known})
+
+
 ROBOTS = {
     "doggy": DOGGY,
+    "known drives": with_known_drives(),
     "without Coriolis terms": without_coriolis(),
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),

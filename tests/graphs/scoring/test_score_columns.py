@@ -30,7 +30,8 @@ CASES += one_hypothesis_each("accelerometer", ("motor_viscous", "link_viscous", 
 CASES += one_hypothesis_each(
     "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
 )
-CASES += one_hypothesis_each("heavy", ("weight_dependent_friction",))
+CASES += one_hypothesis_each("heavy", ("weight_dependent_friction", "gravity_direction"))
+CASES += one_hypothesis_each("known drives", ("torque_constant_error",))
 
 
 def test_every_effect_has_a_case():
