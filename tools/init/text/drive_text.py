@@ -18,6 +18,7 @@ RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where 
 VISCOUS_EFFECT = ("N m", "A")  # units of commands whose viscous friction is an effect
 DELAY_EFFECT = "command_delay@robot"
 DELAY_PRIOR = 0.01  # [s] filters of currents and cycles of buses take milliseconds
+SURE = 5.0  # [sigma] below zero from which a value is no uncertain one
 ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
 SPREAD, LOST_SPREAD = 2.0, 5.0  # [value] priors of logarithms: a factor 7, or 150, either way
 NO_PULL = 10.0  # times wider, about zero
@@ -123,7 +124,10 @@ def _why_lost(drive: DriveValues, found: Value | None) -> str:
         return "the recording gives ratios of drive values only; hold one that you know with `fixed: true`"
     if found is None:
         return "the recording is too short, or moves too little, to tell"
-    return f"lost in its uncertainty: the regression says {found.value:.2g} +- {found.sigma:.1g}"
+    says = f"the regression says {found.value:.2g} +- {found.sigma:.1g}"
+    if found.value < -SURE * found.sigma:
+        return f"{says}, below zero, which cannot be: masses, units or names are wrong, or it is another robot"
+    return f"lost in its uncertainty: {says}"
 
 
 def _spring_rows(drive: DriveValues | None) -> list[_Row]:
