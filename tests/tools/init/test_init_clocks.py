@@ -83,3 +83,15 @@ def test_a_replay_has_the_same_clock(arm, tmp_path, kind):
     arrived = np.concatenate([block.stamps for block in reader])
     assert arrived - arrived.min() == pytest.approx(np.repeat(arm[1].times, 2), abs=1e-3)
     assert any(told.partition(";")[0] in text for text in reader.notices())
+
+
+def test_a_recorder_whose_clock_went_back_is_told_as_that(arm, tmp_path, capsys):
+    """Bags are read by times of reception: two stretches lie on each other, as from two nodes."""
+    motion = arm[1]
+    times = np.where(motion.times > 3.0, motion.times - 2.0023, motion.times)
+    topics = {"/joint_states": motion.states(), "/motor_command": motion.commands(tuple(ARM))}
+    bag = write_arm_bag(tmp_path / "arm.mcap", times, topics)
+    assert main(["init", str(arm[0]), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 1
+    said = capsys.readouterr().err
+    assert "the clock of the recorder was set back" in said
+    assert "/joint_states" in said

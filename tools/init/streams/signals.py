@@ -120,8 +120,8 @@ def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[
     troubles: list[RecordingError] = []
     found = [_signal(field, timed[field.label], start, troubles) for field in fields]
     signals = [signal for signal in found if signal is not None]
-    if troubles and not signals:
-        raise troubles[0]
+    if troubles and not any(signal.quantity == "position" and not signal.commanded for signal in signals):
+        raise troubles[0]  # else the bag would seem to hold no positions
     signals = [replace(signal, joints=joined.get(signal.topic, ())) for signal in signals]
     holes = LongHoles.of([signal.times for signal in signals])
     signals = [replace(signal, times=holes.shortened(signal.times)) for signal in signals]
