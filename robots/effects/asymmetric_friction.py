@@ -25,7 +25,7 @@ EFFECT = JointTorque(
     parameters=(EffectParameter("torque", "N m", start=0.0, prior_sigma=100.0),),
     example={"torque": 1.0},
     card=Card(
-        title="friction that differs between the directions",
+        title="friction unlike in both directions",
         law="b a_motor = ... - a tanh(k v_motor)^2, with a = torque",
         explanation="Worm gears, belts and seals may resist more one way than the other: the Coulomb torque is mu + a "
         "forwards and mu - a backwards.",

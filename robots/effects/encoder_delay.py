@@ -28,7 +28,7 @@ EFFECT = TimeShift(
     parameters=(EffectParameter("delay", "s", start=1e-3, prior_sigma=0.5, sign="+"),),
     example={"delay": 3e-3},
     card=Card(
-        title="encoder reading older than its stamp",
+        title="encoder older than its stamp",
         law="reading(t) = q_motor(t - delay), or q_link(t - delay) for the encoders on the links",
         explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
         "joint: its encoder is read later than those of the others.",

@@ -21,7 +21,7 @@ EFFECT = ReadingEffect(
     parameters=(EffectParameter("scale", "1", start=0.0, prior_sigma=0.5),),
     example={"scale": 0.02},
     card=Card(
-        title="wrong gear ratio or scale of an encoder",
+        title="wrong gear ratio or encoder scale",
         law="reading = (1 + scale) q_motor + zero",
         explanation="The number that turns counts into the joint's angle is wrong: another gear ratio than the file "
         "says, another number of lines. Every angle and every speed of the joint is off by the same share, which gyros "

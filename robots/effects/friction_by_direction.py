@@ -28,7 +28,7 @@ EFFECT = JointTorque(
     ),
     example={"torque": 0.4, "coefficient": 0.8},
     card=Card(
-        title="dry and viscous friction that differ between the directions",
+        title="friction of each direction",
         law="b a_motor = ... - (a tanh(k v_motor) + e v_motor) tanh(k v_motor), with a = torque, e = coefficient",
         explanation="Friction has four numbers: dry and viscous friction forwards, mu + a and d + e, and backwards, "
         "mu - a and d - e. Seals, worm gears and preloaded screws are such. Each of the two differences has its own "

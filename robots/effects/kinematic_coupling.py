@@ -35,7 +35,7 @@ EFFECT = KinematicCoupling(
     parameters=(EffectParameter("from_<joint>", "rad/rad", start=0.0, prior_sigma=10.0),),
     example={"from_joint1": 0.1, "from_joint2": 0.1, "from_joint3": 0.1},
     card=Card(
-        title="transmission that runs over other joints",
+        title="transmission over other joints",
         law="q_link = T q_motor while no spring is stretched; from_<joint j> is added to the element (owner, j) of T. "
         "Springs see A q_link - q_motor with A = T^-1, links feel A^T (K deflection + D d(deflection)/dt)",
         explanation="A cable or belt passes over a pulley on the axis of another joint; when that joint turns, it "

@@ -49,7 +49,7 @@ EFFECT = WeightDependentFriction(
     ),
     example={"coefficient": 0.1, "quadratic": 0.002},
     card=Card(
-        title="friction that grows with the weight behind the joint",
+        title="friction by the weight it carries",
         law="b a_motor = ... - (c1 |s| + c2 s^2) tanh(k v_motor), with c1 = coefficient, c2 = quadratic and the load "
         "at rest s = T^T (g(q) - J^T F), in motor coordinates",
         explanation="What the arm and a load on it weigh presses on the bearings and teeth of the gear, in motion as "

@@ -2,6 +2,7 @@
 """One finite-difference test for the Jacobians of every factor, and GTSAM's own check of the wrapped ones."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import gtsam
 import numpy as np
@@ -25,6 +26,7 @@ from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.step import Steps
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
@@ -37,6 +39,7 @@ from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.sensors import Accelerometer, LinkEncoder
 
 ROBOT = load_robot("doggy")
+MIMICKING = Path(__file__).parents[1] / "graphs/mimicking_doggy.urdf"
 PAPER = load_robot("doggy_paper")
 M = 5
 ROUNDING = 1e-5  # a residual of size 0.1 differenced at 1e-6 keeps 2e-11 of noise, 2e-6 of this
@@ -81,6 +84,10 @@ def _robots_with_effects():
     base["coriolis"] = replace(base["coriolis"], tree=ROBOT.tree.with_coriolis(False))
     base["joint_elasticity"] = replace(ROBOT, choices=replace(ROBOT.choices, rigid_joints=("joint3",)))
     base["joint_elasticity"] = replace(base["joint_elasticity"], noise=carried_noise(ROBOT, base["joint_elasticity"]))
+    known = replace(ROBOT.parameters["motor.k_pwm"], fixed=True)
+    base["torque_constant_error"] = replace(ROBOT, parameters={**ROBOT.parameters, known.name: known})
+    heavy = RigidTree(MIMICKING, ROBOT.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7})
+    base["gravity_direction"] = base["weight_dependent_friction"] = replace(ROBOT, tree=heavy)
     for effect in catalogue().values():
         if effect.id == "integration_error":
             continue

@@ -11,8 +11,8 @@ R1 = "value: [[-1, 0, 0], [0, 0, -1], [0, -1, 0]]"
 STIFFNESS = "joint1.stiffness: {value: 400.0, unit: N m/rad, prior_sigma: 600.0, published: 187.555}"
 BIAS = "bias: {value: [0.04564, 0.00024, -0.02222], prior_sigma: 0.1}"
 TOP_KEYS = (
-    "expected calibration, command, constants, description, effects, format, gravity, held_at_mean, joints, locked, "
-    "model, name, noise, parameters, sensors, urdf"
+    "expected calibration, command, constants, derived, description, effects, format, gravity, held_at_mean, joints, "
+    "locked, model, name, noise, parameters, sensors, urdf"
 )
 
 # (what stands in doggy.yaml, what stands there instead, what the user is told)
@@ -131,7 +131,7 @@ def test_a_file_that_is_something_else_is_refused(content, told, tmp_path):
 
 def test_an_unknown_robot_is_answered_with_the_ready_ones():
     assert complaint("dogy") == "no robot 'dogy': neither a file nor a ready robot; did you mean 'doggy'?"
-    known = "doggy, doggy_paper, hebi_2r, hebi_3r, hebi_5r, kr300, tx90l, xl330_pendulum"
+    known = "biorob, doggy, doggy_paper, hebi_2r, hebi_3r, hebi_5r, kr300, panda, tx90l, xl330_pendulum"
     assert complaint("x") == f"no robot 'x': neither a file nor a ready robot; expected {known}"
 
 

@@ -10,7 +10,6 @@ from jointscope.graphs.calibration.identifiability import weak_directions
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.noise.robust_sigma import BlockScores, inflation
 from jointscope.graphs.problem.timeline import Timeline
-from jointscope.graphs.solving.posterior import ResidualPart
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -51,11 +50,6 @@ def test_a_large_value_of_any_sign_is_as_weak_as_its_relative_sigma(doggy):
         assert [d.text for d in weak_directions(robot, calibration, shared, covariance)] == weak
 
 
-def _parts(residual, design):
-    m = len(residual)
-    return ResidualPart(None, np.arange(m), residual[:, None], np.zeros((m, 1)), design[:, None, :])
-
-
 @pytest.mark.parametrize("memory", [0.0, 0.99])
 def test_jackknife_over_blocks_finds_the_spread_of_estimates_under_coloured_noise(memory):
     """Straight-line fits to AR(1) noise: reported sigmas against the scatter over many repetitions."""
@@ -70,7 +64,7 @@ def test_jackknife_over_blocks_finds_the_spread_of_estimates_under_coloured_nois
             noise[k] = memory * noise[k - 1] + np.sqrt(1 - memory**2) * noise[k]
         estimate = np.linalg.solve(H, design.T @ noise)
         scores = BlockScores(0.0, 20.0, np.arange(2), 2)
-        scores.add(t, _parts(noise - design @ estimate, design))
+        scores.add(t, (noise - design @ estimate)[:, None], design[:, None, :])
         estimates.append(estimate)
         reported.append(inflation([scores], np.linalg.inv(H)) * np.sqrt(np.diag(np.linalg.inv(H))))
     scatter, typical = np.std(estimates, axis=0), np.sqrt(np.mean(np.square(reported), axis=0))

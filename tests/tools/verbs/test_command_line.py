@@ -38,7 +38,7 @@ def in_own_folder(tmp_path, monkeypatch):
 def no_solving(monkeypatch):
     """Reading, calibrating and comparing give made-up results at once."""
     monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
-    monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress, solver: fake_calibration())
+    monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress, solver, sets: fake_calibration())
     monkeypatch.setattr(compare_module, "compare", lambda *args, progress: fake_comparison())
 
 
