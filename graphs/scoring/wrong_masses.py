@@ -51,7 +51,7 @@ class WrongMass:
 def wrong_masses(
     problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
 ) -> tuple[WrongMass, ...]:
-    """What a solved calibration says of the mass of each link, surest first; nothing without gravity.
+    """What a solved calibration says of each link's mass, surest first; nothing without gravity or beside massless links.
 
     Args:
         problems: whole recordings with the noise used.
@@ -59,8 +59,8 @@ def wrong_masses(
         calibrations: the values found, with the biases of each recording.
     """
     robot, effect = problems[0].robot, catalogue()[EFFECT]
-    if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity):
-        return ()
+    if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity) or robot.tree.massless:
+        return ()  # a link without inertia has no equation of its own beside its rotor's
     here = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
     hypotheses = [
         EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)
