@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from tilted_arm import URDF
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.judging.torque_rows import TorqueEquations
@@ -14,16 +15,6 @@ from jointscope.tools.simulator import simulate
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
-URDF = """<robot name="arm"><link name="base"/>
-<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
- <origin xyz="0.1 0.2 0.3" rpy="0.4 -0.3 0.2"/><axis xyz="0 1 0"/>
- <limit effort="80" velocity="4" lower="-3" upper="3"/></joint>
-<link name="upper"><inertial><origin xyz="0.1 0 0.2"/><mass value="3"/>
- <inertia ixx="0.05" iyy="0.05" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0 0 0.4" rpy="0.5 0.1 0"/>
- <axis xyz="0.6 0 -0.8"/><limit effort="40" velocity="4" lower="-2" upper="2"/></joint>
-<link name="fore"><inertial><origin xyz="0.05 0 0.15"/><mass value="2"/>
- <inertia ixx="0.03" iyy="0.01" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
 YAML = """
 format: 1
 name: arm
@@ -47,7 +38,7 @@ BAND = 15.0  # [Hz]
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
     folder = tmp_path_factory.mktemp("arm")
-    (folder / "arm.urdf").write_text(URDF)
+    (folder / "arm.urdf").write_text(URDF.format(speed=4))
     (folder / "arm.yaml").write_text(YAML)
     return load_robot(folder / "arm.yaml")
 
