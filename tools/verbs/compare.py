@@ -103,31 +103,26 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
-    """Compares the models on poses.
-
-    Raises:
-        RobotError: pictures were asked for.
-    """
-    if files.pictures:
-        raise RobotError("pictures of poses come with `jointscope calibrate ROBOT --poses ... --report F.html`")
-    text, content = compare_poses(robots, poses)
-    checked = check_models(limits, content["models"])
-    if files.json is not None:
-        write_json(files.json, content | acceptance_json(checked))
-    print(text)
-    return print_acceptance(checked)
+    """Compares the models on poses; raises RobotError where pictures were asked for."""
+    _no_pictures(files, "poses")
+    return _told(*compare_poses(robots, poses), files, limits)
 
 
 def _on_rests(robots: dict[str, Any], rests: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
-    """Compares the models on rests.
-
-    Raises:
-        RobotError: pictures were asked for.
-    """
-    if files.pictures:
-        raise RobotError("pictures of rests come with `jointscope calibrate ROBOT --rests ... --report F.html`")
+    """Compares the models on rests; raises RobotError where pictures were asked for."""
+    _no_pictures(files, "rests")
     with progress_bar() as progress:
         text, content = compare_rests(robots, rests, progress)
+    return _told(text, content, files, limits)
+
+
+def _no_pictures(files: ResultFiles, kind: str) -> None:
+    if files.pictures:
+        raise RobotError(f"pictures of {kind} come with `jointscope calibrate ROBOT --{kind} ... --report F.html`")
+
+
+def _told(text: str, content: dict[str, Any], files: ResultFiles, limits: Sequence[Limit]) -> int:
+    """Writes JSON, says what was found and which limits are kept; returns the exit code."""
     checked = check_models(limits, content["models"])
     if files.json is not None:
         write_json(files.json, content | acceptance_json(checked))
