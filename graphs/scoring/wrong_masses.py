@@ -51,7 +51,9 @@ class WrongMass:
 def wrong_masses(
     problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
 ) -> tuple[WrongMass, ...]:
-    """What a solved calibration says of each link's mass, surest first; nothing without gravity or beside massless links.
+    """What a solved calibration says of each link's mass, surest first.
+
+    Without gravity, or beside massless links, nothing is said.
 
     Args:
         problems: whole recordings with the noise used.
