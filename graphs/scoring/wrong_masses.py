@@ -53,7 +53,7 @@ def wrong_masses(
 ) -> tuple[WrongMass, ...]:
     """What a solved calibration says of each link's mass, surest first.
 
-    Without gravity, or beside massless links, nothing is said.
+    Without gravity, nothing is said.
 
     Args:
         problems: whole recordings with the noise used.
@@ -61,8 +61,8 @@ def wrong_masses(
         calibrations: the values found, with the biases of each recording.
     """
     robot, effect = problems[0].robot, catalogue()[EFFECT]
-    if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity) or robot.tree.massless:
-        return ()  # a link without inertia has no equation of its own beside its rotor's
+    if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity):
+        return ()
     here = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
     hypotheses = [
         EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)

@@ -12,6 +12,7 @@ import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
@@ -337,6 +338,7 @@ def test_a_finger_without_a_mass_has_that_of_its_rotor(moving, tmp_path, capsys)
     assert "g.urdf: link finger_link, moved by finger, has no inertia; its rotor has it all" in said
     robot = load_robot(tmp_path / "a.yaml")
     assert robot.tree.massless == ("finger",) and robot.command.unit == "N m"
+    assert catalogue()["link_mass"].owners_of(robot) == moving[:-1]  # others are asked for theirs
     start = {name: parameter.value for name, parameter in robot.parameters.items()}
     assert start["finger.inertia"] == pytest.approx(0.05, rel=0.05)  # the commands are held
     assert start["finger.coulomb_torque"] == pytest.approx(0.3, rel=0.05)
