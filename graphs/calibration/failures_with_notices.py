@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors of an estimation together with what looked odd in the recordings, which often is the reason."""
+"""Errors of an estimation together with what looked odd in the recordings, and with what to type next."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
 from jointscope.robots.errors import SolveError
+from jointscope.robots.files.robot_file import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
@@ -27,10 +29,23 @@ def with_notices(message: str, recordings: Sequence[Recording], notices: Sequenc
     return "; ".join([message, *[text for text in texts if text not in said][: max(MOST - len(said), 0)]])
 
 
+def next_commands(message: str, robot: Robot, recordings: Sequence[Recording]) -> str:
+    """A failure with the commands that look for its reason, unless it names one already."""
+    if "jointscope " in message or not recordings:
+        return message
+    name, bag = robot_argument(robot), shlex.quote(recordings[0].path)
+    text = f"{message}; `jointscope info {bag} --robot {name}` says whether they fit each other"
+    if robot.effects:
+        last = shlex.quote(robot.effects[-1].label)
+        return f"{text}, `jointscope remove {name} {last} -o OUT.yaml` takes out the effect that was added last"
+    urdf = shlex.quote(str(robot.tree.urdf))
+    return f"{text}, `jointscope init {urdf} {bag} -o OUT.yaml` finds start values"
+
+
 def names_notices(
     function: Callable[Concatenate[Robot, Sequence[Recording], P], T],
 ) -> Callable[Concatenate[Robot, Sequence[Recording], P], T]:
-    """Decorates what learns from recordings: its SolveErrors name what looked odd in them."""
+    """Decorates what learns from recordings: its SolveErrors name what looked odd in them and what to type next."""
 
     @wraps(function)
     def named(robot: Robot, recordings: Sequence[Recording], *args: P.args, **kwargs: P.kwargs) -> T:
@@ -38,6 +53,7 @@ def names_notices(
             return function(robot, recordings, *args, **kwargs)
         except SolveError as err:
             notices = [notice for recording in recordings for notice in screen(recording, robot)]
-            raise SolveError(with_notices(str(err), recordings, notices)) from err
+            message = with_notices(str(err), recordings, notices)
+            raise SolveError(next_commands(message, robot, recordings)) from err
 
     return named

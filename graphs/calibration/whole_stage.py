@@ -29,6 +29,7 @@ from jointscope.graphs.starts.memory_start import with_filled_memories
 from jointscope.graphs.starts.time_shift_start import placed
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
+from jointscope.robots.files.robot_file import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
@@ -223,8 +224,7 @@ def _must_converge(solution: Solution, robot: Robot, enough: float) -> None:
             f"no convergence after {len(solution.iterations)} iterations: the last step was still "
             f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
             + gone
-            + "start values may be far off, or the model may contradict the recording: look at what "
-            "`jointscope info BAG --robot ROBOT` says, then `jointscope diagnose ROBOT BAG` for what the model lacks"
+            + "start values may be far off, or the model may contradict the recording"
         )
 
 
@@ -246,5 +246,5 @@ def _vanishing(robot: Robot, solution: Solution) -> str:
         return ""
     return (
         f"sizes of {', '.join(gone)} are below a tenth of their start, so the recording may show no such effect: "
-        f"`jointscope remove {robot.path.name} {' '.join(gone)} -o OUT.yaml`; else "
+        f"`jointscope remove {robot_argument(robot)} {' '.join(gone)} -o OUT.yaml`; else "
     )

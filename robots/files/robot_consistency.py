@@ -97,7 +97,7 @@ def _check_links(robot: Robot, place: str) -> None:
         label = " ".join(f"joint_elasticity@{joint}" for joint in rigid)
         raise RobotError(
             f"{place}: sensors.{sensor.name}: a torque is measured at the spring of a joint, and {', '.join(rigid)} "
-            f"has none; remove the sensor, then `jointscope add {robot.path.name} {label} -o OUT.yaml` and put it back"
+            f"has none; remove the sensor, then `jointscope add {robot.path} {label} -o OUT.yaml` and put it back"
         )
     if sensor is not None and robot.transmission is not None:
         raise RobotError(f"{place}: sensors.{sensor.name}: not used with a section transmission; remove the sensor")

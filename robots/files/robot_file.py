@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import os
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,6 +48,12 @@ CONSTANTS = ("motor.supply_voltage", "motor.gear")
 def ready_robots() -> dict[str, Path]:
     """The robots that come with the package: name and file."""
     return {path.stem: path for path in sorted(READY_ROOT.glob("*/*.yaml"))}
+
+
+def robot_argument(robot: Robot) -> str:
+    """What a user types to name a robot: the name of a ready one, else the path of its file."""
+    stem = robot.path.stem
+    return shlex.quote(stem if ready_robots().get(stem) == robot.path else str(robot.path))
 
 
 def load_robot(name_or_path: str | Path) -> Robot:

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.robots.files.robot_file import robot_argument
 from jointscope.tools.presentation.candidate_numbers import origin_text, p_text, parameter_texts, share_text
 from jointscope.tools.presentation.model_answer import diagnosis_answer, missing_numerics, of_verdict
 from jointscope.tools.presentation.numbers import percent, significant
-from jointscope.tools.presentation.robot_argument import robot_argument
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 10  # candidates; the report has them all

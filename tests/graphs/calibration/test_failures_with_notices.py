@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import pytest
 
 from jointscope.graphs.calibration import failures_with_notices
-from jointscope.graphs.calibration.failures_with_notices import names_notices, with_notices
+from jointscope.graphs.calibration.failures_with_notices import names_notices, next_commands, with_notices
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.discover import discover
 from jointscope.robots.errors import SolveError
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.recordings.recording import Notice, Recording
 
 diagnose_module = import_module("jointscope.graphs.discovery.diagnose")
@@ -36,7 +37,7 @@ def test_nothing_is_named_twice():
 
 
 @pytest.mark.parametrize("depth", [1, 2])
-def test_what_fails_inside_is_named_once(monkeypatch, depth):
+def test_what_fails_inside_is_named_once_with_the_commands_that_look_for_the_reason(monkeypatch, depth, doggy):
     monkeypatch.setattr(failures_with_notices, "screen", lambda recording, robot: [SWAPPED])
 
     def fails(robot, recordings):
@@ -44,8 +45,18 @@ def test_what_fails_inside_is_named_once(monkeypatch, depth):
 
     for _ in range(depth):
         fails = names_notices(fails)
-    with pytest.raises(SolveError, match=r"^it ran away; imu2: the axes seem swapped$"):
-        fails("robot", [recording()])
+    with pytest.raises(SolveError) as err:
+        fails(add_effect(doggy, "backlash@joint2"), [recording()])
+    assert str(err.value) == (
+        "it ran away; imu2: the axes seem swapped; `jointscope info run.mcap --robot doggy` says whether they fit each "
+        "other, `jointscope remove doggy backlash@joint2 -o OUT.yaml` takes out the effect that was added last"
+    )
+
+
+def test_a_robot_without_effects_gets_start_values_from_init(doggy):
+    text = next_commands("it ran away", doggy, [recording()])
+    assert text.endswith(f"`jointscope init {doggy.tree.urdf} run.mcap -o OUT.yaml` finds start values")
+    assert next_commands("try `jointscope add`", doggy, [recording()]) == "try `jointscope add`"
 
 
 @pytest.mark.parametrize("verb", [diagnose, discover])

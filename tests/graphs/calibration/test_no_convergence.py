@@ -25,9 +25,7 @@ def unfinished(robot, sizes):
 def test_effects_that_vanish_are_named_with_the_command_that_removes_them():
     robot = add_effect(load_robot("doggy"), "backlash@joint2")
     small = 0.01 * robot.parameters["joint2.backlash.half_gap"].prior
-    with pytest.raises(
-        SolveError, match=r"sizes of backlash@joint2 are below a tenth .*jointscope remove doggy.yaml back"
-    ):
+    with pytest.raises(SolveError, match=r"sizes of backlash@joint2 are below a tenth .*jointscope remove doggy back"):
         _must_converge(unfinished(robot, {"joint2.backlash.half_gap": small}), robot, 0.1)
 
 

@@ -9,16 +9,16 @@ from html import escape
 
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
+from jointscope.robots.files.robot_file import robot_argument
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import left_out_arguments
 from jointscope.tools.presentation.model_answer import missing_numerics, of_verdict
-from jointscope.tools.presentation.robot_argument import robot_argument
 from jointscope.tools.report.page.page import Section
 
 
 def after_diagnosis(result: Diagnosis) -> Section:
     """Add the missing effect and calibrate, or let discover do it; or use the model."""
-    robot, bags, held = _quoted(robot_argument(result.robot)), _paths(result.recordings), _holdout(result.heldout)
+    robot, bags, held = robot_argument(result.robot), _paths(result.recordings), _holdout(result.heldout)
     missing = of_verdict(result, "missing") or missing_numerics(result)
     found = [c.label for c in missing or of_verdict(result, "possible")]
     if result.adequate:
@@ -41,7 +41,7 @@ def after_discovery(result: Discovery) -> Section:
     """Look at the model that was found, and undo its last step."""
     file = _quoted(result.robot_file or "found.yaml")
     bag = _paths([result.heldout]) if result.heldout is not None else "ANOTHER_BAG"
-    first = _quoted(result.steps[0].robot_file or robot_argument(result.steps[0].robot))
+    first = _quoted(result.steps[0].robot_file) if result.steps[0].robot_file else robot_argument(result.steps[0].robot)
     blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
     last = result.steps[-1].added
     if last and last in {here.label for here in result.robot.effects}:  # a better integrator is no effect
