@@ -18,11 +18,9 @@ from jointscope.graphs.comparison.failure_analysis import analyse_failure
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.diagnosis_words import paragraphs_of
 from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_missing_torque
-from jointscope.graphs.discovery.refit import refit
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
-from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
     SAME,
@@ -32,6 +30,8 @@ from jointscope.graphs.discovery.verdicts import (
     judge,
     worth_a_refit,
 )
+from jointscope.graphs.refits.refit import refit
+from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, heldout_error, judged_error
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context

@@ -19,8 +19,8 @@ from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, diagnose, un
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
-from jointscope.graphs.discovery.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.discovery.verdicts import MATTERS, SURE
+from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.effect_kinds.effect_at import EffectAt

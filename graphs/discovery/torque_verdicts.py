@@ -16,11 +16,11 @@ import numpy as np
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
-from jointscope.graphs.discovery.loop_validation import judged_by_loop
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
 from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
 from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
 from jointscope.graphs.judging.torque_rows import TorqueEquations
+from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.units import of_slide

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
-from jointscope.graphs.discovery.refit import Refit
 from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
-from jointscope.graphs.discovery.validation import ValidationError
+from jointscope.graphs.refits.refit import Refit
+from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
 
 MATTERS = 0.02  # share of the squared validation error that an effect must explain

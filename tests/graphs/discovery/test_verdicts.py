@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
-from jointscope.graphs.discovery.validation import ValidationError
 from jointscope.graphs.discovery.verdicts import ValidatedRefit, excess_share, judge, worth_a_refit
+from jointscope.graphs.refits.validation import ValidationError
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.robots.effect_kinds.effect_at import EffectAt

@@ -242,7 +242,9 @@ def _drive(
     found |= {name: value for name, value in equation.solve().items() if name == GAIN and not guessed}
     turned = {n: Value(sign * x.value if n == GAIN else x.value, x.sigma) for n, x in found.items()}
     start = {GAIN: abs(gain), **_above_zero(equation, found, abs(gain))}
-    if elastic or INERTIA not in found:
+    inertia = found.get(INERTIA)
+    hidden = inertia is not None and inertia.value < -TOLD * inertia.sigma and explained < EXPLAINED  # by a spring
+    if elastic or inertia is None or hidden:
         start[INERTIA] = max(start[INERTIA], MATCHED * link)
     return DriveValues(start, turned, explained, sign, confidence, link, guessed)
 

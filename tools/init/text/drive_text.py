@@ -126,7 +126,7 @@ def _why_lost(drive: DriveValues, found: Value | None) -> str:
         return "the recording is too short, or moves too little, to tell"
     says = f"the regression says {found.value:.2g} +- {found.sigma:.1g}"
     if found.value < -SURE * found.sigma:
-        return f"{says}, below zero, which cannot be: masses, units or names are wrong, or it is another robot"
+        return f"{says}, below zero, which cannot be: masses, units or names are wrong, or a spring gives way"
     return f"lost in its uncertainty: {says}"
 
 

@@ -21,8 +21,8 @@ from jointscope.graphs.comparison.compare import smooth
 from jointscope.graphs.comparison.free_run import free_run, loop_error
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.predictions_ahead import HORIZON, Ahead, predict_ahead
-from jointscope.graphs.discovery.loop_validation import judged_by_loop, loop_squares
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.refits.loop_validation import judged_by_loop, loop_squares
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
