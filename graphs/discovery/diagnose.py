@@ -20,18 +20,19 @@ from jointscope.graphs.discovery.diagnosis_words import paragraphs_of
 from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_missing_torque
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.spring_trials import SpringTrials
 from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
-    SAME,
     SENSOR_FLOOR,
     ValidatedRefit,
     excess_share,
     judge,
+    ranked,
     worth_a_refit,
 )
 from jointscope.graphs.refits.refit import refit
-from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, heldout_error, judged_error
+from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error, reported_heldout_error
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -46,6 +47,7 @@ LEADERS = 3  # candidates that are refitted
 PATIENCE = 2  # times as many, as long as none of them helps: one effect may hide that another one is right
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
+MUCH = 10.0  # [%] of the drive's torque that no adequate model leaves open, whatever it is
 LOOK_FIRST = "Look at this before any effect"  # how a paragraph about a plain mistake begins
 DOUBTFUL = 1.2  # times the error from which a floor cannot be what noise alone would give
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
@@ -113,23 +115,19 @@ def diagnose(
     clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
-    validated, failed = dict[str, ValidatedRefit](), set[str]()
+    percent: Mapping[str, float] = {}
     if torques is None:
-        validated, failed = _refit_leaders(base, scored, before.error, (fit, spans), holdout, leaders, report, pool)
+        candidates, refits = _by_predictions(base, scored, before, (fit, spans), holdout, leaders, report, pool)
+    else:
+        candidates, refits, percent = torques.candidates, torques.refits, torques.percent
     clock.stage("refits")
-    seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans)
-    candidates = _ranked(
-        [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
-    )
-    candidates = torques.candidates if torques is not None else candidates
+    report("springs", 0.9)
+    trials = SpringTrials(base, (fit, spans), before, holdout)
+    candidates, elastic = trials.beside(candidates, scored, refits, percent)
+    refits = {**refits, **elastic}
+    clock.stage("springs")
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
-    share = unexplained(comparison)
-    if torques is not None:
-        share = torques.unexplained
-    elif best is not None:
-        after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
-        share = unexplained_share(after, comparison.judged_floor)
-    refits = torques.refits if torques is not None else {label: t.refit.robot for label, t in validated.items()}
+    share = _unexplained(best, torques, elastic, comparison)
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -138,7 +136,9 @@ def diagnose(
     result = Diagnosis(
         robot=base.robot,
         candidates=tuple(candidates),
-        adequate=best is None and max(share, *_elsewhere(base, holdout, torques)) < ADEQUATE,
+        adequate=best is None
+        and max(share, *_elsewhere(base, holdout, torques)) < ADEQUATE
+        and max(percent.values(), default=0.0) < MUCH,
         unexplained_share=share,
         error=comparison.judged_error,
         floor=comparison.judged_floor,
@@ -157,6 +157,18 @@ def diagnose(
         missing_torque_percent=None if torques is None else torques.percent,
     )
     return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
+
+
+def _unexplained(
+    best: Candidate | None, torques: TorqueVerdicts | None, elastic: Mapping[str, Robot], comparison: ModelComparison
+) -> float:
+    """Share of the squared error that stays unexplained with the best candidate, in the measure that judged it."""
+    if torques is not None and (best is None or best.label not in elastic):
+        return torques.unexplained
+    if best is None:
+        return unexplained(comparison)
+    after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
+    return unexplained_share(after, comparison.judged_floor)
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:
@@ -206,6 +218,23 @@ def unexplained_share(error: float, floor: float) -> float:
     return float(max(1.0 - (floor / error) ** 2, 0.0)) if error != 0.0 else 0.0
 
 
+def _by_predictions(
+    base: BaseModel,
+    scored: ScoredCandidates,
+    before: ValidationError,
+    spans: tuple[Sequence[Span], Sequence[Span]],
+    holdout: Recording | None,
+    leaders: int,
+    report: Progress,
+    side_by_side: SideBySide,
+) -> tuple[list[Candidate], Mapping[str, Robot]]:
+    """Candidates judged by predictions after their refits, best first, and the robots refitted."""
+    validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
+    seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans[1])
+    judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
+    return ranked(judged), {label: t.refit.robot for label, t in validated.items()}
+
+
 def _refit_leaders(
     base: BaseModel,
     scored: ScoredCandidates,
@@ -251,38 +280,4 @@ def _refit_and_validate(
         errors: ValidationError = judged_error(base, found.robot, found.biases, spans)
     except (JointscopeError, np.linalg.LinAlgError):
         return None
-    return ValidatedRefit(found, errors, _heldout(found.robot, holdout))
-
-
-def _heldout(robot: Robot, holdout: Recording | None) -> float:
-    """Only reported: a model that cannot follow the held-out recording has no figure there, and keeps its verdict."""
-    if holdout is None:
-        return float("nan")
-    try:
-        return heldout_error(robot, holdout)
-    except (JointscopeError, np.linalg.LinAlgError):
-        return float("nan")
-
-
-def _yielding(candidate: Candidate, smallest: float, missing: Sequence[Candidate]) -> Candidate:
-    """A candidate that explains only part of what the best one explains is no more than possible."""
-    if candidate.verdict != "missing" or candidate.validation_error <= smallest * (1.0 + SAME):
-        return candidate
-    best = min(missing, key=lambda c: c.validation_error)
-    reason = f"but {best.label} explains more of it; look again once that is in the model"
-    return replace(candidate, verdict="possible", reasons=(*candidate.reasons, reason))
-
-
-def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
-    order = {"missing": 0, "possible": 1, "absent": 2, "untestable": 3}
-    missing = [c for c in candidates if c.verdict == "missing"]
-    smallest = min((c.validation_error for c in missing), default=0.0)
-    candidates = [_yielding(c, smallest, missing) for c in candidates]
-
-    def key(c: Candidate) -> tuple[float, ...]:
-        if c.verdict == "missing":
-            return (0.0, float(c.dof), -c.score)
-        return (float(order[c.verdict]), -c.score, 0.0)
-
-    return sorted(candidates, key=key)
+    return ValidatedRefit(found, errors, reported_heldout_error(found.robot, holdout))

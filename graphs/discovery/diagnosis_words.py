@@ -52,7 +52,7 @@ def _explains(c: Candidate, d: Diagnosis) -> str:
         f"{name} {p.value:.4g} +- {p.sigma:.2g} {p.unit}".removesuffix(" 1") for name, p in c.parameters.items()
     )
     sizes = f": {values}" if values else ""
-    if d.missing_torque_percent is not None:
+    if d.missing_torque_percent is not None and not c.refitted:
         text = f"{title(c)} explains {100 * c.share:.0f} % of the squared missing torque on blocks left out{sizes}."
     else:
         text = (

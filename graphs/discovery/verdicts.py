@@ -8,7 +8,7 @@ enters here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -183,3 +183,28 @@ def _bic(before: float, after: float, parameters: int, seconds: float) -> float:
         return float("nan")
     samples = max(seconds / HORIZON, 2.0)
     return float(samples * np.log(after**2 / before**2) + parameters * np.log(samples))
+
+
+def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
+    order = {"missing": 0, "possible": 1, "absent": 2, "untestable": 3}
+    missing = [c for c in candidates if c.verdict == "missing"]
+    best = min(missing, key=lambda c: c.validation_error, default=None)
+    if best is not None:
+        smallest = best.validation_error * (1.0 + SAME)
+        candidates = [c if c.validation_error <= smallest else yielding(c, best) for c in candidates]
+
+    def key(c: Candidate) -> tuple[float, ...]:
+        if c.verdict == "missing":
+            return (0.0, float(c.dof), -c.score)
+        return (float(order[c.verdict]), -c.score, 0.0)
+
+    return sorted(candidates, key=key)
+
+
+def yielding(candidate: Candidate, best: Candidate) -> Candidate:
+    """A candidate that explains only part of what the best one explains: no more than possible."""
+    if candidate.verdict != "missing":
+        return candidate
+    reason = f"but {best.label} explains more of it; look again once that is in the model"
+    return replace(candidate, verdict="possible", reasons=(*candidate.reasons, reason))

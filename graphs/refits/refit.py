@@ -62,7 +62,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
         base: the base model.
         spans: pieces to fit.
         score: the effect, its shapes and where to start; None fits the robot of `base` itself.
-        label: another effect than that of the score, started at its own start values.
+        label: another effect than that of the score, started at its own start values unless the base model has it.
 
     Raises:
         SolveError: the fit ran away.
@@ -70,12 +70,12 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
     robot = base.robot
     if score is not None:
         robot = add_effect(robot, score.hypothesis.label, start_of(score, robot))
-    elif label:
+    elif label and not robot.has_effect(*label.split("@")):
         robot = add_effect(robot, label)
     # noise that is next to nothing holds the states where the model without the effect has them
     noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
     problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
-    if score is not None or label:
+    if robot is not base.robot:
         # the states still are those of a model without the effect: they follow before all parameters move
         estimate = solve(problems, estimate, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
     solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)

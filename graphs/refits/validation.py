@@ -23,6 +23,7 @@ from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.predictions_ahead import HORIZON, Ahead, predict_ahead
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.refits.loop_validation import judged_by_loop, loop_squares
+from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -142,3 +143,13 @@ def heldout_error(robot: Robot, recording: Recording) -> float:
     ahead = predict_ahead(problem, calibration, Predictor(problem.robot, problem.timeline), causal, HORIZON)
     everything = Span(0, -np.inf, np.inf)
     return _root_mean(_mean_by_channel([[_squares(problem, ahead, everything, 0.0)]], len(robot.channels)))
+
+
+def reported_heldout_error(robot: Robot, recording: Recording | None) -> float:
+    """The same, which is only reported: NaN without a recording or where the model cannot follow it."""
+    if recording is None:
+        return float("nan")
+    try:
+        return heldout_error(robot, recording)
+    except (JointscopeError, np.linalg.LinAlgError):
+        return float("nan")

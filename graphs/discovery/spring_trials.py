@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Springs behind joints that were taken for rigid, tried by calibration.
+
+One linear step from a rigid joint does not tell of its spring: the link that swings behind the motor has no states yet,
+and the base parameters have taken what they could of it. So a joint that is far from explained is calibrated with one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jointscope.graphs.calibration.base_model import BaseModel, Span
+from jointscope.graphs.discovery.diagnosis_result import Candidate
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
+from jointscope.graphs.discovery.verdicts import ValidatedRefit, judge, yielding
+from jointscope.graphs.refits.refit import refit
+from jointscope.graphs.refits.validation import ValidationError, judged_error, reported_heldout_error
+from jointscope.robots.errors import JointscopeError
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+
+SPRING = "joint_elasticity"
+FAR = 10.0  # [%] of the drive's torque that is missing, [sigma] of the prediction, from which a joint is tried
+MOST_TRIED = 2  # joints, those first of which most is missing
+CLEAR = 0.5  # share of the squared error that a spring must explain to stand before torques
+
+
+@dataclass(frozen=True)
+class SpringTrials:
+    """Trials beside other candidates.
+
+    Attributes:
+        base: the rigid model.
+        spans: pieces on which a model is fitted, and those on which it is judged.
+        before: errors of the base model on the latter.
+        holdout: scored and reported.
+    """
+
+    base: BaseModel
+    spans: tuple[Sequence[Span], Sequence[Span]]
+    before: ValidationError
+    holdout: Recording | None
+
+    def beside(
+        self,
+        candidates: Sequence[Candidate],
+        scored: ScoredCandidates,
+        torques: Mapping[str, Robot],
+        missing: Mapping[str, float],
+    ) -> tuple[list[Candidate], dict[str, Robot]]:
+        """All candidates with the verdicts on springs, and the robots with those.
+
+        A clear spring that explains more than the first other one comes first.
+
+        Args:
+            candidates: judged by other means, best first.
+            scored: the same before they were judged.
+            torques: robots with the effects that missing torque names.
+            missing: torque of each joint in percent of the drive's; empty where predictions are judged.
+        """
+        tried = {f"{SPRING}@{joint}": self._fitted(joint) for joint in self._far(missing)}
+        if not tried:
+            return list(candidates), {}
+        seconds = sum(span.t1 - span.t0 for span in self.spans[1])
+        springs = [
+            judge(c, self.before, tried[c.label], seconds, tried[c.label] is None)
+            for c in scored.candidates
+            if c.label in tried
+        ]
+        refits = {label: fitted.refit.robot for label, fitted in tried.items() if fitted is not None}
+        clear = [spring for spring in springs if spring.verdict == "missing" and spring.share > CLEAR]
+        best = min(clear, key=lambda spring: spring.validation_error, default=None)
+        others = [c for c in candidates if c.label not in tried]
+        first = next((c for c in others if c.verdict == "missing"), None)
+        if best is not None and best.validation_error < self._rival(first, torques):
+            return [best, *(yielding(c, best) for c in (*springs, *others) if c is not best)], refits
+        return [
+            *others,
+            *(_doubted(spring) if first is None else yielding(spring, first) for spring in springs),
+        ], refits
+
+    def _far(self, missing: Mapping[str, float]) -> list[str]:
+        """Joints to be tried, worst first."""
+        robot = self.base.robot
+        if len(robot.sensors) > 1 or robot.transmission is not None or robot.choices.link_dynamics != "model":
+            return []
+        channels = zip(robot.joints, robot.motor_encoder.channels, strict=True)
+        far = missing or {joint: self.before.channels[name] for joint, name in channels}
+        can = catalogue()[SPRING].owners_of(robot)
+        return sorted((joint for joint in can if far[joint] > FAR), key=lambda joint: -far[joint])[:MOST_TRIED]
+
+    def _fitted(self, joint: str) -> ValidatedRefit | None:
+        """The model with a spring; None where it cannot be calibrated.
+
+        It is calibrated from the start values: the rotor of the rigid model moves the link, too.
+        """
+        label = f"{SPRING}@{joint}"
+        try:
+            elastic = BaseModel.of(add_effect(self.base.result.start, label), self.base.recordings)
+            found = refit(elastic, self.spans[0], None, label)
+            errors = judged_error(elastic, found.robot, found.biases, self.spans[1])
+        except (JointscopeError, np.linalg.LinAlgError):
+            return None
+        return ValidatedRefit(found, errors, reported_heldout_error(found.robot, self.holdout))
+
+    def _rival(self, first: Candidate | None, torques: Mapping[str, Robot]) -> float:
+        """Error on validation blocks of the first other candidate that is missing; infinite without one."""
+        if first is None:
+            return float("inf")
+        if np.isfinite(first.validation_error):
+            return first.validation_error
+        try:
+            grown = BaseModel.of(torques[first.label], self.base.recordings, self.base)
+            found = refit(grown, self.spans[0], None, first.label)
+            return judged_error(grown, found.robot, found.biases, self.spans[1]).error
+        except (JointscopeError, np.linalg.LinAlgError):
+            return float("inf")
+
+
+def _doubted(spring: Candidate) -> Candidate:
+    if spring.verdict != "missing":
+        return spring
+    why = f"but it explains less than {100 * CLEAR:.0f} % of the error"
+    return replace(spring, verdict="possible", reasons=(*spring.reasons, why))

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Springs behind joints that the robot file calls rigid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from jointscope.graphs.discovery import spring_trials
+from jointscope.graphs.discovery.diagnose import diagnose
+from jointscope.graphs.discovery.diagnosis_result import Candidate
+from jointscope.graphs.discovery.spring_trials import SpringTrials
+from jointscope.graphs.refits.validation import ValidationError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.command_line import main
+
+CASES = Path(__file__).parents[4] / "shared" / "cases"
+
+
+@pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")
+@pytest.mark.slow
+def test_a_spring_that_the_file_does_not_know_is_found_and_nothing_is_called_adequate_without_it(tmp_path):
+    path, bag = tmp_path / "e.yaml", CASES / "elastic.mcap"
+    assert main(["init", str(CASES / "elastic.urdf"), str(bag), "-o", str(path)]) == 0
+    robot = load_robot(path)
+    found = diagnose(robot, [read_recording(bag, robot)], missing_torque=False)
+    first = found.candidates[0]
+    assert (first.label, first.verdict, first.refitted) == ("joint_elasticity@motor1", "missing", True)
+    assert not found.adequate
+    compliance = first.parameters["compliance"]
+    assert compliance.value == pytest.approx(1.0 / 150.0, rel=1e-3)
+    assert all(c.verdict != "missing" for c in found.candidates[1:])
+
+
+def candidate(effect, verdict, error=float("nan"), share=0.9):
+    return Candidate(effect, "j1", 1.0, 1, 0.0, {}, verdict, share, validation_error=error)
+
+
+def trials(monkeypatch, spring, rival=float("inf"), missing=50.0):
+    """What is found beside a torque that explains something, where the spring was judged so."""
+    robot = SimpleNamespace(sensors={"e": 1}, transmission=None, choices=SimpleNamespace(link_dynamics="model"))
+    robot.joints, robot.motor_encoder = ("j1", "j2"), SimpleNamespace(channels=("j1.p", "j2.p"))
+    monkeypatch.setattr(spring_trials, "catalogue", lambda: {spring_trials.SPRING: Owners()})
+    monkeypatch.setattr(spring_trials, "judge", lambda *_: spring)
+    fitted = SimpleNamespace(refit=SimpleNamespace(robot="elastic"))
+    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, joint: fitted)
+    monkeypatch.setattr(SpringTrials, "_rival", lambda *_: rival)
+    before = ValidationError(100.0, 10.0, np.array([100.0]), {"j1.p": 100.0, "j2.p": 1.0})
+    tried = SpringTrials(SimpleNamespace(robot=robot), ((), ()), before, None)
+    scored = SimpleNamespace(candidates=[candidate("joint_elasticity", "absent"), candidate("cogging", "absent")])
+    torque = candidate("torque_offset", "missing")
+    return tried.beside([torque], scored, {}, {"j1": missing, "j2": 1.0})
+
+
+class Owners:
+    def owners_of(self, robot):
+        return robot.joints
+
+
+def test_a_clear_spring_stands_before_torques(monkeypatch):
+    found, refits = trials(monkeypatch, candidate("joint_elasticity", "missing", 2.0), rival=60.0)
+    assert [(c.effect, c.verdict) for c in found] == [("joint_elasticity", "missing"), ("torque_offset", "possible")]
+    assert refits == {"joint_elasticity@j1": "elastic"}
+
+
+@pytest.mark.parametrize(
+    ("share", "rival"),
+    [pytest.param(0.4, np.inf, id="explains too little"), pytest.param(0.9, 1.0, id="another one explains more")],
+)
+def test_other_springs_are_possible_at_most(monkeypatch, share, rival):
+    spring = replace(candidate("joint_elasticity", "missing", 2.0), share=share)
+    found, _ = trials(monkeypatch, spring, rival)
+    assert [(c.effect, c.verdict) for c in found] == [("torque_offset", "missing"), ("joint_elasticity", "possible")]
+
+
+def test_joints_that_are_nearly_explained_are_not_tried(monkeypatch):
+    found, refits = trials(monkeypatch, candidate("joint_elasticity", "missing", 2.0), missing=9.0)
+    assert [c.effect for c in found] == ["torque_offset"] and not refits
