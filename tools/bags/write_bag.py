@@ -57,9 +57,28 @@ def write_bag(
     Raises:
         RecordingError: the bag cannot be written; nothing is left behind.
     """
+    ros2 = _format(Path(path), fmt) != "bag"
+    write_topics(path, _topics(recording, robot, ros2), fmt, progress)
+
+
+def joint_states(
+    topic: str,
+    names: tuple[str, ...],
+    stamps: NDArray[np.int64],
+    fields: dict[str, NDArray[np.float64]],
+    ros2: bool = True,
+) -> TopicMessages:
+    """A topic of JointStates: `fields` are positions, velocities or efforts, shape (n, c) each."""
+    kind = known_message_type("sensor_msgs/msg/JointState", ros2)
+    return TopicMessages(topic, kind, stamps, fill_messages(kind, names, stamps, fields))
+
+
+def write_topics(
+    path: str | Path, topics: list[TopicMessages], fmt: str | None = None, progress: Progress | None = None
+) -> None:
+    """Writes a bag of messages that are there already; arguments and errors as of `write_bag`."""
     path = Path(path)
     fmt = _format(path, fmt)
-    topics = _topics(recording, robot, ros2=fmt != "bag")
     if path.is_dir() and not _is_bag_folder(path):
         raise RecordingError(
             f"cannot write the bag {path}: a folder of that name exists and is not a bag; remove it or name another"

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frequency responses of any system: signals in; response matrix with noise and total covariance out."""

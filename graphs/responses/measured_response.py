@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All that a recording says of the frequency response of its system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from jointscope.graphs.responses.distortions import Distortions, distortions
+from jointscope.graphs.responses.resonances import Resonance, resonances
+from jointscope.graphs.responses.response_matrix import ResponseMatrix, response_matrix
+from jointscope.graphs.responses.spectra import Spectra, spectra
+from jointscope.robots.recordings.signals import Excitation, Signals
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """The response of a system.
+
+    Attributes:
+        spectra: of its experiments.
+        matrix: with covariances.
+        distortions: on lines that were not excited.
+        resonances: and anti-resonances.
+    """
+
+    spectra: Spectra
+    matrix: ResponseMatrix
+    distortions: Distortions
+    resonances: tuple[Resonance, ...]
+
+    @staticmethod
+    def of(signals: Signals, excitation: Excitation) -> MeasuredResponse:
+        """The response that a recording shows.
+
+        Raises:
+            RecordingError: it cannot show one.
+        """
+        found = spectra(signals, excitation)
+        matrix = response_matrix(found)
+        peaks = resonances(matrix.frequencies, matrix.G, matrix.sigmas(matrix.total))
+        return MeasuredResponse(found, matrix, distortions(found, matrix), tuple(peaks))
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of `--json`."""
+        m = self.matrix
+        noise = None if m.noise is None else m.relative(m.noise).tolist()
+        return {
+            "path": self.spectra.path,
+            "excitation": {
+                "source": self.spectra.excitation.source,
+                "f0": self.spectra.excitation.f0,
+                "lines": self.spectra.excitation.lines.tolist(),
+                "experiments": len(self.spectra.U),
+                "periods": m.periods,
+                "realisations": len(m.each),
+                "pairs": self.spectra.common is not None,
+            },
+            "inputs": list(m.inputs),
+            "outputs": list(m.outputs),
+            "noise": noise,
+            "total": m.relative(m.total).tolist(),
+            "total_from": m.total_from,
+            "resonances": [
+                {
+                    "input": m.inputs[r.input],
+                    "output": m.outputs[r.output],
+                    "anti": r.anti,
+                    "frequency": {"value": r.frequency, "sigma": r.frequency_sigma, "unit": "Hz"},
+                    "damping": {"value": r.damping, "sigma": r.damping_sigma, "unit": "1"},
+                }
+                for r in self.resonances
+            ],
+        }

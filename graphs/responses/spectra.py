@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Steady periods of an excited system as spectra, experiment by experiment.
+
+X(k) = 1/N sum_n x(n) exp(-2 pi j k n / N) of each period; a cosine of amplitude a has |X| = a / 2. Two experiments that
+differ in the sign of the excitation count as one, half their difference: what does not change its sign with the
+excitation (gravity, a motion that carries it, even distortion) is not in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recordings.signals import Excitation, Experiment, Signal, Signals, whole_periods
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+CLIPPED = 2e-3  # share of samples that stay at exactly the largest or smallest value, as no signal within its limits
+EXCITED = 3.0  # times what is between the lines, or what changes from period to period
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Spectra of one recording.
+
+    Attributes:
+        path: of the recording.
+        excitation: how it was excited.
+        inputs, outputs: names of the channels.
+        U: of the inputs, shape (e, p, K, nu): experiment, period, line.
+        Y: of the outputs, shape (e, p, K, ny).
+        common: half the sum of the pairs, of the outputs, shape (e, p, K, ny); None without pairs.
+        realisations: number of each experiment's realisation, shape (e,).
+    """
+
+    path: str
+    excitation: Excitation
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    U: Complex
+    Y: Complex
+    common: Complex | None
+    realisations: NDArray[np.intp]
+
+    @property
+    def periods(self) -> int:
+        """Of each experiment."""
+        return int(self.U.shape[1])
+
+    @property
+    def frequencies(self) -> Array:
+        """Of all lines, shape (K,) [Hz]."""
+        return np.asarray(self.excitation.f0 * np.arange(self.U.shape[2]))
+
+    @property
+    def blocks(self) -> list[NDArray[np.intp]]:
+        """Experiments that together excite all inputs: of each realisation, or all of them where that is too few."""
+        numbers = list(dict.fromkeys(self.realisations.tolist()))
+        each = [np.flatnonzero(self.realisations == r) for r in numbers]
+        enough = all(len(block) >= len(self.inputs) for block in each)
+        return each if enough else [np.arange(len(self.realisations))]
+
+
+def spectra(signals: Signals, excitation: Excitation) -> Spectra:
+    """The spectra of a recording.
+
+    Raises:
+        RecordingError: an experiment is not in it, periods are not whole, an input is clipped, a line not excited.
+    """
+    _check_clipping(signals)
+    _check_rates(signals, excitation)
+    steady = min(e.periods - e.transient for e in excitation.experiments)
+    pairs: dict[tuple[int, int], dict[int, tuple[Complex, Complex]]] = {}
+    for experiment in excitation.experiments:
+        found = tuple(
+            _periods(s, excitation, experiment, steady, signals.path) for s in (signals.inputs, signals.outputs)
+        )
+        pairs.setdefault((experiment.realisation, experiment.number), {})[experiment.sign] = (found[0], found[1])
+    lonely = [key for key, pair in pairs.items() if len(pair) == 1]
+    if lonely and len(lonely) < len(pairs):
+        raise RecordingError(
+            f"{signals.path}: experiment {lonely[0][1]} of realisation {lonely[0][0]} has one sign, others have both; "
+            "leave it out, or record the other sign"
+        )
+    keys = sorted(pairs)
+    U, Y = (_differences([pairs[key] for key in keys], i) for i in (0, 1))
+    common = None if lonely else np.array([(pairs[key][1][1] + pairs[key][-1][1]) / 2 for key in keys])
+    K = min(U.shape[2], Y.shape[2])
+    made = Spectra(
+        signals.path,
+        excitation,
+        signals.inputs.names,
+        signals.outputs.names,
+        U[:, :, :K],
+        Y[:, :, :K],
+        None if common is None else common[:, :, :K],
+        np.array([key[0] for key in keys], dtype=np.intp),
+    )
+    _check_excited(made)
+    return made
+
+
+def _differences(pairs: Sequence[dict[int, tuple[Complex, Complex]]], i: int) -> Complex:
+    """Half the difference of both signs, or the one that is there, seen with a positive sign."""
+    each = [
+        (pair[1][i] - pair[-1][i]) / 2 if len(pair) == 2 else sign * both[i]
+        for pair in pairs
+        for sign, both in [next(iter(pair.items()))]
+    ]
+    return np.array(each)
+
+
+def _periods(signal: Signal, excitation: Excitation, experiment: Experiment, steady: int, path: str) -> Complex:
+    """Spectra of the last steady periods of an experiment, shape (p, K, c), phases as of its start."""
+    N = whole_periods(excitation.f0, signal.step, path)
+    begin = experiment.start + (experiment.periods - steady) / excitation.f0
+    x, first = signal.even(begin, steady * N, path)
+    X = np.fft.rfft(x.reshape(steady, N, -1), axis=1) / N
+    late = np.exp(-2j * np.pi * excitation.f0 * np.arange(X.shape[1]) * (first - begin))
+    return np.asarray(X * late[None, :, None])
+
+
+def _check_rates(signals: Signals, excitation: Excitation) -> None:
+    for signal in (signals.inputs, signals.outputs):
+        highest = excitation.f0 * float(excitation.lines.max())
+        if highest > 0.5 / signal.step:
+            raise RecordingError(
+                f"{signals.path}: {signal.names[0]} is sampled at {1.0 / signal.step:.4g} Hz, lines go up to "
+                f"{highest:g} Hz: above half the rate they fold onto others; record faster or leave these lines out"
+            )
+
+
+def _check_clipping(signals: Signals) -> None:
+    for name, u in zip(signals.inputs.names, signals.inputs.values.T, strict=True):
+        for limit in (u.max(), u.min()):
+            at = u == limit
+            share = float(np.mean(at[1:] & at[:-1]))
+            if np.ptp(u) > 0.0 and share > CLIPPED:
+                raise RecordingError(
+                    f"{signals.path}: {name} stands at {limit:.4g} in {100.0 * share:.2g} % of the samples: it is "
+                    "clipped, and what is lost comes back at all lines; excite less"
+                )
+
+
+def _check_excited(found: Spectra) -> None:
+    """Every line must stand out from what changes between periods, in some experiment of some input.
+
+    Raises:
+        RecordingError: it does not.
+    """
+    lines = found.excitation.lines
+    size = np.sqrt(np.mean(np.abs(found.U) ** 2, axis=(0, 1)))
+    between = np.setdiff1d(np.arange(1, min(int(lines.max()) + 2, len(size))), lines)
+    floor = np.median(size[between], axis=0) if len(between) > 2 else np.zeros(size.shape[1])
+    if found.periods > 1:
+        change = np.sqrt(np.mean(np.var(found.U, axis=1, ddof=1), axis=0))
+        floor = np.maximum(floor, np.median(change[lines], axis=0))
+    weak = [int(k) for k in lines if np.all(size[k] <= EXCITED * floor)]
+    if len(weak) > 0.5 * len(lines):
+        raise RecordingError(
+            f"{found.path}: {len(weak)} of {len(lines)} lines of {found.excitation.source} are not excited; it belongs "
+            "to another recording, or f0 or the start times are wrong"
+        )
+    if weak:
+        raise RecordingError(
+            f"{found.path}: nothing was excited at line {weak[0]} ({found.excitation.f0 * weak[0]:g} Hz)"
+            + (f" and {len(weak) - 1} more" if len(weak) > 1 else "")
+            + f"; take it out of the lines of {found.excitation.source}"
+        )

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`jointscope frequency`: frequency response matrix of any system, with noise and total covariance."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import RecordingError
+from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
+
+EXAMPLE = """example:
+  jointscope frequency frequency_P1 frequency_P3 --report frf.html
+  jointscope frequency bench.mcap --from /drive:effort --to /joint_states:velocity:motor,load -o frf.npz
+
+How it was excited is read from excitation.yaml beside the bag, or found from the recording (docs/frequency.md)."""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Adds the verb to the command line."""
+    parser = subparsers.add_parser(
+        "frequency",
+        help="frequency response matrix of any system, with noise and total covariance",
+        description="Frequency responses from recordings of periodic excitation, each bag by itself.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the matrices as .npz or .csv")
+    parser.add_argument(
+        "--from",
+        dest="source",
+        default="",
+        metavar="SIGNAL",
+        help="inputs, TOPIC:FIELD[:NAME,...]; default: /joint_states:effort of the joints in /motor_command",
+    )
+    parser.add_argument(
+        "--to", dest="target", default="", metavar="SIGNAL", help="outputs; default: /joint_states:position of these"
+    )
+    parser.add_argument(
+        "--excitation",
+        type=Path,
+        metavar="FILE",
+        help="describes the excitation; default: excitation.yaml beside the bag",
+    )
+    parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Estimates, writes the files, and says what was found."""
+    if args.output is not None and args.output.suffix.lower() not in (".npz", ".csv"):
+        raise RecordingError(f"{args.output}: expected a name that ends with .npz or .csv")
+    files = [path for path in (args.output, args.report, args.json) if path is not None]
+    check_outputs(files, inputs=[*args.bags, *filter(None, [args.excitation])])
+    from jointscope.graphs.responses.measured_response import MeasuredResponse
+    from jointscope.tools.bags.read_signals import excitation_of, read_signals
+    from jointscope.tools.terminal.responses_text import response_text
+
+    found = []
+    with progress_bar() as progress:
+        for i, bag in enumerate(args.bags):
+            progress(f"reading {bag.name}", i / len(args.bags))
+            signals, drive = read_signals(bag, args.source, args.target)
+            excitation = excitation_of(bag, drive, len(signals.inputs.names), args.excitation)
+            found.append(MeasuredResponse.of(signals, excitation))
+    with ExitStack() as stack:
+        if args.output is not None:
+            from jointscope.tools.verb_parts.response_files import write_responses
+
+            write_responses(stack.enter_context(whole_file(args.output)), found, args.output.suffix.lower())
+        if args.report is not None:
+            from jointscope.tools.report.responses_report import responses_report
+
+            stack.enter_context(whole_file(args.report)).write_text(responses_report(found), encoding="utf-8")
+        if args.json is not None:
+            write_json(stack.enter_context(whole_file(args.json)), {"responses": [one.to_json() for one in found]})
+    print("\n\n".join(map(response_text, found)))
+    if files:
+        print(f"\nWrote {', '.join(map(str, files))}")
+    return 0
