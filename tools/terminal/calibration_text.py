@@ -31,7 +31,8 @@ def _headline(result: CalibrationResult) -> str:
     speed = result.recording_seconds / result.wall_seconds if result.wall_seconds > 0 else float("inf")
     return (
         f"{result.robot.name} from {bags}: {result.samples:,} samples in {result.recording_seconds:.1f} s, calibrated "
-        f"in {result.wall_seconds:.1f} s ({speed:.1f} times as fast as recorded), {len(result.iterations)} iterations"
+        f"in {result.wall_seconds:.1f} s ({significant(speed, 2)} times as fast as recorded), "
+        f"{len(result.iterations)} iterations"
     )
 
 

@@ -275,7 +275,8 @@ def test_commands_that_come_only_when_they_change_are_never_silent():
 @pytest.mark.parametrize(
     ("seconds", "said"),
     [(3e-7, "300 ns"), (3.84e-4, "384 us"), (0.021, "21 ms"), (-3.2, "3.2 s"), (7500.0, "2 h 5 min"),
-     (1.767e9, "56 years"), (300.0, "5 min 0 s"), (1e6, "12 days")],
+     (1.767e9, "56 years"), (300.0, "5 min 0 s"), (1e6, "12 days"), (9.996e-4, "1 ms"),
+     (0.09996, "0.1 s"), (10790.0, "3 h 0 min")],
 )  # fmt: skip
 def test_times_are_said_as_people_say_them(seconds, said):
     assert duration(seconds) == said
