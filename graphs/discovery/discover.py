@@ -171,7 +171,7 @@ class _Search:
 
     def _loop(self, base: Any) -> tuple[str, Diagnosis | None]:
         added = sum(step.added is not None for step in self.steps)
-        refused: set[str] = set()
+        refused: dict[str, str] = {}
         while True:
             share = added / self.max_steps
             diagnosis = self.kind.diagnosed(base, self.steps[-1].comparison, self.last_errors, self._part(share))
@@ -183,24 +183,26 @@ class _Search:
                 return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
             grown = next((g for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), None)
             if grown is None:
-                return "what helped on validation blocks did not hold when calibrated with all data", diagnosis
+                why = "; ".join(f"{label} {reason}" for label, reason in refused.items())
+                return f"what helped on validation blocks did not hold when calibrated with all data: {why}", diagnosis
             base = self._without_idle(grown)
             refused.clear()
             added += 1
 
-    def _try(self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: set[str]) -> Any:
-        """The model with a candidate, calibrated with all training recordings; None if that makes it worse."""
+    def _try(self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: dict[str, str]) -> Any:
+        """The model with a candidate, calibrated with all training recordings; None, and why, if that is no better."""
         self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
         try:
             grown = self.kind.calibrated(diagnosis.refits[candidate.label], base)
             errors = self.kind.errors(grown)
-        except JointscopeError:
-            errors = None
+        except JointscopeError as err:
+            refused[candidate.label] = f"cannot be calibrated ({err})"
+            return None
         before = self.steps[-1].train_error
         # what left-out blocks said about the torque is not asked again of predictions in sigmas of a fine sensor
-        helps = errors is not None and errors.error**2 < (1.0 - self.kind.must_explain) * before**2
-        if errors is None or not (helps or diagnosis.missing_torque_percent is not None):
-            refused.add(candidate.label)
+        helps = errors.error**2 < (1.0 - self.kind.must_explain) * before**2
+        if not (helps or diagnosis.missing_torque_percent is not None):
+            refused[candidate.label] = f"leaves the training error at {errors.error:.3g} sigma ({before:.3g} before)"
             return None
         self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, before, errors.error), errors)
         return grown

@@ -49,6 +49,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--unit",
         default="",
+        type=lambda text: text.replace(" ", ""),  # robot files say "N m"
         choices=("duty", "V", "A", "Nm"),
         help="unit of the command, if you know it; else the masses of the URDF and its size tell",
     )

@@ -84,7 +84,7 @@ def test_masses_of_arms_that_exist_are_not_doubted(arm):
 
 
 def test_torques_that_are_said_must_move_the_masses_as_torques_do(arm, tmp_path):
-    robot = begun(arm, tmp_path, 0.5, None, "--unit", "Nm")
+    robot = begun(arm, tmp_path, 0.5, None, "--unit", "N m")
     level, text = asked(robot, (), [read_recording(arm[1], robot)])
     assert level == "bad" and "one moves as 0.5" in text and "masses times 2" in text
     right = begun(arm, tmp_path, 1.0)
