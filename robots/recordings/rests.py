@@ -24,6 +24,7 @@ SHORTEST = 0.5  # [s] of a stretch that is a rest
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
 PARTS = 4  # of what is looked at, whose means are compared
 SWINGING = 12.0  # [sigma] of a link encoder that these means may differ by
+FEWEST, OFTEN = 3, 0.25  # rests, and part of the time that motors stand, below both of which it is motion
 LONG_PAUSE = 0.5  # [s] without a sample
 
 
@@ -112,8 +113,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         RecordingError: there is none, with the reason.
     """
     motor, link = robot.motor_encoder, robot.link_encoder
-    stream = recording.streams[motor.name]
-    standing = still_stretches(stream.times, stream.values - motor.zero, WITHIN * motor.sigmas)
+    stream, standing = recording.streams[motor.name], _standing(recording, robot)
     stretches = _split(standing, loads.changes)
     found, swinging = [], 0
     for t0, t1 in stretches:
@@ -130,6 +130,12 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         )
     if not found:
         raise RecordingError(_why_none(recording, standing, stretches, swinging))
+    share = standing_share(recording, robot)
+    if len(found) < FEWEST and share < OFTEN:
+        raise RecordingError(
+            f"{recording.path}: the motors stand {100 * share:.0f} % of the time only; expected rests; a recording of "
+            f"motion stands before the first option: jointscope calibrate ROBOT {recording.path} -o OUT.yaml"
+        )
     times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = (np.array(p) for p in zip(*found, strict=True))
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]
     first = stream.values[0] - motor.zero
@@ -141,6 +147,19 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     )  # fmt: skip
     rests = rests.only(_last_of_each(rests))
     return replace(rests, moved=_moved(first, rests.q_motor, WITHIN * motor.sigmas))
+
+
+def standing_share(recording: Recording, robot: Robot) -> float:
+    """Part of a recording in which all motors stand."""
+    times = recording.streams[robot.motor_encoder.name].times
+    return float(sum(t1 - t0 for t0, t1 in _standing(recording, robot))) / max(float(np.ptp(times)), 1e-9)
+
+
+def _standing(recording: Recording, robot: Robot) -> list[tuple[float, float]]:
+    """Stretches in which all motors stand [s]."""
+    motor = robot.motor_encoder
+    stream = recording.streams[motor.name]
+    return still_stretches(stream.times, stream.values - motor.zero, WITHIN * motor.sigmas)
 
 
 def still_stretches(times: Array, values: Array, within: Array) -> list[tuple[float, float]]:

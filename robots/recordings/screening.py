@@ -25,6 +25,7 @@ from jointscope.robots.recordings.resting_joints import (
     must_move,
     what_it_cannot_tell,
 )
+from jointscope.robots.recordings.rests import OFTEN, standing_share
 from jointscope.robots.recordings.wrapped_counter import wrapping_jump
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
@@ -169,9 +170,12 @@ def _check_changes(recording: Recording, stream: Stream, robot: Robot) -> None:
     units = robot.sensors[stream.name].units
     for dead, channel, unit, value in zip(constant, stream.channels, units, stream.values[0], strict=True):
         if dead:
+            rests = "; the motors stand often: rests follow --rests"
             raise RecordingError(
                 f"{channel} never changes: {value:.6g} {unit} in all {len(stream)} samples; expected at least "
                 "noise: the sensor is dead or another field holds its values"
+                + rests
+                * (standing_share(recording, robot) > OFTEN)
             )
 
 

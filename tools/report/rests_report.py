@@ -30,7 +30,7 @@ def rests_report(result: RestCalibration, checked: AcceptedBy = NO_LIMITS) -> st
 def _verdict(result: RestCalibration) -> Section:
     errors = result.errors
     lead = (
-        f"{verdict(errors)} {result.count} rests: links rest {significant(errors.error, 2)} sigma (rms) from where "
+        f"{verdict(result)} {result.count} rests: links rest {significant(errors.error, 2)} sigma (rms) from where "
         f"motors and loads say, {significant(result.before.error, 3)} before; 1 is expected."
     )
     torques, beyond = errors.torques(result.robot), errors.beyond(result.robot)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
@@ -10,9 +11,11 @@ from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
+LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
 
 
@@ -23,7 +26,7 @@ def rest_calibration_text(result: RestCalibration) -> str:
         f"{result.robot.name} from {paths}: {result.count} rests, calibrated in {result.wall_seconds:.1f} s, "
         f"{result.iterations} iterations",
         "",
-        verdict(result.errors),
+        verdict(result),
         f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads say, "
         f"{significant(result.before.error, 3)} before; 1 is expected",
     ]
@@ -55,13 +58,25 @@ def rests_beside_motion(result: CalibrationResult) -> str:
     )
 
 
-def verdict(errors: RestErrors) -> str:
-    """Whether the model holds at rest."""
-    if errors.error <= AS_EXPECTED:
-        return "Yes, the model holds at these rests."
-    if errors.error <= DOUBTFUL:
+def verdict(result: RestCalibration) -> str:
+    """Whether the model holds at rest, and whether the rests tell its values."""
+    error = result.errors.error
+    if error > DOUBTFUL:
+        return "No, do not rely on this yet: links do not rest where the model says."
+    owner, values = max(Counter(p.name.split(".")[0] for p in result.parameters).items(), key=lambda item: item[1])
+    if result.count <= values:
+        rests = counted(result.count, "rest")
+        return f"No, do not rely on this yet: {rests} for {values} values of {owner}; nothing could contradict them."
+    values_of = result.robot.parameters
+    told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
+    loose = [p for p in told if p.sigma > LOOSE * p.value]
+    if loose:
+        names = ", ".join(f"{p.name} (+-{significant(100 * p.sigma / p.value, 2)} %)" for p in loose)
+        so = "No, do not rely on this yet" if len(loose) == len(told) else "Usable, with reservations"
+        return f"{so}: these rests hardly tell {names}; let it rest in more postures, or with other weights."
+    if error > AS_EXPECTED:
         return "Usable, with reservations: links rest further from where the model says than their encoders explain."
-    return "No, do not rely on this yet: links do not rest where the model says."
+    return "Yes, the model holds at these rests."
 
 
 def _errors(by_label: Mapping[str, RestErrors], robot: Robot) -> str:

@@ -15,6 +15,7 @@ from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.rests import Rests
+from jointscope.tools.terminal.rests_text import verdict
 
 URDF = """<robot name="lever"><link name="base"/>
 <joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
@@ -107,6 +108,17 @@ def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path)
     held_out = rest_errors([RestSet.of(result.robot, hanging(40, 2))])
     exact = rest_errors([RestSet.of(robot.with_values(truth), hanging(40, 2))])
     assert held_out.error < 1.05 * exact.error
+
+
+def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
+    robot = lever(tmp_path)
+    assert verdict(calibrate_rests(robot, [hanging(60, 1)])).startswith("Yes")
+    few = calibrate_rests(robot, [hanging(4, 1)])
+    assert "4 rests for 5 values of swing; nothing could contradict them" in verdict(few)
+    share = {"swing.stiffness": 0.5, "swing.coulomb_torque": 0.1}
+    loose = tuple(replace(p, sigma=share.get(p.name, 0.0) * p.value) for p in few.parameters)
+    said = verdict(replace(few, parameters=loose, problems=few.problems * 2))
+    assert said.startswith("Usable") and "these rests hardly tell swing.stiffness (+-50 %);" in said
 
 
 def test_gradients_are_those_of_differences(tmp_path):

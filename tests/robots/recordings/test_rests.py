@@ -82,6 +82,9 @@ def test_motion_has_no_rests_and_weights_in_a_hurry_have_none():
     assert str(err.value) == (
         "bench: no rests: no motor stands for 0.5 s; a recording of motion stands before the first option"
     )
+    begins_at_rest = np.concatenate([np.zeros(100), np.linspace(0.0, 3.0, 500)])
+    with pytest.raises(RecordingError, match="stand 17 % of the time only; expected rests; a recording"):
+        find_rests(recording(begins_at_rest), ROBOT, LoadHistory.none())
     times = np.arange(0.0, 4.0, 0.3)
     hurried = LoadHistory(times, np.outer(times, [0, 1, 0]), ("attachment",) * len(times))
     with pytest.raises(RecordingError, match=r"the load changes within 0\.5 s wherever the motors stand"):
