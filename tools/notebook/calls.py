@@ -30,11 +30,11 @@ from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed
+from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
 from jointscope.tools.simulator.simulation import Simulation
 from jointscope.tools.simulator.simulation import simulate as simulate_motion
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.rest_runs import weighted_rests
-from jointscope.tools.verb_parts.robot_as_recorded import robot_as_recorded
 
 AnyRobot = Robot | str | Path
 AnyRecording = Recording | str | Path

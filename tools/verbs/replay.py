@@ -82,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(outputs, inputs=[args.bag, *robot_file, *args.effects])
     load_user_effects(args.effects)
     from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
     from jointscope.tools.terminal.replay_text import replay_text
-    from jointscope.tools.verb_parts.robot_as_recorded import robot_as_recorded
 
     robot, said = robot_as_recorded(load_robot(args.robot), args.bag)
     with progress_bar() as progress, ExitStack() as stack:
