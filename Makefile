@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
+# make demo | story | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
 # Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
@@ -11,11 +11,18 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
+.PHONY: demo story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
 	$(BIN)/jointscope demo -o demo
+
+# The picture of the README: three effects are hidden, a quarter of an hour.
+story: $(VENV)/sim $(VENV)/code
+	mkdir -p demo
+	$(BIN)/jointscope demo -o demo/story --seconds 20 --effect load_dependent_friction@joint2:coefficient=0.25 \
+		--effect cogging@joint1:cos=0.5,sin=0.4,order=42.092 --effect backlash@joint3:half_gap=0.01
+	cp demo/story/story.svg docs/pictures/story.svg
 
 # One process a core, each with one thread of linear algebra; a file's tests stay together, as they share recordings.
 PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile

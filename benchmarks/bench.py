@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prints what was promised beside what is measured, as markdown.
+"""Prints what was promised beside what is measured, and writes it into docs/measured.md.
 
 Usage: python benchmarks/bench.py [SECTION...] [--quick] [--json FILE]
 """
@@ -8,49 +8,22 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
-import json
-import os
-import platform
-import time
 from pathlib import Path
-from typing import Any
 
-from patience import say
-from tables import Section
+from section_runs import run_sections
 
 SECTIONS = ("accuracy", "speed", "honest_sigmas", "reading")
-PACKAGES = ("jointscope", "numpy", "scipy", "gtsam", "pin", "mujoco", "numba", "rosbags")
 
 
 def main() -> None:
     arguments = _parse()
-    surroundings = environment()
-    print(f"# Benchmark{' (quick run)' if arguments.quick else ''}\n\n{surroundings}\n", flush=True)
-    results: dict[str, Any] = {"environment": surroundings, "quick": arguments.quick, "sections": {}}
-    for name in arguments.sections or SECTIONS:
-        say(f"section {name}")
-        started = time.perf_counter()
-        section: Section = importlib.import_module(name).run(arguments.quick)
-        seconds = time.perf_counter() - started
-        print(f"{section.markdown()}\n({seconds:.0f} s)\n", flush=True)
-        results["sections"][name] = section.to_json() | {"seconds": seconds}
-        if arguments.json:  # after every section: what is measured is kept, whatever comes next
-            arguments.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
-
-
-def environment() -> str:
-    """Cores, load, Python and package versions in one line."""
-    versions = []
-    for package in PACKAGES:
-        try:
-            versions.append(f"{package} {importlib.metadata.version(package)}")
-        except importlib.metadata.PackageNotFoundError:
-            versions.append(f"{package} not installed")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    # other work on the machine makes every time below longer; the load tells
-    load = f"load {os.getloadavg()[0]:.1f} at the start, " if hasattr(os, "getloadavg") else ""
-    return f"{cores} cores, {load}{platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}"
+    run_sections(
+        "Benchmark",
+        arguments.sections or SECTIONS,
+        lambda name: importlib.import_module(name).run(arguments.quick),
+        arguments.quick,
+        arguments.json,
+    )
 
 
 def _parse() -> argparse.Namespace:

@@ -27,8 +27,8 @@ from arm_recording import record
 from arm_row import BROKEN, ArmRow, judge
 from arm_table import section
 from arm_verbs import THREADS, first_contact
-from bench import environment
 from kept_rows import keep, known_rows
+from measured_page import environment, write_section
 from patience import say
 
 import jointscope.graphs
@@ -52,7 +52,10 @@ def main() -> None:
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)})"
-    print(f"# Arms{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{section(rows).markdown()}")
+    told = section(rows).markdown()
+    print(f"# Arms{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{told}")
+    if not part and not arguments.quick and arguments.only == "*":
+        write_section(told)
     if not arguments.table and arguments.only == "*":
         print(perfect_recordings.run(arguments.quick).markdown())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hides effects in simulated recordings, lets `discover` find them and prints the table as markdown.
+"""Hides effects in simulated recordings and lets `discover` find them; the table goes into docs/measured.md.
 
 Usage: python benchmarks/bench_discovery.py [--quick] [--only PATTERN] [--jobs N] [--results FILE] [--table] [--list]
 """
@@ -20,12 +20,12 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import cache
 from pathlib import Path
 
-from bench import environment
 from discovery import section
 from discovery_case import run_case
 from discovery_row import Row
 from hidden_effects import Case, cases, tenth
 from kept_rows import keep, known_rows
+from measured_page import environment, write_section
 from patience import say
 from setting_arms import SettingCase
 
@@ -53,9 +53,10 @@ def main() -> None:
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)} cases)"
-    print(
-        f"# Discovery{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{section(rows).markdown()}"
-    )
+    told = section(rows).markdown()
+    print(f"# Discovery{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{told}")
+    if not part and not arguments.quick and not arguments.only:
+        write_section(told)
 
 
 def measure(missing: list[Case | SettingCase], jobs: int) -> Iterator[Row]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prints what was promised of the fixed-lag estimator beside what is measured, as markdown.
+"""Prints what was promised of the fixed-lag estimator beside what is measured, and writes it into docs/measured.md.
 
 Usage: python benchmarks/bench_estimator.py [SECTION...] [--quick] [--minutes M] [--json FILE]
 """
@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import multiprocessing
 import os
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
 
-from bench import environment
-from patience import say
+from section_runs import run_sections
 from tables import Section
 
 SECTIONS = ("latency", "accuracy", "consistency", "trouble")
@@ -28,18 +24,13 @@ MINUTES = 10.0
 def main() -> None:
     arguments = _parse()
     os.environ.update(dict.fromkeys(THREADS, "1"))  # read when the processes below load numpy
-    surroundings = environment()
-    print(f"# Estimator{' (quick run)' if arguments.quick else ''}\n\n{surroundings}\n", flush=True)
-    results: dict[str, Any] = {"environment": surroundings, "quick": arguments.quick, "sections": {}}
-    for name in arguments.sections or SECTIONS:
-        say(f"section {name}")
-        started = time.perf_counter()
-        section = _measured(name, arguments.quick, arguments.minutes)
-        seconds = time.perf_counter() - started
-        print(f"{section.markdown()}\n({seconds:.0f} s)\n", flush=True)
-        results["sections"][name] = section.to_json() | {"seconds": seconds}
-        if arguments.json:  # after every section: what is measured is kept, whatever comes next
-            arguments.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+    run_sections(
+        "Estimator",
+        arguments.sections or SECTIONS,
+        lambda name: _measured(name, arguments.quick, arguments.minutes),
+        arguments.quick,
+        arguments.json,
+    )
 
 
 def run(name: str, quick: bool, minutes: float) -> Section:

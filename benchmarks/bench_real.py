@@ -8,15 +8,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
-import time
 from pathlib import Path
-from typing import Any
 
-from bench import environment
-from patience import say
 from real_recordings import REAL
-from tables import Section
+from section_runs import run_sections
 
 SECTIONS = ("real_hebi", "real_kr300", "real_xl330")
 
@@ -28,17 +23,13 @@ def main() -> None:
     arguments = parser.parse_args()
     if not REAL.is_dir():
         parser.exit(message=f"skipped: {REAL} does not exist; the recordings do not come with the project\n")
-    surroundings = environment()
-    print(f"# Recordings of real robots\n\n{surroundings}\n", flush=True)
-    results: dict[str, Any] = {"environment": surroundings, "sections": {}}
-    for name in arguments.sections or SECTIONS:
-        say(f"section {name}")
-        started = time.perf_counter()
-        section: Section = importlib.import_module(name).run()
-        print(f"{section.markdown()}\n({time.perf_counter() - started:.0f} s)\n", flush=True)
-        results["sections"][name] = section.to_json()
-        if arguments.json:
-            arguments.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+    run_sections(
+        "Recordings of real robots",
+        arguments.sections or SECTIONS,
+        lambda name: importlib.import_module(name).run(),
+        False,
+        arguments.json,
+    )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bench import environment
+from measured_page import environment, write_section
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
@@ -52,6 +52,8 @@ PAPERS = (  # what leaves the 0.19 and 0.32 mm of the paper: ripple, soft wrist,
 )
 PANDA = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "real" / "panda_sockets"
 
+TOLD: list[str] = []  # what goes into the page, too
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
@@ -65,8 +67,15 @@ def main() -> None:
     if PANDA.is_dir():
         found |= _real()
     found |= _simulated(robot)
+    write_section("\n".join(["## Poses", *TOLD]))
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+
+
+def _tell(text: str) -> None:
+    """Prints, and keeps it for the page."""
+    print(text, flush=True)
+    TOLD.append(text)
 
 
 def _made_elsewhere(robot: Robot) -> dict[str, Any]:
@@ -77,22 +86,22 @@ def _made_elsewhere(robot: Robot) -> dict[str, Any]:
     whole = _tip(result.robot, verification)
     rigid = _tip(calibrate_poses(without_sag(robot), [calibration]).robot, verification)
     gap = calibrate_poses(robot, [read_poses(DATA / "poses_backlash", robot)]).robot.parameters["joint3.backlash"]
-    print("| made elsewhere | wanted | measured |\n| --- | --- | --- |")
-    print(
+    _tell("| made elsewhere | wanted | measured |\n| --- | --- | --- |")
+    _tell(
         f"| 150 poses not fitted: 90 % / largest | 0.055 / 0.11 mm | {whole['p90_mm']:.3f} / {whole['max_mm']:.3f} mm |"
     )
-    print(f"| the same, rigid | 0.44 / 0.77 mm | {rigid['p90_mm']:.2f} / {rigid['max_mm']:.2f} mm |")
+    _tell(f"| the same, rigid | 0.44 / 0.77 mm | {rigid['p90_mm']:.2f} / {rigid['max_mm']:.2f} mm |")
     told = result.determined
-    print(f"| rank, combinations | 29, 18 | {told.rank}, {len(told.combinations)} |")
-    print(f"| backlash | -200 +- 15 urad | {1e6 * gap.value:.0f} +- {1e6 * (gap.sigma or 0.0):.0f} urad |")
-    print(f"| 150 poses | 2 s | {seconds:.2f} s |\n")
+    _tell(f"| rank, combinations | 29, 18 | {told.rank}, {len(told.combinations)} |")
+    _tell(f"| backlash | -200 +- 15 urad | {1e6 * gap.value:.0f} +- {1e6 * (gap.sigma or 0.0):.0f} urad |")
+    _tell(f"| 150 poses | 2 s | {seconds:.2f} s |\n")
     return {"verification": whole, "rigid": rigid, "rank": told.rank, "backlash": gap.value, "seconds_150": seconds}
 
 
 def _real() -> dict[str, Any]:
     """Panda arms, whole places held out: mean error at poses that were not fitted, and distance of their sockets."""
-    print("| real arm, place held out | error [mm] | of its sockets, 50 mm | without sag [mm] |")
-    print("| --- | --- | --- | --- |")
+    _tell("| real arm, place held out | error [mm] | of its sockets, 50 mm | without sag [mm] |")
+    _tell("| --- | --- | --- | --- |")
     robot, found = load_robot("panda"), {}
     for name in ("panda_1", "panda_2", "panda_3"):
         poses = read_poses(PANDA / f"{name}.csv", robot)
@@ -107,13 +116,13 @@ def _real() -> dict[str, Any]:
                 rows.append((tip_errors(problem).to_json()["mean_mm"], 1e3 * apart))
             found[f"{name}/{place}"] = rows
             (whole, apart), (rigid, _) = rows
-            print(f"| {name}, {place} | {whole:.3f} | {apart:.2f} | {rigid:.3f} |", flush=True)
-    print()
+            _tell(f"| {name}, {place} | {whole:.3f} | {apart:.2f} | {rigid:.3f} |")
+    _tell("")
     return {"panda": found}
 
 
 def _simulated(robot: Robot) -> dict[str, Any]:
-    print("| simulated, 40 poses | found | held out, 90 % before / after [mm] | s |\n| --- | --- | --- | --- |")
+    _tell("| simulated, 40 poses | found | held out, 90 % before / after [mm] | s |\n| --- | --- | --- | --- |")
     rows, false, first = [], 0, 0
     for seed in CLEAN:
         row = _row(robot, seed, ())
@@ -128,11 +137,11 @@ def _simulated(robot: Robot) -> dict[str, Any]:
     exact, truth = simulate_poses(robot, 150, 60, session="held out")
     floor = _tip(robot.with_values(truth["parameters"]), exact)["p90_mm"]
     for row in papers:
-        print(
+        _tell(
             f"\n{row['count']} poses, held out, over the floor of {floor:.3f} mm (wanted 1.3 or less): "
             f"{row['p90_mm'][-1] / floor:.2f}"
         )
-    print(f"\nclean arms with a false effect: {false} of {len(CLEAN)}; faults named first: {first} of {len(FAULTS)}")
+    _tell(f"\nclean arms with a false effect: {false} of {len(CLEAN)}; faults named first: {first} of {len(FAULTS)}")
     return {"rows": [*rows, together, *papers], "floor_mm": floor, "false": false, "first": first}
 
 
@@ -146,7 +155,7 @@ def _row(robot: Robot, seed: int, effects: tuple[str, ...], count: int = 40) -> 
     p90 = [step.heldout.to_json()["p90_mm"] for step in found.steps if step.heldout is not None]
     names = [step.added.hypothesis.label for step in found.steps if step.added is not None]
     hidden = ", ".join(effects) or f"nothing (seed {seed})"
-    print(f"| {hidden} | {', '.join(names) or 'nothing'} | {p90[0]:.3f} / {p90[-1]:.3f} | {seconds:.1f} |", flush=True)
+    _tell(f"| {hidden} | {', '.join(names) or 'nothing'} | {p90[0]:.3f} / {p90[-1]:.3f} | {seconds:.1f} |")
     return {"hidden": list(effects), "seed": seed, "count": count, "found": names, "p90_mm": p90, "seconds": seconds}
 
 

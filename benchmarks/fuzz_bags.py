@@ -22,6 +22,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from measured_page import write_section
 from patience import say
 
 TRIALS, DEEP = 2000, 200
@@ -48,7 +49,10 @@ def main() -> int:
     findings = [finding for report in reports for finding in report["findings"]]
     minutes = (time.perf_counter() - began) / 60
     most = max((report["megabytes"] for report in reports), default=0.0)
-    print(_text(findings, len(reports), minutes, most))
+    told = _text(findings, len(reports), minutes, most)
+    print(told)
+    if arguments.trials >= TRIALS and arguments.deep >= DEEP:
+        write_section(f"## Damaged bags through the verbs\n\n{told}")
     if arguments.findings:
         arguments.findings.write_text(json.dumps(findings, indent=1), encoding="utf-8")
     return int(bool(findings))

@@ -8,6 +8,10 @@ A message says what is wrong, where, what was expected, what was got and what to
 class JointscopeError(Exception):
     """Root of all errors of this package; the command line prints it as one line and exits with 1."""
 
+    def _render_traceback_(self) -> list[str]:
+        """A notebook, too, shows the one line that says what to do."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class RecordingError(JointscopeError):
     """A bag cannot be read or its content cannot be a measurement of this robot."""

@@ -25,7 +25,7 @@ tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sourc
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text
 tools.presentation tools.terminal tools.report.page tools.report.sections.calibration tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
-tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verbs tools
+tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.notebook tools.verbs tools
 """.split()
 """All rooms in the order of their imports: a module imports from its own room and from those before it."""
 MOST_FILES = 16

@@ -10,38 +10,54 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from jointscope.graphs.calibration.calibrate import calibrate
     from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
-    from jointscope.graphs.comparison.compare import compare
-    from jointscope.graphs.discovery.diagnose import diagnose
-    from jointscope.graphs.discovery.discover import discover
     from jointscope.graphs.fixed_lag.estimator import FixedLagEstimator
+    from jointscope.robots import errors
+    from jointscope.robots.errors import JointscopeError
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.robots.files.robot_writer import robot_text
     from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.notebook.calls import (
+        add,
+        calibrate,
+        compare,
+        diagnose,
+        discover,
+        graph,
+        read,
+        replay,
+        simulate,
+    )
 
 __version__: str
 __all__ = [
     "CalibrationGraph",
     "FixedLagEstimator",
+    "JointscopeError",
+    "add",
     "calibrate",
     "compare",
     "diagnose",
     "discover",
+    "errors",
+    "graph",
     "load_robot",
+    "read",
     "read_recording",
+    "replay",
     "robot_text",
+    "simulate",
 ]
 
+_CALLS = "tools.notebook.calls"
 _MODULES = {
+    **dict.fromkeys(("add", "calibrate", "compare", "diagnose", "discover", "graph"), _CALLS),
+    **dict.fromkeys(("read", "replay", "simulate"), _CALLS),
     "CalibrationGraph": "graphs.calibration.calibration_graph",
     "FixedLagEstimator": "graphs.fixed_lag.estimator",
-    "calibrate": "graphs.calibration.calibrate",
-    "compare": "graphs.comparison.compare",
-    "diagnose": "graphs.discovery.diagnose",
-    "discover": "graphs.discovery.discover",
+    "JointscopeError": "robots.errors",
     "load_robot": "robots.files.robot_file",
-    "read_recording": "tools.bags.read_recording",
+    "read_recording": "tools.bags.read_recording",  # the older name of `read`, with its own arguments
     "robot_text": "robots.files.robot_writer",
 }
 
@@ -51,6 +67,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version  # brings a parser of mails along
 
         return version("jointscope")
+    if name == "errors":
+        return importlib.import_module("jointscope.robots.errors")
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"jointscope.{_MODULES[name]}"), name)

@@ -70,7 +70,7 @@ def effect_json(effect: Effect) -> dict[str, Any]:
 def _parameters(effect: Effect) -> list[str]:
     if not effect.parameters:
         return ["no parameters"]
-    rows = [[p.name, p.unit, _null(p), SIGNS[p.sign], f"{p.start:.3g}", _remark(p)] for p in effect.parameters]
+    rows = [[p.name, p.unit, null_text(p), SIGNS[p.sign], f"{p.start:.3g}", remark_text(p)] for p in effect.parameters]
     head = ["parameter", "unit", "null value", "sign", "start", ""]
     return text_table(head, rows, "<<<<><", 0).splitlines()
 
@@ -85,11 +85,13 @@ def _nulls(effect: Effect) -> str:
     return ", ".join(f"{stem}{'/'.join(ends)} {null:g}" for (stem, null), ends in found.items())
 
 
-def _null(p: EffectParameter) -> str:
+def null_text(p: EffectParameter) -> str:
+    """At which value the effect is absent; a shape has none."""
     return "none" if p.is_shape else f"{p.null:g}"
 
 
-def _remark(p: EffectParameter) -> str:
+def remark_text(p: EffectParameter) -> str:
+    """What else is to be said about a parameter."""
     remarks = ["a shape"] if p.is_shape else []
     if len(p.grid) > 1:
         remarks.append(f"a diagnosis tries {len(p.grid)} values, {p.grid[0]:g} to {p.grid[-1]:g}")

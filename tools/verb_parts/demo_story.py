@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The steps of `jointscope demo`: a robot with a soft bearing, a model without it, and the way to the model with it."""
+"""The steps of `jointscope demo`: a robot with hidden effects, a model without them, and the way to one with them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, write_discover
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 ROBOT = "doggy"
-EFFECT = "bearing_flexibility@joint1"
+SOFT_BEARING = "bearing_flexibility@joint1"
 FRICTION = "smooth"  # as the robot file has it; "dry" would be a second missing effect
 TEST_SECONDS = 8.0  # [s]
 
@@ -31,22 +32,23 @@ class DemoStory:
         folder: where the user will find them.
         seconds: length of the training recording [s].
         seed: of the simulated robot.
+        effects: ID@OWNER of what the robot has and the model does not know.
     """
 
-    def __init__(self, hidden: Path, folder: Path, seconds: float, seed: int):
-        self.hidden, self.folder, self.seconds, self.seed = hidden, folder, seconds, seed
+    def __init__(self, hidden: Path, folder: Path, seconds: float, seed: int, effects: Sequence[str]):
+        self.hidden, self.folder, self.seconds, self.seed, self.effects = hidden, folder, seconds, seed, effects
         self.robot = load_robot(ROBOT)
 
     def tell(self) -> dict[str, Any]:
         """Runs all steps and returns what they found, for JSON."""
-        say("1. A recording. MuJoCo drives a Doggy whose bearing under joint 1 is soft; the model does not know that.")
+        say(f"1. A recording. MuJoCo drives a Doggy with {', '.join(self.effects)}; the model does not know that.")
         truth = self._simulate("train", "calibration", self.seconds)
         say("\n2. Another motion of the same robot, held out: it is scored, but never chooses.")
         self._simulate("test", "moves", TEST_SECONDS)
         say("\n3. What does the model lack? Calibrate, diagnose, add, and again, until nothing helps.")
         discovery = self._discover()
         say("\n4. Against the truth of the simulation:")
-        say(against_truth(discovery, truth, EFFECT))
+        say(against_truth(discovery, truth, self.effects))
         return {"discovery": discovery.to_json(), "truth": truth}
 
     def _simulate(self, name: str, motion: str, seconds: float) -> dict[str, Any]:
@@ -54,7 +56,8 @@ class DemoStory:
         from jointscope.tools.bags.write_bag import write_bag
         from jointscope.tools.simulator import simulate
 
-        options = f"--effect {EFFECT} --motion {motion} --seconds {seconds:g} --seed {self.seed} --friction {FRICTION}"
+        options = " ".join(f"--effect {effect}" for effect in self.effects)
+        options += f" --motion {motion} --seconds {seconds:g} --seed {self.seed} --friction {FRICTION}"
         self._command(f"simulate {ROBOT} -o {{0}}/{name}.mcap {options}")
         with progress_bar() as progress:
             simulation = simulate(
@@ -62,7 +65,7 @@ class DemoStory:
                 motion,
                 seconds,
                 self.seed,
-                effects=[EFFECT],
+                effects=self.effects,
                 friction=FRICTION,
                 progress=lambda share: progress("simulating", share),
             )
@@ -98,20 +101,21 @@ class DemoStory:
         return result
 
     def _draw(self, result: Discovery) -> None:
-        """The waterfall and the most telling residual map as picture files."""
+        """The story, the waterfall and the most telling residual map as picture files."""
         from jointscope.graphs.discovery.residual_maps import residual_maps
         from jointscope.tools.report.page.picture import picture
         from jointscope.tools.report.sections.diagnosis.torque_maps import map_picture
         from jointscope.tools.report.sections.diagnosis.waterfall import waterfall_picture
+        from jointscope.tools.report.story_picture import story_picture
 
-        pictures = {"waterfall.svg": waterfall_picture(result)}
+        pictures = {"story.svg": story_picture(result), "waterfall.svg": picture(waterfall_picture(result))}
         first: Diagnosis | None = result.steps[0].diagnosis
         maps = residual_maps(first.missing) if first is not None and first.missing is not None else []
         if first is not None and first.missing is not None and maps:
-            pictures["missing_torque.svg"] = map_picture(maps[0], first.missing)
+            pictures["missing_torque.svg"] = picture(map_picture(maps[0], first.missing))
         for name, svg in pictures.items():
             with whole_file(self.hidden / name) as file:
-                file.write_text(picture(svg), encoding="utf-8")
+                file.write_text(svg, encoding="utf-8")
 
     def _read(self, name: str, progress: Progress) -> Recording:
         from jointscope.tools.bags.read_recording import read_recording

@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
+FALSE = "added, too, although the simulation does not have it"
 ALLOWED_ERROR = 0.02  # a parameter within 2 % of the truth is called found
 
 
-def against_truth(result: Discovery, truth: Mapping[str, Any], effect: str) -> str:
+def against_truth(result: Discovery, truth: Mapping[str, Any], effects: Sequence[str]) -> str:
     """Table of true values, those of the base model and those of the last model, and two sentences."""
     first, last = result.steps[0].robot, result.robot
     rows, wrong_before, wrong_after = [], [], []
@@ -33,18 +34,26 @@ def against_truth(result: Discovery, truth: Mapping[str, Any], effect: str) -> s
         start = significant(before.value, 4) if before is not None else ""
         rows.append([p.name, significant(true, 4), start, value, spread, p.unit, percent(error), distance])
     head = ["parameter", "truth", "base model", "last model", "± sigma", "unit", "error", "in sigmas"]
-    return f"{text_table(head, rows, '<>>>><>>')}\n\n{_verdict(result, effect, wrong_before, wrong_after)}"
+    return f"{text_table(head, rows, '<>>>><>>')}\n\n{_verdict(result, effects, wrong_before, wrong_after)}"
 
 
-def _verdict(result: Discovery, effect: str, before: list[float], after: list[float]) -> str:
+def _verdict(result: Discovery, effects: Sequence[str], before: list[float], after: list[float]) -> str:
     added = [step.added for step in result.steps if step.added]
-    others = [label for label in added if label != effect]
-    found = f"{effect} was found" if effect in added else f"{effect} was NOT found"
-    found += f"; {', '.join(others)} was added, too, although the simulation does not have it" if others else ""
+    hidden = [effect.partition(":")[0] for effect in effects]
+    told = (
+        _said([label for label in hidden if label in added], "found"),
+        _said([label for label in hidden if label not in added], "NOT found"),
+        _said([label for label in added if label not in hidden], FALSE),
+    )
+    found = "; ".join(filter(None, told))
     if not before:
         return f"{found}."
     good = sum(error <= ALLOWED_ERROR for error in after)
     return (
         f"{found}. Of {len(after)} parameters {good} are within {ALLOWED_ERROR:.0%} of the truth, the largest error is "
-        f"{percent(max(after))}; without the effect it was {percent(max(before))}."
+        f"{percent(max(after))}; without the effect{'s' if len(effects) > 1 else ''} it was {percent(max(before))}."
     )
+
+
+def _said(labels: Sequence[str], what: str) -> str:
+    return f"{', '.join(labels)} {'was' if len(labels) == 1 else 'were'} {what}" if labels else ""

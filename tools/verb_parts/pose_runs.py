@@ -15,7 +15,7 @@ from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_report
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 
@@ -97,6 +97,7 @@ def run_pose_calibration(
     """
     from jointscope.graphs.poses.calibrate_poses import calibrate_poses
     from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.report.poses_report import poses_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text
 
     if files.rrd is not None:
@@ -114,12 +115,7 @@ def run_pose_calibration(
             from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
 
             stack.enter_context(whole_file(urdf)).write_text(calibrated_urdf(result.robot), encoding="utf-8")
-        if files.report is not None:
-            from jointscope.tools.report.poses_report import poses_report
-
-            stack.enter_context(whole_file(files.report)).write_text(
-                poses_report(result, checked=checked), encoding="utf-8"
-            )
+        write_report(stack, files, lambda: poses_report(result, checked=checked))
         if files.json is not None:
             write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
     return pose_calibration_text(result), checked
@@ -159,9 +155,10 @@ def run_pose_search(
     from jointscope.graphs.poses.calibrate_poses import calibrate_poses
     from jointscope.graphs.poses.discover_poses import discover_poses, pose_candidates
     from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.report.poses_report import poses_report
     from jointscope.tools.terminal.pose_discovery_text import pose_discovery_text, pose_ranking_text
 
-    if files.rrd is not None or (files.report is not None and not search):
+    if files.rrd is not None or (files.pictures and not search):
         raise RobotError(f"{robot.name}: poses have a report with `calibrate` and `discover`; leave the option out")
     sessions = [read_poses(path, robot) for path in paths]
     if not search:
@@ -180,10 +177,7 @@ def run_pose_search(
 
             text = robot_text(found.robot, files.robot.parent, _origin(last, robot))
             stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        if files.report is not None:
-            from jointscope.tools.report.poses_report import poses_report
-
-            stack.enter_context(whole_file(files.report)).write_text(poses_report(last, found), encoding="utf-8")
+        write_report(stack, files, lambda: poses_report(last, found))
         if files.json is not None:
             write_json(stack.enter_context(whole_file(files.json)), _discovery(found, files.robot))
     return pose_discovery_text(found)

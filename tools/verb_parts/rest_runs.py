@@ -15,7 +15,7 @@ from jointscope.robots.recordings.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds, write_report
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 
@@ -52,6 +52,7 @@ def run_rest_calibration(
         JointscopeError: the rests cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+    from jointscope.tools.report.rests_report import rests_report
     from jointscope.tools.terminal.rests_text import rest_calibration_text
 
     if files.rrd is not None:
@@ -66,11 +67,7 @@ def run_rest_calibration(
             origin = made_from(robot.path.name) | other_kinds(result)
             text = robot_text(result.robot, files.robot.parent, origin)
             stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        if files.report is not None:
-            from jointscope.tools.report.rests_report import rests_report
-
-            html = rests_report(result, checked=checked)
-            stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+        write_report(stack, files, lambda: rests_report(result, checked=checked))
         if files.json is not None:
             write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
     return rest_calibration_text(result), checked

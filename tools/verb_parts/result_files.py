@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import jointscope
-from jointscope.robots.errors import RobotError
+from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.outside_modules import need_module
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json
-from jointscope.tools.writing.whole_file import whole_file, write_json
+from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 
 @dataclass(frozen=True)
@@ -31,39 +31,52 @@ class ResultFiles:
         rrd: rerun recording.
         json: what the screen says, for machines.
         robot: robot file; only a calibration has one.
+        figures: folder for every picture of the report as SVG; made if it is not there.
 
     Raises:
-        JointscopeError: an rrd is asked for, and rerun is not there.
+        JointscopeError: an rrd is asked for, and rerun is not there; the folder for pictures is a file or has no place.
     """
 
     report: Path | None = None
     rrd: Path | None = None
     json: Path | None = None
     robot: Path | None = None
+    figures: Path | None = None
 
     def __post_init__(self) -> None:
+        if self.figures is not None and not self.figures.is_dir():
+            check_outputs([self.figures])
+            if self.figures.exists():
+                raise JointscopeError(f"cannot write into {self.figures}: it is a file; expected a folder")
         if self.rrd is not None:
             need_module("rerun")  # now, not after an hour of work
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> ResultFiles:
         """The files named on the command line."""
-        return cls(args.report, args.rrd, args.json, getattr(args, "output", None))
+        return cls(args.report, args.rrd, args.json, getattr(args, "output", None), args.figures)
 
     @property
     def all(self) -> tuple[Path, ...]:
-        """Those that were asked for."""
+        """Those that were asked for; without the folder of pictures."""
         return tuple(path for path in (self.robot, self.report, self.rrd, self.json) if path is not None)
+
+    def tell(self, *others: Path | None) -> None:
+        """Prints what was written: these files, others, and the folder of pictures."""
+        named = [str(path) for path in (*self.all, *others, self.figures) if path is not None]
+        if named:
+            print(f"\nWrote {', '.join(named)}")
 
     @property
     def pictures(self) -> bool:
         """Whether anything with pictures was asked for."""
-        return self.report is not None or self.rrd is not None
+        return self.report is not None or self.rrd is not None or self.figures is not None
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
-    """Adds --report, --rrd and --json, which every verb that estimates something takes."""
+    """Adds --report, --figures, --rrd and --json, which every verb that estimates something takes."""
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="write every picture of the report as SVG")
     parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
 
@@ -183,13 +196,26 @@ def _write_views(
     checked: AcceptedBy = NO_LIMITS,
 ) -> None:
     """Report, rerun recording and JSON; they take their places when the stack closes."""
-    if files.report is not None:
-        html = report(result)
-        stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+    write_report(stack, files, partial(report, result))
     if files.rrd is not None:
         log(result, stack.enter_context(whole_file(files.rrd)))
     if files.json is not None:
         write_json(stack.enter_context(whole_file(files.json)), result.to_json() | acceptance_json(checked))
+
+
+def write_report(stack: ExitStack, files: ResultFiles, report: Callable[[], str]) -> None:
+    """The report and its pictures, where they are asked for; they take their places when the stack closes."""
+    if files.report is None and files.figures is None:
+        return
+    html = report()
+    if files.report is not None:
+        stack.enter_context(whole_file(files.report)).write_text(html, encoding="utf-8")
+    if files.figures is not None:
+        from jointscope.tools.report.page.report_figures import report_figures
+
+        files.figures.mkdir(exist_ok=True)
+        for name, svg in report_figures(html).items():
+            stack.enter_context(whole_file(files.figures / name)).write_text(svg, encoding="utf-8")
 
 
 def provenance(result: Any) -> dict[str, Any]:

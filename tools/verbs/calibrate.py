@@ -14,7 +14,7 @@ from jointscope.tools.presentation.left_out import add_leave_out_option, leave_o
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
-from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration, weighted_rests
+from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
@@ -71,10 +71,9 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(
         [*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.rests, *args.effects]
     )
-    from jointscope.graphs.calibration.calibrate import calibrate
-    from jointscope.graphs.transmission.calibrate_links import calibrate_links
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.notebook.calls import calibrate
     from jointscope.tools.presentation.judgement import judge
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look
@@ -85,13 +84,13 @@ def run(args: argparse.Namespace) -> int:
         with progress_bar() as progress:
             text, checked = run_pose_calibration(robot, args.poses, files, args.urdf, limits, progress)
         print(text)
-        print(f"\nWrote {', '.join(map(str, [*files.all, *filter(None, [args.urdf])]))}")
+        files.tell(args.urdf)
         return print_acceptance(checked)
     if args.rests and not args.bags:
         with progress_bar() as progress:
             text, checked = run_rest_calibration(robot, args.rests, files, limits, progress)
         print(text)
-        print(f"\nWrote {', '.join(map(str, files.all))}")
+        files.tell()
         return print_acceptance(checked)
     check_viewer(robot, files)
     if robot.free_links and (args.incremental or args.solver != "condensed"):
@@ -103,19 +102,15 @@ def run(args: argparse.Namespace) -> int:
         read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
-        if robot.free_links:
-            result = calibrate_links(robot, recordings, progress=progress)
-        else:
-            seen = None if args.incremental else progress  # what is printed and a bar would write into each other
-            rests = weighted_rests(robot, args.rests, progress)
-            result = calibrate(robot, recordings, solver=_solver(args, robot), sets=rests, progress=seen)
-        if files.report is not None or files.rrd is not None:
+        seen = None if args.incremental else progress  # what is printed and a bar would write into each other
+        result = calibrate(robot, recordings, rests=args.rests, solver=_solver(args, robot), progress=seen)
+        if files.pictures:
             progress("writing", 1.0)
         checked = check_models(limits, {robot.name: result.to_json()})
         write_calibration(result, files, checked)
     judgement = judge(result)
     print(calibration_text(result, judgement))
-    print(f"\nWrote {', '.join(map(str, files.all))}")
+    files.tell()
     if judgement.level != "good":
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")

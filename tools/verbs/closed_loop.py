@@ -79,7 +79,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Runs all loops, writes the files, and says what was found."""
     bag = args.output
-    files = ResultFiles(args.report, args.rrd, args.json)
+    files = ResultFiles(args.report, args.rrd, args.json, figures=args.figures)
     truth_file = None if bag is None else bag.parent / f"{bag.stem}.truth.json"
     robot_files = [name for name in (args.robot, args.model) if name is not None and Path(name).is_file()]
     outputs = [bag if bag is not None and bag.suffix else None, truth_file, *files.all]
@@ -102,11 +102,9 @@ def run(args: argparse.Namespace) -> int:
             write_json(truth_file, result.truth)
         write_closed_loop(result, files)
     print(closed_loop_text(result))
-    written = [path for path in (bag, truth_file, *files.all) if path is not None]
     if bag is not None:
         print(f"\n{bag} holds the run of {result.recorded.label}")
-    if written:
-        print(f"\nWrote {', '.join(map(str, written))}")
+    files.tell(bag, truth_file)
     return 0
 
 

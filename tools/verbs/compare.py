@@ -74,10 +74,9 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(
         files.all, inputs=[*([] if poses or rests else [args.bag]), *poses, *rests, *robot_files, *args.effects]
     )
-    from jointscope.graphs.comparison.compare import compare
-    from jointscope.graphs.transmission.compare_links import compare_links
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.notebook.calls import compare
     from jointscope.tools.terminal.comparison_text import comparison_text
 
     load_user_effects(args.effects)
@@ -93,12 +92,11 @@ def run(args: argparse.Namespace) -> int:
     with progress_bar() as progress:
         first = next(iter(robots.values()))
         (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
-        result = (compare_links if first.free_links else compare)(robots, recording, progress=progress)
+        result = compare(robots, recording, progress=progress)
         checked = check_models(limits, result.to_json()["models"])
         write_comparison(result, files, checked)
     print(comparison_text(result))
-    if files.all:
-        print(f"\nWrote {', '.join(map(str, files.all))}")
+    files.tell()
     return print_acceptance(checked)
 
 

@@ -29,6 +29,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("demo"), help="folder; default demo")
     parser.add_argument("--seconds", metavar="S", type=float, default=14.0, help="of the training recording [s]")
     parser.add_argument("--seed", metavar="N", type=int, default=1, help="of the simulated robot; default 1")
+    parser.add_argument(
+        "--effect",
+        metavar="ID@OWNER",
+        action="append",
+        help="hide this effect instead of the soft bearing; may be repeated",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON")
     parser.set_defaults(run=run)
 
@@ -39,11 +45,12 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise JointscopeError(f"cannot write into {folder}: it is a file; expected a folder, or a new name")
     check_outputs([folder / "found.yaml" if folder.is_dir() else folder, args.json])
-    from jointscope.tools.verb_parts.demo_story import DemoStory
+    from jointscope.tools.verb_parts.demo_story import SOFT_BEARING, DemoStory
 
     try:
         with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as hidden:
-            found = DemoStory(Path(hidden), folder, args.seconds, args.seed).tell()
+            effects = args.effect or [SOFT_BEARING]
+            found = DemoStory(Path(hidden), folder, args.seconds, args.seed, effects).tell()
             folder.mkdir(exist_ok=True)
             for file in sorted(Path(hidden).iterdir()):
                 os.replace(file, folder / file.name)
@@ -60,6 +67,6 @@ def _where_to_look(folder: Path) -> str:
 5. Look at it:
    {folder}/discovery.html      what was missing, and why (open it in a browser)
    {folder}/found.yaml          the robot file with the effect, values and sigmas
-   {folder}/waterfall.svg       error step by step
+   {folder}/story.svg           error step by step, and the worst moment before and after
    $ jointscope view {folder}/discovery.rrd
    $ jointscope compare {folder}/found.step0.yaml {folder}/found.yaml {folder}/test.mcap"""

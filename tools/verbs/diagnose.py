@@ -67,6 +67,5 @@ def run(args: argparse.Namespace) -> int:
             progress("writing", 1.0)
         write_diagnosis(result, files)
     print(diagnosis_text(result))
-    if files.all:
-        print(f"\nWrote {', '.join(map(str, files.all))}")
+    files.tell()
     return 0

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     if args.poses:
         with progress_bar() as progress:
             print(run_pose_search(robot, args.poses, args.holdout_poses, files, True, progress))
-        print(f"\nWrote {', '.join(map(str, files.all))}")
+        files.tell()
         return 0
     check_viewer(robot, files)
     with progress_bar() as progress:
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
             progress("writing", 1.0)
         write_discovery(result, files, robot.path.name)
     print(discovery_text(result))
-    print(f"\nWrote {', '.join(map(str, files.all))}")
+    files.tell()
     return 0
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
-from jointscope.tools.writing.whole_file import check_outputs, write_json
+from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 EXAMPLE = """examples:
   jointscope effects
@@ -30,13 +30,14 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("id", metavar="ID", nargs="?", help="an effect")
     add_effects_option(parser)
+    parser.add_argument("--page", type=Path, metavar="F.md", help="write the whole catalogue as a page of markdown")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Lists, or prints one card."""
-    check_outputs([args.json], inputs=args.effects)
+    check_outputs([args.json, args.page], inputs=args.effects)
     from jointscope.robots.files.effect_catalogue import catalogue, find_effect
     from jointscope.tools.terminal.effect_text import card_text, effect_json, list_text
 
@@ -47,6 +48,11 @@ def run(args: argparse.Namespace) -> int:
     else:
         effect = find_effect(args.id)
         content, text = effect_json(effect), card_text(effect)
+    if args.page is not None:
+        from jointscope.tools.terminal.effect_page import effect_page
+
+        with whole_file(args.page) as page:
+            page.write_text(effect_page(catalogue().values()), encoding="utf-8")
     if args.json is not None:
         write_json(args.json, content)
     print(text)

@@ -10,6 +10,7 @@ from typing import Any
 
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_report
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 EXAMPLE = """example:
@@ -47,6 +48,7 @@ def add_parser(subparsers: Any) -> None:
         help="describes the excitation; default: excitation.yaml beside the bag",
     )
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="write every picture of the report as SVG")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
 
@@ -55,10 +57,11 @@ def run(args: argparse.Namespace) -> int:
     """Estimates, writes the files, and says what was found."""
     if args.output is not None and args.output.suffix.lower() not in (".npz", ".csv"):
         raise RecordingError(f"{args.output}: expected a name that ends with .npz or .csv")
-    files = [path for path in (args.output, args.report, args.json) if path is not None]
-    check_outputs(files, inputs=[*args.bags, *filter(None, [args.excitation])])
+    files = ResultFiles(args.report, json=args.json, figures=args.figures)
+    check_outputs([args.output, *files.all], inputs=[*args.bags, *filter(None, [args.excitation])])
     from jointscope.graphs.responses.measured_response import MeasuredResponse
     from jointscope.tools.bags.read_signals import excitation_of, read_signals
+    from jointscope.tools.report.responses_report import responses_report
     from jointscope.tools.terminal.responses_text import response_text
 
     found = []
@@ -73,13 +76,9 @@ def run(args: argparse.Namespace) -> int:
             from jointscope.tools.verb_parts.response_files import write_responses
 
             write_responses(stack.enter_context(whole_file(args.output)), found, args.output.suffix.lower())
-        if args.report is not None:
-            from jointscope.tools.report.responses_report import responses_report
-
-            stack.enter_context(whole_file(args.report)).write_text(responses_report(found), encoding="utf-8")
+        write_report(stack, files, lambda: responses_report(found))
         if args.json is not None:
             write_json(stack.enter_context(whole_file(args.json)), {"responses": [one.to_json() for one in found]})
     print("\n\n".join(map(response_text, found)))
-    if files:
-        print(f"\nWrote {', '.join(map(str, files))}")
+    files.tell(args.output)
     return 0

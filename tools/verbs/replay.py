@@ -74,7 +74,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replays, writes the files, and says what was found."""
-    files = ResultFiles(args.report, args.rrd, args.json)
+    files = ResultFiles(args.report, args.rrd, args.json, figures=args.figures)
     robot_file = [Path(args.robot)] if Path(args.robot).is_file() else []
     outputs = [args.output, *files.all]
     if args.output is not None:
@@ -82,35 +82,18 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(outputs, inputs=[args.bag, *robot_file, *args.effects])
     load_user_effects(args.effects)
     from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
     from jointscope.tools.terminal.replay_text import replay_text
 
-    robot, said = _as_recorded(load_robot(args.robot), args.bag)
+    robot, said = robot_as_recorded(load_robot(args.robot), args.bag)
     with progress_bar() as progress, ExitStack() as stack:
         result, left_out = _replayed(args, robot, progress, stack)
         write_replay(result, files)
     print(replay_text(result))
     for notice in [*said, *left_out]:
         print(f"note: {notice}")
-    written = [path for path in outputs if path is not None]
-    if written:
-        print(f"\nWrote {', '.join(map(str, written))}")
+    files.tell(args.output)
     return 0
-
-
-def _as_recorded(robot: Robot, bag: Path) -> tuple[Robot, list[str]]:
-    """The robot with its other joints where the bag has them, its drive signal as it was sent, and what is said."""
-    from jointscope.graphs.starts.drive_signal import told_drive_signal
-    from jointscope.tools.bags.read_recording import read_posture, read_recording
-
-    posture, notices = read_posture(bag, robot)
-    robot = robot.in_posture(posture)
-    if robot.command.held is None and not robot.layout.motors and not robot.free_links:
-        try:
-            robot, found = told_drive_signal(robot, [read_recording(bag, robot)])
-            notices += found
-        except RecordingError:  # a replay leaves out what a recording cannot have
-            pass
-    return robot, [notice.text for notice in notices]
 
 
 def _replayed(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -70,3 +71,8 @@ def test_a_sigma_that_was_found_anew_is_said_from_a_fifth_on(good):
     assert "`estimate_sigma: false` in sensors.motor_encoder keeps yours" in found(0.4)
     assert "joint1.motor_position 2.77e-05 rad (was 6.93e-05)" in found(0.4)
     assert "estimate_sigma" not in found(0.9)
+
+
+def test_the_page_that_explains_the_verdict_names_every_check(good):
+    page = (Path(__file__).parents[3] / "docs" / "is_it_good.md").read_text(encoding="utf-8")
+    assert [check.name for check in judge(good).checks if f"| {check.name} |" not in page] == []

@@ -14,14 +14,13 @@ import pytest
 from fake_results import fake_calibration, fake_comparison
 
 import jointscope
-from jointscope.graphs.calibration import calibrate as calibrate_module
-from jointscope.graphs.comparison import compare as compare_module
 from jointscope.robots.files.robot_file import load_robot, ready_robots
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags import read_recording as read_module
 from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main, verbs
+from jointscope.tools.notebook import calls
 from jointscope.tools.presentation.judgement import judge
 
 IMPORT_COST = {"numpy", "gtsam", "pinocchio", "rerun", "rosbags", "scipy", "mujoco"}
@@ -38,8 +37,8 @@ def in_own_folder(tmp_path, monkeypatch):
 def no_solving(monkeypatch):
     """Reading, calibrating and comparing give made-up results at once."""
     monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
-    monkeypatch.setattr(calibrate_module, "calibrate", lambda *args, progress, solver, sets: fake_calibration())
-    monkeypatch.setattr(compare_module, "compare", lambda *args, progress: fake_comparison())
+    monkeypatch.setattr(calls, "calibrate_motion", lambda *args, **options: fake_calibration())
+    monkeypatch.setattr(calls, "compare_motion", lambda *args, progress: fake_comparison())
 
 
 def files(folder=".") -> set[str]:
@@ -305,7 +304,7 @@ def test_ctrl_c_leaves_nothing_behind(where, no_solving, capsys, monkeypatch):
 
     Path("o.yaml").write_text("before")
     place = {
-        "calibrate": (calibrate_module, "calibrate"),
+        "calibrate": (calls, "calibrate_motion"),
         "report": (report, "calibration_report"),
         "rrd": (rerun_log, "log_calibration"),
         "json": (result_files, "write_json"),
@@ -345,7 +344,7 @@ def test_a_reader_that_has_seen_enough_is_no_trouble():
 
 
 def test_a_bug_is_one_line_too_and_can_be_looked_into(no_solving, capsys, monkeypatch):
-    monkeypatch.setattr(calibrate_module, "calibrate", raising(ZeroDivisionError("division\nby zero")))
+    monkeypatch.setattr(calls, "calibrate_motion", raising(ZeroDivisionError("division\nby zero")))
     arguments = ["calibrate", "doggy", "a.mcap", "-o", "o.yaml"]
     told = "this is a bug in jointscope: ZeroDivisionError: division by zero; JOINTSCOPE_TRACEBACK=1 shows where"
     assert complaint(capsys, *arguments) == told

@@ -21,7 +21,7 @@ pytest.importorskip("mujoco", reason="the demo simulates its recordings")
 WRITTEN = {
     *("train.mcap", "train.truth.json", "test.mcap", "test.truth.json"),
     *("found.yaml", "found.step0.yaml", "found.step1.yaml", "found.discovery.json"),
-    *("discovery.html", "discovery.rrd", "discovery.json", "waterfall.svg", "missing_torque.svg"),
+    *("discovery.html", "discovery.rrd", "discovery.json", "story.svg", "waterfall.svg", "missing_torque.svg"),
 }
 
 
@@ -64,7 +64,7 @@ def test_the_demo_tells_the_story_and_leaves_its_files(quick, capsys):
 
 def test_the_pictures_are_files_of_their_own(quick):
     assert main(["demo", "-o", "here", "--seconds", "3"]) == 0
-    for name in ("waterfall.svg", "missing_torque.svg"):
+    for name in ("story.svg", "waterfall.svg", "missing_torque.svg"):
         root = ElementTree.parse(Path("here") / name).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert float(root.attrib["width"]) > 100.0
@@ -74,11 +74,11 @@ def test_an_effect_that_was_not_found_is_told_as_plainly():
     result = fake_discovery(0.5)
     truth = {name: p.published for name, p in result.robot.parameters.items()}
     alone = dataclasses.replace(result, steps=result.steps[:1])
-    assert f"{BEARING} was NOT found." in against_truth(alone, truth, BEARING)
+    assert f"{BEARING} was NOT found." in against_truth(alone, truth, [BEARING])
     other = dataclasses.replace(result.steps[1], added="cogging@joint2")
     wrong = dataclasses.replace(result, steps=(result.steps[0], other))
     told = "was NOT found; cogging@joint2 was added, too, although the simulation does not have it."
-    assert told in against_truth(wrong, truth, BEARING)
+    assert told in against_truth(wrong, truth, [BEARING])
 
 
 def test_ctrl_c_leaves_nothing_behind(quick, capsys):

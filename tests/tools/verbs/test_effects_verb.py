@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 
@@ -80,3 +82,19 @@ def test_mistakes_are_answered_in_one_line(arguments, message, capsys):
     assert out == "" and err.count("\n") == 1
     if message:
         assert err == f"jointscope: error: {message}\n"
+
+
+def test_the_page_of_the_catalogue_is_current(capsys, in_own_folder):
+    said(capsys, "--page", "catalogue.md")
+    page = (in_own_folder / "catalogue.md").read_text(encoding="utf-8")
+    kept = (Path(__file__).parents[3] / "docs" / "catalogue.md").read_text(encoding="utf-8")
+    assert page == kept, "write it anew: jointscope effects --page docs/catalogue.md"
+
+
+def test_the_page_has_every_effect_with_its_law_and_links_that_lead_somewhere(capsys, in_own_folder):
+    said(capsys, "--page", "catalogue.md")
+    page = (in_own_folder / "catalogue.md").read_text(encoding="utf-8")
+    headings = set(re.findall(r"^### (\S+)$", page, re.MULTILINE))
+    assert headings == set(catalogue())
+    assert set(re.findall(r"\]\(#([^)]+)\)", page)) == headings
+    assert all(effect.card.law in page for effect in catalogue().values())

@@ -39,6 +39,6 @@ def _direction(direction: WeakDirection) -> str:
     height = 20 * len(largest)
     return (
         f'<h3>{escape(sentence(direction.text))}</h3><div class="scroll">'
-        f'<svg width="{LEFT + BAR + 60}" height="{height}" '
+        f'<svg width="{LEFT + BAR + 60}" height="{height}" viewBox="0 0 {LEFT + BAR + 60} {height}" '
         f'role="img" aria-label="weights of the direction">{"".join(rows)}</svg></div>'
     )

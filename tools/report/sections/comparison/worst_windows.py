@@ -38,6 +38,23 @@ def worst_windows(result: ComparisonResult) -> Section:
 
 
 def _closer(result: ComparisonResult, window: WorstWindow) -> str:
+    plots = window_plots(result, window)
+    return figure(plots, window_keys(result)) if plots else ""
+
+
+def window_keys(result: ComparisonResult) -> list[Key]:
+    """Legend of `window_plots`."""
+    return [Key("measured", "soft", "wide"), *model_keys(result)]
+
+
+def window_plots(result: ComparisonResult, window: WorstWindow, width: int = Axes.width) -> list[str]:
+    """Measurement and predictions around a window, and below it their errors; nothing of an unknown channel.
+
+    Args:
+        result: models on one recording.
+        window: stretch of time of one channel.
+        width: of each plot [px].
+    """
     for name, sensor in result.models[0].sensors.items():
         if window.channel in sensor.channels:
             title, marks = channel_marks(result, name, sensor.channels.index(window.channel), "ahead")
@@ -46,11 +63,13 @@ def _closer(result: ComparisonResult, window: WorstWindow) -> str:
                 min(window.t1 + AROUND, float(sensor.times[-1])),
             )
             shade = (window.t0, window.t1)
-            above = plot(Axes(title, "", height=150, x_range=limits, shade=shade), marks)
             errors = _errors(result, name, sensor.channels.index(window.channel))
-            below = plot(Axes("measured − predicted [sensor sigma]", height=150, x_range=limits, shade=shade), errors)
-            return figure([above, below], [Key("measured", "soft", "wide"), *model_keys(result)])
-    return ""
+            below = "measured − predicted [sensor sigma]"
+            return [
+                plot(Axes(title, "", width, 150, x_range=limits, shade=shade), marks),
+                plot(Axes(below, width=width, height=150, x_range=limits, shade=shade), errors),
+            ]
+    return []
 
 
 def _errors(result: ComparisonResult, sensor: str, i: int) -> list[Mark]:

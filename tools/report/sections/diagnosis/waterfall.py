@@ -33,14 +33,14 @@ def waterfall(result: Discovery) -> Section:
     return Section("waterfall", "Step by step", body, lead)
 
 
-def waterfall_picture(result: Discovery) -> str:
-    """Two bars per step and the floor as a mark on them."""
+def waterfall_picture(result: Discovery, bar: int = BAR) -> str:
+    """Two bars per step and the floor as a mark on them; the longest bar has `bar` pixels."""
     errors = [e for step in result.steps for e in (step.train_error, step.heldout_error) if math.isfinite(e)]
     largest = 1.15 * max([2.0, *errors])
     height = ROW * len(result.steps)
 
     def at(value: float) -> float:
-        return BAR * max(math.log(max(value, LEAST) / LEAST), 0.004) / math.log(largest / LEAST)
+        return bar * max(math.log(max(value, LEAST) / LEAST), 0.004) / math.log(largest / LEAST)
 
     ticks = "".join(
         f'<path class="grid" d="M{LEFT + at(v):.1f} 0V{height}"/>'
@@ -49,8 +49,8 @@ def waterfall_picture(result: Discovery) -> str:
     )
     rows = "".join(_row(step, k, at) for k, step in enumerate(result.steps))
     return (
-        f'<svg viewBox="0 0 {LEFT + BAR + RIGHT} {height + 36}" role="img" aria-label="error of every step">{ticks}'
-        f'{rows}<text class="xlabel" x="{LEFT + BAR / 2:.0f}" y="{height + 31}">{AXIS}</text></svg>'
+        f'<svg viewBox="0 0 {LEFT + bar + RIGHT} {height + 36}" role="img" aria-label="error of every step">{ticks}'
+        f'{rows}<text class="xlabel" x="{LEFT + bar / 2:.0f}" y="{height + 31}">{AXIS}</text></svg>'
     )
 
 

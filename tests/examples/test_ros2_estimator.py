@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The ROS 2 example with a stand-in for rclpy: messages of a simulated robot in, states that are right out."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from ros_stand_in import DiagnosticStatus, Imu, JointState, Node, install
+
+from jointscope.robots.errors import RobotError
+from jointscope.tools.bags.needed_streams import needed_streams
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2" / "estimator_node.py"
+EPOCH = 1_700_000_000  # [s] stamps are large numbers on a robot
+
+
+@pytest.fixture
+def module(monkeypatch):
+    install(monkeypatch)
+    monkeypatch.setattr(Node, "parameters", {"robot": "doggy", "lag": 0.02, "rate": 100.0})
+    spec = importlib.util.spec_from_file_location("estimator_node", EXAMPLE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def message(stream, t, values):
+    """What a driver would send; joints in another order than the robot's, and one that the robot does not have."""
+    stamp = SimpleNamespace(sec=EPOCH + int(t), nanosec=round(1e9 * (t % 1.0)) % 10**9)
+    header = SimpleNamespace(stamp=stamp)
+    raw = values / stream.source.factor
+    if stream.source.msgtype.endswith("Imu"):
+        return Imu(header=header, angular_velocity=SimpleNamespace(**dict(zip("xyz", raw, strict=True))))
+    names = [*(stream.source.names or ("joint1", "joint2", "joint3"))][::-1]
+    return JointState(header=header, name=["other", *names], **{stream.source.field: [9.9, *raw[::-1]]})
+
+
+def feed(node, robot, recording):
+    rows = []
+    for stream in needed_streams(robot):
+        data = recording.streams[stream.name]
+        rows += [(t, stream, values) for t, values in zip(data.times, data.values, strict=True)]
+    for t, stream, values in sorted(rows, key=lambda row: row[0]):
+        for kind, callback in node.heard[stream.source.topic]:
+            sent = message(stream, t, values)
+            assert isinstance(sent, kind)
+            callback(sent)
+
+
+def test_the_node_says_nothing_before_it_knows_a_state(module):
+    node = module.EstimatorNode()
+    node.timers[0.01]()
+    node.timers[1.0]()
+    assert not node.published["~/joint_states"]
+    (told,) = node.published["/diagnostics"]
+    assert (told.status[0].level, told.status[0].message) == (DiagnosticStatus.WARN, "waiting for samples")
+
+
+def test_states_are_those_of_the_robot_in_the_order_of_its_joints(module, doggy, simulated, monkeypatch):
+    monkeypatch.setattr(module.js, "load_robot", lambda name: doggy)
+    node = module.EstimatorNode()
+    part = simulated.recording.between(4.0, 4.15)
+    feed(node, doggy, part)
+    node.timers[0.01]()
+    (state,) = node.published["~/joint_states"]
+    assert state.name == list(doggy.joints)
+    end = max(stream.times[-1] for stream in part.streams.values())
+    assert state.header.stamp.sec == EPOCH + int(end)
+    true = simulated.states[np.searchsorted(simulated.state_times, end - 1e-9)]
+    assert np.abs(np.array(state.position) - true[:3]).max() < 0.02
+    (mean,), (covariance,) = node.published["~/state"], node.published["~/covariance"]
+    assert [d.size for d in covariance.layout.dim] == [len(mean.data)] * 2
+    P = np.reshape(covariance.data, [len(mean.data)] * 2)
+    assert np.all(np.linalg.eigvalsh(P) > -1e-12)
+    node.timers[1.0]()
+    keys = {pair.key for pair in node.published["/diagnostics"][-1].status[0].values}
+    assert {"NIS joint1.motor_position", "NIS imu1.x"} <= keys
+
+
+def test_messages_for_other_joints_alone_are_not_taken(module):
+    node = module.EstimatorNode()
+    stream = next(s for s in needed_streams(module.js.load_robot("doggy")) if s.name == "motor_encoder")
+    foreign = JointState(name=["gripper"], **{stream.source.field: [0.1]})
+    node.take(stream, foreign)
+    assert not node.estimator.status.received
+
+
+def test_a_robot_with_other_types_of_messages_is_refused_in_one_line(module, doggy, monkeypatch):
+    command = dataclasses.replace(doggy.command, msgtype="std_msgs/msg/Float64MultiArray")
+    monkeypatch.setattr(module.js, "load_robot", lambda name: dataclasses.replace(doggy, command=command))
+    with pytest.raises(RobotError, match=r"expected one of sensor_msgs/msg/JointState, sensor_msgs/msg/Imu$"):
+        module.EstimatorNode()

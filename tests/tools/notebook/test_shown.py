@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results in a notebook: text, table, data frame, figure; and what is said where pandas or matplotlib are missing."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fake_diagnosis import fake_diagnosis, fake_discovery
+from fake_results import fake_calibration, fake_comparison
+
+from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
+from jointscope.tools.notebook.shown import SHOWN_ROWS
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    return Calibrated.of(fake_calibration())
+
+
+@pytest.fixture(scope="module")
+def results(calibrated):
+    comparison = Compared.of(fake_comparison())
+    return [calibrated, comparison, Diagnosed.of(fake_diagnosis()), Discovered.of(fake_discovery())]
+
+
+def test_a_result_is_still_the_result_of_the_computation(calibrated):
+    assert isinstance(calibrated, CalibrationResult)
+    assert dataclasses.replace(calibrated, cost=3.0).cost == 3.0
+    assert CalibrationGraph.of.__name__ == "of"
+
+
+def test_a_parameter_is_found_by_its_name_and_an_unknown_one_is_told_with_those_there_are(calibrated):
+    assert calibrated["joint2.stiffness"].unit == "N m/rad"
+    with pytest.raises(RobotError, match=r"^doggy has no parameter joint9\.stiffness; it has motor\.k_pwm, "):
+        calibrated["joint9.stiffness"]
+
+
+def test_a_notebook_shows_the_answer_and_a_table_whose_texts_are_escaped(results):
+    for result in results:
+        html = result._repr_html_()
+        assert html.startswith("<p><b>") and result.answer().split(",")[0][:20] in html
+        assert html.count("<tr>") == 1 + min(len(result.rows()), SHOWN_ROWS)
+        assert "<train" not in html
+
+
+def test_rows_have_one_shape(results):
+    for result in results:
+        assert result.rows()
+        assert len({tuple(row) for row in result.rows()}) == 1
+
+
+def test_a_data_frame_is_made_of_the_rows(calibrated, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=lambda rows: ("frame", rows)))
+    kind, rows = calibrated.to_dataframe()
+    assert kind == "frame"
+    assert {row["parameter"]: row["value"] for row in rows}["joint2.stiffness"] == calibrated["joint2.stiffness"].value
+
+
+def test_a_missing_extra_is_one_line_that_says_which(calibrated, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(JointscopeError) as told:
+        calibrated.to_dataframe()
+    assert str(told.value) == "to_dataframe() needs pandas, which is not installed; do: pip install pandas"
+    with pytest.raises(JointscopeError) as told:
+        calibrated.plot()
+    assert str(told.value) == "plot() needs matplotlib, which is not installed; do: pip install 'jointscope[plot]'"
+
+
+def test_figures_need_no_display(results, tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib", reason="comes with the extra plot")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    for k, result in enumerate(results):
+        result.plot().savefig(tmp_path / f"{k}.svg")
+        assert (tmp_path / f"{k}.svg").stat().st_size > 5000
+    assert not importlib.import_module("matplotlib.pyplot").get_fignums()
+
+
+def test_a_figure_is_drawn_into_axes_that_are_given(results):
+    """With a stand-in for axes, so that the curves are looked at where matplotlib is not installed, too."""
+    calibrated = results[0]
+    drawn = []
+
+    class Axes:
+        figure = "the figure"
+
+        def plot(self, x, y, **style):
+            drawn.append((style["label"], np.asarray(y)))
+
+        def __getattr__(self, name):
+            return lambda *args, **kwargs: None
+
+    try:
+        importlib.import_module("matplotlib.pyplot")
+    except ImportError:
+        calibrated.draw(Axes())
+    else:
+        assert calibrated.plot(Axes()) == "the figure"
+    assert [label for label, _ in drawn] == list(calibrated.channels)
+    assert all(0.5 < np.std(y[np.isfinite(y)]) < 2.0 for _, y in drawn)
+
+
+def test_saving_writes_what_the_verb_writes(calibrated, tmp_path):
+    calibrated.save(tmp_path / "a.yaml", report=tmp_path / "a.html", json=tmp_path / "a.json")
+    assert json.loads((tmp_path / "a.json").read_text())["parameters"]["joint2.stiffness"]["unit"] == "N m/rad"
+    assert {file.name for file in tmp_path.iterdir()} == {"a.yaml", "a.html", "a.json"}

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The verbs as functions: robots by name, path or object, recordings by path or object; errors are JointscopeErrors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from jointscope.graphs.calibration.calibrate import calibrate as calibrate_motion
+from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.comparison.compare import compare as compare_motion
+from jointscope.graphs.discovery.diagnose import diagnose as diagnose_motion
+from jointscope.graphs.discovery.discover import discover as discover_motion
+from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
+from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
+from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.transmission.calibrate_links import calibrate_links
+from jointscope.graphs.transmission.compare_links import compare_links
+from jointscope.graphs.transmission.diagnose_links import diagnose_links
+from jointscope.graphs.transmission.discover_links import discover_links
+from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.files.effects_at_once import add_effects
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.write_bag import write_bag
+from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed
+from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
+from jointscope.tools.simulator.simulation import Simulation
+from jointscope.tools.simulator.simulation import simulate as simulate_motion
+from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
+from jointscope.tools.verb_parts.rest_runs import weighted_rests
+
+AnyRobot = Robot | str | Path
+AnyRecording = Recording | str | Path
+
+
+def read(bag: str | Path, robot: AnyRobot) -> Recording:
+    """Reads what a robot needs from a bag, in SI units, each stream at its own times.
+
+    Args:
+        bag: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
+        robot: says which topics, fields, units and joint names.
+
+    Raises:
+        RecordingError: the bag cannot be read, or does not hold what the robot needs.
+    """
+    return read_recording(bag, _robot(robot))
+
+
+def calibrate(
+    robot: AnyRobot,
+    recordings: AnyRecording | Sequence[AnyRecording],
+    *,
+    rests: Sequence[str | Path] = (),
+    sets: Sequence[SetProblem] = (),
+    biases_only: bool = False,
+    solver: Solver = solve,
+    progress: Progress | None = None,
+) -> Calibrated:
+    """Finds the parameters of a robot from one or more recordings, with their uncertainties.
+
+    Args:
+        robot: model with start values and priors.
+        recordings: of motion; parameters and mountings are shared, states and biases are each recording's own.
+        rests: bags in which the robot stands, with weights on it or without, for the same estimate.
+        sets: recordings of other kinds that you have made yourself, for the same estimate.
+        biases_only: leave dynamics and mountings as they are.
+        solver: minimises the cost of all samples.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
+        SolveError: no convergence, or a value that nothing determines.
+    """
+    model = _robot(robot)
+    read_ones = _recordings(recordings, model)
+    if model.free_links:
+        return Calibrated.of(calibrate_links(model, read_ones, progress=progress))
+    all_sets = [*sets, *weighted_rests(model, [Path(path) for path in rests], progress or _quiet)]
+    options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
+    return Calibrated.of(calibrate_motion(model, read_ones, **options))
+
+
+def compare(
+    robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot],
+    recording: AnyRecording,
+    *,
+    progress: Progress | None = None,
+) -> Compared:
+    """Predicts a recording with one or more models, and tells how far off they are, where and when.
+
+    Args:
+        robots: one, several, or several with labels.
+        recording: one that no model was fitted to.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RobotError: two robots have the same name and no labels.
+        RecordingError: the recording cannot be a measurement of these robots.
+    """
+    several = [robots] if isinstance(robots, Robot | str | Path) else robots
+    models = _labelled(several)
+    first = next(iter(models.values()))
+    (read_one,) = _recordings(recording, first)
+    return Compared.of((compare_links if first.free_links else compare_motion)(models, read_one, progress=progress))
+
+
+def diagnose(
+    robot: AnyRobot,
+    recordings: AnyRecording | Sequence[AnyRecording],
+    holdout: AnyRecording | None = None,
+    *,
+    missing_torque: bool = True,
+    progress: Progress | None = None,
+) -> Diagnosed:
+    """Ranks the physical effects that a model may lack, each with its evidence.
+
+    Args:
+        robot: is calibrated first.
+        recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
+        holdout: is scored and reported, and never chooses.
+        missing_torque: estimate the torque that the model lacks, for the pictures.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    model, learnt, held = _to_learn_from(robot, recordings, holdout)
+    if model.free_links:
+        return Diagnosed.of(diagnosis_of(diagnose_links(model, learnt, held, progress=progress), learnt, held))
+    found = diagnose_motion(model, learnt, held, missing_torque=missing_torque, progress=progress)
+    return Diagnosed.of(diagnosis_of(found, learnt, held))
+
+
+def discover(
+    robot: AnyRobot,
+    recordings: AnyRecording | Sequence[AnyRecording],
+    holdout: AnyRecording | None = None,
+    *,
+    missing_torque: bool = True,
+    progress: Progress | None = None,
+) -> Discovered:
+    """Calibrates, diagnoses, adds what is missing, and repeats until nothing helps; arguments as of `diagnose`."""
+    model, learnt, held = _to_learn_from(robot, recordings, holdout)
+    if model.free_links:
+        return Discovered.of(discovery_of(discover_links(model, learnt, held, progress=progress), learnt, held))
+    found = discover_motion(model, learnt, held, missing_torque=missing_torque, progress=progress)
+    return Discovered.of(discovery_of(found, learnt, held))
+
+
+def add(robot: AnyRobot, *effects: str) -> Robot:
+    """The robot with more effects, at their start values.
+
+    Args:
+        robot: is left as it is.
+        effects: ID@OWNER; ID@* for everything that it can act on.
+
+    Raises:
+        EffectError: an effect is unknown, is there already, or cannot act there.
+    """
+    return add_effects(_robot(robot), effects).robot
+
+
+def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replayed:
+    """Feeds a recording to the estimator of the control loop; a bag in the order in which it was received.
+
+    Args:
+        robot: calibrated.
+        recording: a bag, or a recording that was read.
+        lag: of the smoothed state [s].
+
+    Raises:
+        RecordingError: the recording cannot be a measurement of this robot.
+    """
+    model = _robot(robot)
+    if isinstance(recording, Recording):
+        return Replayed.of(replay_messages(model, recording, lag))
+    model, _ = robot_as_recorded(model, Path(recording))
+    arrivals = ArrivalReader(Path(recording), model)
+    found = replay_messages(model, arrivals, lag)
+    return Replayed.of(replace(found, source=arrivals.source(found.recording_seconds, model.name)))
+
+
+def graph(result: CalibrationResult, per_sample: bool = False) -> CalibrationGraph:
+    """The GTSAM graph of a calibration.
+
+    Args:
+        result: of `calibrate`.
+        per_sample: one factor for every sample, instead of one for every thousand.
+    """
+    return CalibrationGraph.of(result, per_sample)
+
+
+def simulate(
+    robot: AnyRobot,
+    bag: str | Path | None = None,
+    *,
+    motion: str = "calibration",
+    seconds: float | None = None,
+    seed: int = 0,
+    effects: Iterable[str] = (),
+    **conditions: Any,
+) -> Simulation:
+    """A recording from an engine that is independent of the estimator's own model.
+
+    Args:
+        robot: the truth, where it has no published values.
+        bag: where to write the recording; nowhere if not given.
+        motion: "calibration", or "moves" to judge by.
+        seconds: duration [s].
+        seed: of robot, motion and noise; the same seed is the same robot.
+        effects: ID@OWNER[:param=value,...] that the robot has.
+        conditions: everything else that `jointscope.tools.simulator.simulation.simulate` takes, as friction="smooth".
+
+    Raises:
+        SimulationError: MuJoCo is missing, or an option is impossible.
+    """
+    model = _robot(robot)
+    found = simulate_motion(model, motion, seconds, seed, effects=effects, **conditions)
+    if bag is not None:
+        write_bag(Path(bag), found.recording, model)
+    return found
+
+
+def _robot(robot: AnyRobot) -> Robot:
+    return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
+def _recordings(recordings: AnyRecording | Sequence[AnyRecording], robot: Robot) -> list[Recording]:
+    several = [recordings] if isinstance(recordings, Recording | str | Path) else recordings
+    return [each if isinstance(each, Recording) else read_recording(each, robot) for each in several]
+
+
+def _to_learn_from(
+    robot: AnyRobot, recordings: AnyRecording | Sequence[AnyRecording], holdout: AnyRecording | None
+) -> tuple[Robot, list[Recording], Recording | None]:
+    """What is learnt from and what is held out.
+
+    Raises:
+        RecordingError: the held-out recording is also learnt from.
+    """
+    model = _robot(robot)
+    learnt = _recordings(recordings, model)
+    held = None if holdout is None else _recordings(holdout, model)[0]
+    if held is not None and held.sha256 and held.sha256 in {recording.sha256 for recording in learnt}:
+        raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
+    return model, learnt, held
+
+
+def _labelled(robots: Sequence[AnyRobot] | Mapping[str, AnyRobot]) -> dict[str, Robot]:
+    if isinstance(robots, Mapping):
+        return {label: _robot(robot) for label, robot in robots.items()}
+    labels = [robot.name if isinstance(robot, Robot) else Path(robot).stem for robot in robots]
+    if len(set(labels)) < len(labels):
+        raise RobotError(f"{', '.join(labels)}: two models have one name; give labels: {{'before': ..., 'after': ...}}")
+    return dict(zip(labels, map(_robot, robots), strict=True))
+
+
+def _quiet(text: str, share: float) -> None:
+    """Nobody looks."""

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The results of the verbs with what `Shown` adds; each is the result of the computation, too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+
+from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.comparison.comparison_result import ComparisonResult
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.discovery_result import Discovery
+from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
+from jointscope.graphs.fixed_lag.window.state_names import state_names
+from jointscope.robots.errors import RobotError
+from jointscope.tools.notebook.shown import Row, Shown
+from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.presentation.model_answer import diagnosis_answer, discovery_answer
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.presentation.replay_judgement import judge_replay
+from jointscope.tools.verb_parts import result_files
+from jointscope.tools.verb_parts.result_files import ResultFiles
+
+TOLD = 12  # candidates in a figure
+
+
+class _Found(Shown):
+    """Made from a result of the computation."""
+
+    @classmethod
+    def of(cls, found: Any) -> Self:
+        """The same result, which shows itself."""
+        return cls(**{field.name: getattr(found, field.name) for field in fields(found)})
+
+
+@dataclass(frozen=True)
+class Calibrated(_Found, CalibrationResult):
+    """A calibration; `result["joint1.stiffness"]` is one of its parameters."""
+
+    def __getitem__(self, name: str) -> ParameterEstimate:
+        """A parameter or a derived result by its name.
+
+        Raises:
+            RobotError: there is none of that name.
+        """
+        found = {p.name: p for p in (*self.parameters, *self.derived)}
+        if name not in found:
+            raise RobotError(f"{self.robot.name} has no parameter {name}; it has {', '.join(found)}")
+        return found[name]
+
+    def answer(self) -> str:
+        """Whether the result is good."""
+        return judge(self).headline
+
+    def rows(self) -> list[Row]:
+        """A record for each parameter."""
+        return [
+            {"parameter": p.name, "value": p.value, "sigma": p.sigma, "unit": p.unit, "start": p.start, "note": p.note}
+            for p in (*self.parameters, *self.derived)
+        ]
+
+    def draw(self, axes: Any) -> None:
+        """Residuals of the first recording in their expected sigmas: a good model leaves noise between -3 and 3."""
+        for series in self.bags[0].residuals.values():
+            whitened = (series.measured - series.predicted) / series.sigma
+            for channel, values in zip(series.channels, whitened.T, strict=True):
+                axes.plot(series.times, values, linewidth=0.5, label=channel)
+        axes.axhspan(-3.0, 3.0, color="0.5", alpha=0.15)
+        axes.set(xlabel="time [s]", ylabel="residual [sigma]")
+        axes.legend(fontsize="x-small", ncols=3)
+
+    def write(self, files: ResultFiles) -> None:
+        """Robot file, report, viewer recording, JSON."""
+        result_files.write_calibration(self, files)
+
+
+@dataclass(frozen=True)
+class Compared(_Found, ComparisonResult):
+    """Models against a recording."""
+
+    def answer(self) -> str:
+        """The error of each model."""
+        errors = (
+            f"{m.label}: {significant(m.judged_error)} sigma (floor {significant(m.judged_floor)})" for m in self.models
+        )
+        return f"Error {self.models[0].judged_by}, {', '.join(errors)}"
+
+    def rows(self) -> list[Row]:
+        """A record for each model and channel: rmse by horizon."""
+        return [
+            {"model": m.label, "channel": name, "unit": c.unit, "sigma": c.noise_sigma, "fit_percent": c.fit_percent}
+            | {f"rmse_{horizon}": value for horizon, value in c.horizons.items()}
+            for m in self.models
+            for name, c in m.channels.items()
+        ]
+
+    def draw(self, axes: Any) -> None:
+        """Error 0.1 s ahead of each channel in sigmas of its sensor, model beside model."""
+        names = list(self.models[0].channels)
+        width = 0.8 / len(self.models)
+        for k, m in enumerate(self.models):
+            errors = [m.channels[name].horizons["0.1"] / m.channels[name].noise_sigma for name in names]
+            axes.bar(np.arange(len(names)) + k * width, errors, width, label=m.label)
+        axes.set_xticks(np.arange(len(names)), names, rotation=45, ha="right")
+        axes.set(yscale="log", ylabel="error 0.1 s ahead [sigma]")
+        axes.legend()
+
+    def write(self, files: ResultFiles) -> None:
+        """Report, viewer recording, JSON."""
+        result_files.write_comparison(self, files)
+
+
+@dataclass(frozen=True)
+class Diagnosed(_Found, Diagnosis):
+    """Effects that a model may lack."""
+
+    def answer(self) -> str:
+        """What is missing."""
+        return diagnosis_answer(self).headline
+
+    def rows(self) -> list[Row]:
+        """A record for each candidate, best first."""
+        return [
+            {
+                "effect": c.label,
+                "verdict": c.verdict,
+                "score": c.score,
+                "p_value": c.p_value,
+                "share": c.share,
+                "heldout_error": c.heldout_error,
+                "look_alikes": ", ".join(c.look_alikes),
+            }
+            for c in self.candidates
+        ]
+
+    def draw(self, axes: Any) -> None:
+        """Scores of the best candidates."""
+        best = self.candidates[:TOLD][::-1]
+        axes.barh([f"{c.label}: {c.verdict}" for c in best], [c.score for c in best])
+        axes.set(xscale="log", xlabel="score")
+
+    def write(self, files: ResultFiles) -> None:
+        """Report, viewer recording, JSON."""
+        result_files.write_diagnosis(self, files)
+
+
+@dataclass(frozen=True)
+class Discovered(_Found, Discovery):
+    """The way to a model that lacks nothing, step by step; `robot` is the last one."""
+
+    def answer(self) -> str:
+        """What was added."""
+        return discovery_answer(self).headline
+
+    def rows(self) -> list[Row]:
+        """A record for each step."""
+        return [
+            {
+                "step": step.label,
+                "train_error": step.train_error,
+                "heldout_error": step.heldout_error,
+                "floor": step.floor,
+            }
+            for step in self.steps
+        ]
+
+    def draw(self, axes: Any) -> None:
+        """The waterfall."""
+        y = np.arange(len(self.steps))
+        axes.barh(y - 0.2, [step.train_error for step in self.steps], 0.4, label="training")
+        axes.barh(y + 0.2, [step.heldout_error for step in self.steps], 0.4, label="held out")
+        axes.plot([step.floor for step in self.steps], y, "k|", markersize=24, label="floor")
+        axes.set_yticks(y, [step.label for step in self.steps])
+        axes.invert_yaxis()
+        axes.set(xscale="log", xlabel="error [sigma]")
+        axes.legend()
+
+    def write(self, files: ResultFiles) -> None:
+        """Robot file of the last step, report, viewer recording, JSON."""
+        result_files.write_discovery(self, files, self.steps[0].robot.path.name)
+
+
+@dataclass(frozen=True)
+class Replayed(_Found, ReplayResult):
+    """The estimator over a recording."""
+
+    def answer(self) -> str:
+        """Whether the estimator can be trusted."""
+        return judge_replay(self).headline
+
+    def rows(self) -> list[Row]:
+        """A record for each kept tick: states and their sigmas."""
+        names = state_names(self.robot.layout)
+        columns = ("time", *names, *(f"{name}.sigma" for name in names))
+        table = np.column_stack([self.states.times, self.states.mean, self.states.sigma])
+        return [dict(zip(columns, map(float, row), strict=True)) for row in table]
+
+    def draw(self, axes: Any) -> None:
+        """Innovations in their expected sigmas."""
+        for series in self.innovations.values():
+            for channel, values in zip(series.channels, (series.residual / series.sigma).T, strict=True):
+                axes.plot(series.times, values, linewidth=0.5, label=channel)
+        axes.axhspan(-3.0, 3.0, color="0.5", alpha=0.15)
+        axes.set(xlabel="time [s]", ylabel="innovation [sigma]")
+        axes.legend(fontsize="x-small", ncols=3)
+
+    def write(self, files: ResultFiles) -> None:
+        """Report, viewer recording, JSON."""
+        result_files.write_replay(self, files)

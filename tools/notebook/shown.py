@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A result that shows itself: text and table in a notebook, a data frame, a figure, and the files of the verbs."""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from jointscope.robots.errors import JointscopeError
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verb_parts.result_files import ResultFiles
+
+Row = dict[str, Any]
+SHOWN_ROWS = 40  # in a notebook; the data frame has all
+
+
+class Shown(ABC):
+    """What all results can do."""
+
+    @abstractmethod
+    def answer(self) -> str:
+        """What was found, one sentence."""
+
+    @abstractmethod
+    def rows(self) -> list[Row]:
+        """The numbers as records of one shape, in SI units."""
+
+    @abstractmethod
+    def draw(self, axes: Any) -> None:
+        """Draws the result into matplotlib's axes."""
+
+    @abstractmethod
+    def write(self, files: ResultFiles) -> None:
+        """Writes the files of the verb."""
+
+    def to_dataframe(self) -> Any:
+        """The numbers as a pandas.DataFrame.
+
+        Raises:
+            JointscopeError: pandas is not installed.
+        """
+        return _outside("pandas", "to_dataframe()", "pip install pandas").DataFrame(self.rows())
+
+    def plot(self, axes: Any = None) -> Any:
+        """The result as a figure of matplotlib; needs no display.
+
+        Args:
+            axes: where to draw; a figure of its own if not given.
+
+        Returns:
+            The matplotlib.figure.Figure: a notebook shows it, `savefig` writes it.
+
+        Raises:
+            JointscopeError: matplotlib is not installed.
+        """
+        pyplot = _outside("matplotlib.pyplot", "plot()", "pip install 'jointscope[plot]'")
+        if axes is None:
+            figure, axes = pyplot.subplots(figsize=(9.0, 4.0), layout="constrained")
+            pyplot.close(figure)  # a notebook shows what is returned, not that and the open figure
+        self.draw(axes)
+        axes.set_title(self.answer(), wrap=True)
+        return axes.figure
+
+    def save(
+        self,
+        robot: str | Path | None = None,
+        *,
+        report: str | Path | None = None,
+        rrd: str | Path | None = None,
+        json: str | Path | None = None,
+        figures: str | Path | None = None,
+    ) -> None:
+        """Writes what the verbs write: all files, or none.
+
+        Args:
+            robot: robot file, of results that have a robot.
+            report: HTML.
+            rrd: recording for the viewer.
+            json: what the screen says.
+            figures: folder for the pictures of the report.
+
+        Raises:
+            JointscopeError: a file cannot be written.
+        """
+        self.write(ResultFiles(*(None if path is None else Path(path) for path in (report, rrd, json, robot, figures))))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        rows = self.rows()
+        head = "".join(f"<th>{escape(name)}</th>" for name in rows[0]) if rows else ""
+        lines = "".join(f"<tr>{''.join(map(_cell, row.values()))}</tr>" for row in rows[:SHOWN_ROWS])
+        more = f"<p>{len(rows) - SHOWN_ROWS} more</p>" if len(rows) > SHOWN_ROWS else ""
+        return f"<p><b>{escape(self.answer())}</b></p><table><tr>{head}</tr>{lines}</table>{more}"
+
+
+def _cell(value: Any) -> str:
+    text = significant(value, 5) if isinstance(value, float) else "" if value is None else str(value)
+    return f"<td>{escape(text)}</td>"
+
+
+def _outside(module: str, method: str, way: str) -> Any:
+    """A module that comes with no installation of this package by itself."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as err:
+        raise JointscopeError(f"{method} needs {module.partition('.')[0]}, which is not installed; do: {way}") from err
