@@ -11,6 +11,7 @@ body can have, which makers' files do contain. Such inertias are put in after th
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -94,6 +95,11 @@ class ArmBodies:
         mujoco.mj_rne(model, data, 0, self._all)
         mujoco.mj_fullM(model, data, self._full)
         return self.G.T @ self._full @ self.G, self.G.T @ self._all
+
+    @property
+    def engine(self) -> mujoco.MjModel:
+        """A copy of MuJoCo's model, its joints in the order of `moving`; nothing but bodies is in it."""
+        return copy.copy(self._model)
 
     def _compile(self, urdf: Urdf, held: Mapping[str, float]) -> None:
         bodies: dict[str, _Body] = {name: _Body() for name in (WORLD, *self.moving)}

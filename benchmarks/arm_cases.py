@@ -7,7 +7,7 @@ Only data files of four packages are read; none of their code runs.
 from __future__ import annotations
 
 import importlib.metadata
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 EXAMPLE, ICUB, AIRO, DEXMATE = "example-robot-data", "icub-models", "airo-models", "dexmate-urdf"
@@ -31,6 +31,7 @@ class ArmCase:
         counts: of an encoder per turn, or per metre of a slide; 0 for fine ones with noise.
         held: whether joints that do not move stand at a posture or at zero.
         skip: joints of the chain that are held all the same.
+        sticks: whether dry friction truly holds a joint that stands.
     """
 
     name: str
@@ -45,12 +46,14 @@ class ArmCase:
     counts: int = 0
     held: str = "posture"
     skip: tuple[str, ...] = field(default=())
+    sticks: bool = False
 
     @property
     def variant(self) -> str:
         """How it was recorded, in words."""
         parts = [self.unit, f"{self.rate:g} Hz", self.order, f"command: {self.command}"]
         parts += [f"{self.counts} counts"] * bool(self.counts) + ["others at zero"] * (self.held == "zero")
+        parts += ["sticks"] * self.sticks
         return ", ".join(parts)
 
 
@@ -60,7 +63,7 @@ def _of(package: str, name: str, path: str, last: str, count: int, **how: object
 
 def cases() -> list[ArmCase]:
     """All of them."""
-    return [*_arms(), *_legs(), *_hands(), *_mobile()]
+    return [*_arms(), *_legs(), *_hands(), *_mobile(), *_sticking()]
 
 
 def _arms() -> list[ArmCase]:
@@ -139,6 +142,13 @@ def _mobile() -> list[ArmCase]:
         _of(d, "vega_lift", "vega_1u/vega_1u.urdf", "R_arm_j3", 4, unit="A", skip=("torso_flip",)),
         _of(e, "humanoid", "urdf/simple_humanoid.urdf", "LARM_ELBOW", 4, rate=200.0, order="some"),
     ]
+
+
+def _sticking() -> list[ArmCase]:
+    """Some of them once more, each twice: another name is another motion and another truth."""
+    again = ("ur10", "go2", "pr2_arm", "icub_left_arm", "z1", "tiago_lift", "panda", "allegro_finger")
+    table = {case.name: case for case in [*_arms(), *_legs(), *_hands(), *_mobile()]}
+    return [replace(table[name], name=f"{name}_sticks{i}", sticks=True) for name in again for i in (1, 2)]
 
 
 def urdf_file(case: ArmCase) -> Path:

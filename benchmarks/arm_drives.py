@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 SHARPNESS = 500.0  # [s/rad] dry friction is coulomb * tanh(SHARPNESS v): 90 % of it at 3 mrad/s
 SMALLEST_ROTOR = {"turns": 1e-5, "slides": 1e-2}  # [kg m2], [kg]
 LARGEST = {"A": (1.0, 8.0), "duty": (0.25, 0.6)}  # the command's largest value
+DRY, DRY_STICKING = (0.02, 0.06), (0.04, 0.12)  # friction, of the largest torque
 TELLING = 0.15  # part of the torque that must come from known masses for a torque constant to be found
 
 
@@ -26,12 +27,14 @@ class Drives:
         coulomb: dry friction [N m or N].
         viscous: viscous friction [N m s/rad or N s/m].
         k: torque per unit of the command [N m/unit].
+        sticks: whether dry friction holds a joint that stands, instead of turning over smoothly.
     """
 
     inertia: Array
     coulomb: Array
     viscous: Array
     k: Array
+    sticks: bool = False
 
     def friction(self, v: Array) -> Array:
         """Torque against the motion, shape (n,)."""
@@ -58,7 +61,7 @@ def loads(bodies: ArmBodies, motion: Motion, seconds: float) -> Loads:
 
 
 def make_drives(
-    load: Loads, link_inertia: Array, slides: Array, unit: str, rng: np.random.Generator
+    load: Loads, link_inertia: Array, slides: Array, unit: str, rng: np.random.Generator, sticks: bool = False
 ) -> tuple[Drives, str]:
     """Drives that fit the links, and the unit that they can be told in.
 
@@ -69,10 +72,10 @@ def make_drives(
     inertia = np.maximum(link_inertia * np.exp(rng.uniform(np.log(0.3), np.log(3.0), len(slides))), smallest)
     frictionless = load.torque + inertia * load.a
     peak, speed = np.abs(frictionless).max(axis=0), np.abs(load.v).max(axis=0)
-    coulomb = rng.uniform(0.02, 0.06, len(peak)) * peak
+    coulomb = rng.uniform(*(DRY_STICKING if sticks else DRY), len(peak)) * peak
     viscous = rng.uniform(0.03, 0.08, len(peak)) * peak / speed
     told = np.std(load.torque, axis=0) / np.std(frictionless, axis=0)
     if unit != "Nm" and told.min() < TELLING:
         unit = "Nm"
     k = np.ones(len(peak)) if unit == "Nm" else 1.1 * peak / rng.uniform(*LARGEST[unit], len(peak))
-    return Drives(inertia, coulomb, viscous, k), unit
+    return Drives(inertia, coulomb, viscous, k, sticks), unit

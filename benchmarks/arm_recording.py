@@ -79,7 +79,8 @@ def _simulated(case: ArmCase, urdf: Urdf, rng: np.random.Generator) -> Recorded:
     motion = make_motion(joints, np.array([posture[name] for name in names]), rng)
     slides = np.array([joint.kind == "prismatic" for joint in joints])
     link_inertia = np.diag(bodies.mass_matrix(motion.centre)).copy()
-    drives, unit = make_drives(loads(bodies, motion, SECONDS), link_inertia, slides, case.unit, rng)
+    load = loads(bodies, motion, SECONDS)
+    drives, unit = make_drives(load, link_inertia, slides, case.unit, rng, case.sticks)
     # a drive that tells its own effort gets its command from a loop that is faster than the topic
     commanded = 1000.0 if case.command == "measured" else case.rate
     times = _stamps(commanded, 0.001, rng), _stamps(case.rate, 0.001 + 0.3 / case.rate, rng)
@@ -192,6 +193,7 @@ def _truth(r: Recorded, published: int) -> dict[str, Any]:
         "rate": r.case.rate,
         "held": r.case.held,
         "variant": r.case.variant,
+        "sticks": r.case.sticks,
         "posture": r.posture,
         "types": {name: r.urdf.joints[name].kind for name in r.bodies.joints},
         "mimic": [name for name in r.bodies.moving if name not in r.bodies.joints],

@@ -3,7 +3,8 @@
 
     (M(q) + rotors) a + c(q, v) = k u - coulomb tanh(500 v) - viscous v
 
-integrated by Runge and Kutta's rule of fourth order in steps that resolve the dry friction. The controller, which only
+integrated by Runge and Kutta's rule of fourth order in steps that resolve the dry friction; where friction sticks, by
+`arm_sticking.py`. The controller, which only
 has to keep the arm on its way, is the inverse dynamics of the wanted motion with springs and dampers around it.
 """
 
@@ -15,6 +16,7 @@ import numpy as np
 from arm_bodies import ArmBodies
 from arm_drives import SHARPNESS, Drives
 from arm_motion import Motion
+from arm_sticking import StickingArm
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -48,6 +50,7 @@ def simulate(
     """Runs from rest at time 0 to the last stamp; commands are rounded to `digits` as a driver's are."""
     q, v = motion.at(0.0)[0], np.zeros(len(bodies.joints))
     period = float(np.median(np.diff(command_times)))
+    sticking = StickingArm(bodies, drives) if drives.sticks else None
     gains = _gains(bodies.mass_matrix(q) + np.diag(drives.inertia), period)
     step = _longest_step(bodies.mass_matrix(q) + np.diag(drives.inertia), drives)
     # before the first command the arm is held by its brakes
@@ -55,7 +58,9 @@ def simulate(
     now, u, driven = 0.0, np.zeros(len(q)), False
     commands, positions, torques = [], [], []
     for time, samples in events:
-        if driven:
+        if driven and sticking is not None:
+            q, v = sticking.advance(q, v, drives.k * u, time - now)
+        elif driven:
             q, v = _advance(bodies, drives, q, v, drives.k * u, time - now, step)
         now = time
         if samples:

@@ -39,8 +39,8 @@ class Steps:
         weight: W of each step, shape (m, n_link, n_link); None for the identity.
         path: how the commands act, where effects change them; None where they act as logged.
         index: place of each step in the path, shape (m,).
-        slack: factor on the standard deviations of each step, shape (m,); None for 1. Large where something acts that
-            does not belong to the robot; velocities are then nearly free.
+        slack: factor on the standard deviations of the velocities in each step, shape (m, k); None for 1. Large where
+            something acts that no law tells, such as a hand, or friction that holds; velocities are then nearly free.
     """
 
     h: Array
@@ -84,11 +84,11 @@ class Steps:
         h, root = self.h[:, None], np.sqrt(self.h)[:, None]
         rates, k = rate_sigmas(self.noise, h), len(self.layout.velocities)
         if self.slack is not None:  # memories follow the motion, which the sensors see
-            free = np.where(self.slack > 1.0, FREE, 0.0)[:, None] * root
-            rates[:, :k] = np.maximum(rates[:, :k] * self.slack[:, None], free)
+            free = np.where(self.slack > 1.0, FREE, 0.0) * root
+            rates[:, :k] = np.maximum(rates[:, :k] * self.slack, free)
         positions = position_sigmas(self.noise, rates[:, :k], h)
         if self.slack is not None and not self.integrated:
-            positions = positions * self.slack[:, None]
+            positions = positions * self.slack
         return np.hstack([rates, positions])
 
     def combine(self, d_v: Array, d_q: Array) -> Array:

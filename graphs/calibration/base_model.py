@@ -68,7 +68,7 @@ class BaseModel:
         torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near)
+        result = calibrate(full, recordings, near=near, standstill=True)
         return BaseModel(
             result.robot,
             tuple(recordings),

@@ -22,8 +22,9 @@ from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
-from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
+from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
@@ -45,6 +46,7 @@ from jointscope.robots.recordings.screening import screen
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
+STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
 @in_solver_context
@@ -55,6 +57,7 @@ def calibrate(
     *,
     biases_only: bool = False,
     near: Sequence[Calibration] | None = None,
+    standstill: bool = False,
     solver: Solver = solve,
     sets: Sequence[SetProblem] = (),
     progress: Progress | None = None,
@@ -67,6 +70,8 @@ def calibrate(
         biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
         near: values with the biases of each recording that are near the solution already, where the robot's own values
             and noise are, too: nothing is guessed, no windows are cut.
+        standstill: whether friction is asked for its law where a joint stands or turns over, too, as where effects of
+            slow motion are looked for; else what these moments say is left out.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
         sets: recordings of other kinds than motion, which share the robot's values.
         progress: called with a text and the share done, from 0 to 1.
@@ -77,11 +82,11 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
-    result = _calibrated(robot, recordings, biases_only, near, solver, sets, report)
+    result = _calibrated(robot, recordings, biases_only, near, standstill, solver, sets, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:
         report("again, with mountings held", 0.0)
-        anew = _calibrated(held(robot, turned), recordings, False, None, solver, sets, report)
+        anew = _calibrated(held(robot, turned), recordings, False, None, standstill, solver, sets, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -92,6 +97,7 @@ def _calibrated(
     recordings: Sequence[Recording],
     biases_only: bool,
     near: Sequence[Calibration] | None,
+    standstill: bool,
     solver: Solver,
     sets: Sequence[SetProblem],
     report: Progress,
@@ -102,7 +108,10 @@ def _calibrated(
     notices += found
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
-    problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in recordings]
+    told = list(recordings)
+    if near is None and not biases_only and not standstill:
+        told = [leaving_standstill_out(seen, recording) for recording in recordings]
+    problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in told]
     if solver is solve_samples:
         must_be_short(problems)
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros)) if biases_only else ()
@@ -112,6 +121,7 @@ def _calibrated(
         plain = [problem.of_robot(problem.robot.without(seen.accelerometers)) for problem in problems]
         plain = plain if seen.accelerometers else problems
         first = [blunted(problem, sharpness) for problem in plain for sharpness in blunt] or plain
+        # with what standstills say: friction has not been found yet, and small noise makes far starts farther
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
         calibrations = [c.carried_to(Calibration.of(seen)) for c in calibrations]
     else:
@@ -127,8 +137,12 @@ def _calibrated(
     estimate = solved.solution.estimate
     motions = len(solved.problems)
     moving = solved.problems, estimate.states[:motions], estimate.calibrations[:motions]
+    following = result.robot
+    if any(recording.sticking for recording in told):
+        following = replace(following, noise=_through_standstill(result.noise, noise))
     return replace(
         result,
+        robot=following,
         timing=drive_timing(*moving),
         masses=wrong_masses(*moving),
         regressed=regressed_values(result.robot, recordings),
@@ -191,6 +205,12 @@ def _windows_stage(
         noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
     found = estimate.calibrations[0]
     return noise, [bag.with_points(found.common) for bag in bags]
+
+
+def _through_standstill(moving: ProcessNoise, all_of_it: ProcessNoise) -> ProcessNoise:
+    """Noise for a filter that goes through standstills, too, where they ask for far more than the motion does."""
+    more = densities(all_of_it) / densities(moving)
+    return scaled(moving, np.where(more > STANDING, more, 1.0))
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
@@ -53,7 +53,8 @@ class CalibrationGraph:
             per_sample: one factor for every sample instead of condensed ones; GTSAM's optimizers then take a time that
                 grows with the square of the samples, as they copy all values for each of their callbacks.
         """
-        problems = [BagProblem.of(result.robot, bag.recording) for bag in result.bags]
+        robot = replace(result.robot, noise=result.noise)  # the file's is that of a filter, with standstills
+        problems = [BagProblem.of(robot, bag.recording) for bag in result.bags]
         estimate = Estimate(tuple(bag.states for bag in result.bags), tuple(bag.calibration for bag in result.bags))
         if per_sample:
             graph, values = nonlinear_graph(problems, estimate), initial_values(estimate)

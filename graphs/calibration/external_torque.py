@@ -114,8 +114,9 @@ def external_torques(
     torque = _means(ticks, _impulses(robot, defects), edges)[whole]
     centres = (0.5 * (edges[:-1] + edges[1:]))[whole]
     motion = JointStates.of(robot, ticks, x).at(centres)
-    torque = np.where(_hold_still(robot, motion), 0.0, torque)
-    rare = _rare(torque, motion)
+    held = _held_by_friction(robot, recording, motion, float(np.max(np.diff(ticks))))
+    torque = np.where(held, 0.0, torque)
+    rare = _rare(torque, ~held, motion)
     large = np.max(np.abs(np.where(rare, torque, 0.0)), axis=0) > PRACTICAL * _given(robot, recording)
     return _moments(robot, centres, torque, rare & large)
 
@@ -132,7 +133,11 @@ def _given(robot: Robot, recording: Recording) -> Array:
 
 def _impulses(robot: Robot, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
-    return defects[:, : robot.layout.n_link] * robot.free_inertias()
+    moved, layout = robot.free_inertias(), robot.layout
+    for link, joint in zip(layout.joint_link, robot.joints, strict=True):
+        if joint not in layout.motors and joint not in robot.tree.massless:
+            moved[link] += robot.drive_parameter(joint, "inertia").value
+    return defects[:, : layout.n_link] * moved
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:
@@ -142,26 +147,37 @@ def _means(ticks: Array, impulses: Array, edges: Array) -> Array:
     return np.diff(at_edges, axis=0) / np.diff(edges)[:, None]
 
 
-def _hold_still(robot: Robot, motion: JointStates) -> NDArray[np.bool_]:
-    """Where a rigid joint rests: its link is held by the friction of its motor, shape (bins, n_link)."""
+def _held_by_friction(robot: Robot, recording: Recording, motion: JointStates, step: float) -> NDArray[np.bool_]:
+    """Where a rigid joint rests: its link is held by the friction of its motor, shape (bins, n_link).
+
+    What is free in a step [s] may reach into the bin that begins within it.
+    """
     layout = robot.layout
-    still = np.zeros((len(motion.times), layout.n_link), bool)
+    held = np.zeros((len(motion.times), layout.n_link), bool)
     slow = np.abs(motion.v) <= slowest_visible_speed(robot)
     for j, joint in enumerate(robot.joints):
         if joint not in layout.motors:
-            still[:, layout.joint_link[j]] = slow[:, j]
-    return still
+            sticks = recording.sticks(joint, motion.times + 0.5 * BIN + step, BIN + 2.0 * step)
+            held[:, layout.joint_link[j]] = slow[:, j] | sticks
+    return held
 
 
-def _rare(torque: Array, motion: JointStates) -> NDArray[np.bool_]:
-    """Bins and links that lack far more than bins of like motion, shape (bins, n_link)."""
+def _rare(torque: Array, told: NDArray[np.bool_], motion: JointStates) -> NDArray[np.bool_]:
+    """Bins and links that lack far more than bins of like motion, shape (bins, n_link); of those that tell."""
     size = np.abs(torque)
     load = np.where(np.isfinite(motion.load), motion.load, np.gradient(motion.v, motion.times, axis=0))
-    expected = np.median(size, axis=0) * np.ones_like(size)
-    for signals in zip(motion.q.T, motion.v.T, load.T, strict=True):
-        alike = _alike(np.column_stack(signals))
-        expected = np.maximum(expected, np.quantile(size[alike], QUANTILE, axis=1))
-    rare = np.column_stack([_grown(*columns) for columns in zip(size.T, expected.T, strict=True)])
+    signals = [np.column_stack(columns) for columns in zip(motion.q.T, motion.v.T, load.T, strict=True)]
+    rare = np.zeros_like(told)
+    for i in range(size.shape[1]):
+        bins = np.flatnonzero(told[:, i])
+        if len(bins) < FEWEST:
+            continue
+        own, expected = size[bins, i], np.full(len(size), np.inf)
+        expected[bins] = np.median(own)
+        for columns in signals:
+            alike = own[_alike(columns[bins], bins)]
+            expected[bins] = np.maximum(expected[bins], np.quantile(alike, QUANTILE, axis=1))
+        rare[:, i] = _grown(size[:, i], expected)
     share = np.sum(np.where(rare, size**2, 0.0), axis=0) / np.maximum(np.sum(size**2, axis=0), 1e-300)
     return np.asarray(rare & (share > MUCH) & (np.mean(rare, axis=0) < RARE))
 
@@ -175,11 +191,16 @@ def _grown(size: Array, expected: Array) -> NDArray[np.bool_]:
     return np.asarray(seeds[regions] & (size > OF_PEAK * peaks[regions]))
 
 
-def _alike(signals: Array) -> NDArray[np.intp]:
-    """The bins whose signals are nearest to those of each bin without being the same event, shape (bins, ALIKE)."""
+def _alike(signals: Array, numbers: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The bins whose signals are nearest to those of each bin without being the same event, shape (bins, ALIKE).
+
+    Args:
+        signals: of each bin, shape (bins, 3).
+        numbers: of the bins in the order of time, shape (bins,).
+    """
     features = signals / np.maximum(np.std(signals, axis=0), 1e-12)
     _, near = KDTree(features).query(features, k=2 * APART + ALIKE)
-    other = np.abs(near - np.arange(len(near))[:, None]) >= APART
+    other = np.abs(numbers[near] - numbers[:, None]) >= APART
     first = np.argsort(~other, axis=1, kind="stable")[:, :ALIKE]
     return np.take_along_axis(near, first, axis=1)
 

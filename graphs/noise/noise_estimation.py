@@ -74,9 +74,12 @@ class NoiseEvidence:
         """Takes in some residuals; those of other factors are ignored."""
         if isinstance(part.factor, DynamicsFactor):
             half, slack = len(self.squares), part.factor.steps.slack
-            own = slice(None) if slack is None else slack == 1.0
-            self.squares += np.sum(part.residual[own, :half] ** 2, axis=0)
-            self.freedom += np.sum(1.0 - part.leverage[own, :half], axis=0)
+            told = np.ones((len(part.residual), half))
+            if slack is not None:  # memories follow motors that no law holds, too, but not a hand
+                k = slack.shape[1]
+                told[:, :k], told[:, k:] = slack == 1.0, np.any(slack == 1.0, axis=1, keepdims=True)
+            self.squares += np.sum(told * part.residual[:, :half] ** 2, axis=0)
+            self.freedom += np.sum(told * (1.0 - part.leverage[:, :half]), axis=0)
 
     def __add__(self, other: NoiseEvidence) -> NoiseEvidence:
         """Both together."""

@@ -75,7 +75,7 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        acting, slack = path if path.changes else None, _slack(recording, timeline)
+        acting, slack = path if path.changes else None, _slack(robot, recording, timeline)
         steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
@@ -121,14 +121,35 @@ def _impulse_weights(robot: Robot, recording: Recording, timeline: Timeline) -> 
     q = np.zeros((len(middle), layout.n_link))
     q_motor = np.column_stack(angles) - robot.motor_encoder.zero
     q[:, layout.joint_link] = q_motor if robot.transmission is None else q_motor @ robot.transmission.T
-    return tree.weighing_inertia(q) / tree.free_inertias()[:, None]
+    M = tree.weighing_inertia(q)
+    _add_rotors(M, robot, recording, timeline)
+    return M / tree.free_inertias()[:, None]
 
 
-def _slack(recording: Recording, timeline: Timeline) -> Array | None:
-    """Steps that touch a stretch that is left out bind the motion no more; None where there are none."""
-    if not recording.left_out:
+def _add_rotors(M: Array, robot: Robot, recording: Recording, timeline: Timeline) -> None:
+    """Where a rigid joint sticks its torque must be in no row but its own: what it moves is its rotor, too.
+
+    Rows keep their size, so that the noise of the others means the same.
+    """
+    layout, rotors = robot.layout, np.zeros(M.shape[1])
+    sticks = np.zeros(len(M), bool)
+    for link, joint in zip(layout.joint_link, robot.joints, strict=True):
+        if joint not in layout.motors:
+            rotors[link] = robot.drive_parameter(joint, "inertia").value
+            sticks |= recording.sticks(joint, timeline.ticks[1:], timeline.h)
+    alone = np.diagonal(M[sticks], axis1=1, axis2=2)
+    M[sticks] = (M[sticks] + np.diag(rotors)) * (alone / (alone + rotors))[:, :, None]
+
+
+def _slack(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
+    """Where steps bind no motion: all in a stretch that is left out, one joint where it sticks; None for neither."""
+    if not recording.left_out and not recording.sticking:
         return None
-    return np.where(recording.are_judged(timeline.ticks[1:], timeline.h), 1.0, SLACK)
+    end, h, layout = timeline.ticks[1:], timeline.h, robot.layout
+    free = np.repeat(~recording.are_judged(end, h)[:, None], len(layout.velocities), axis=1)
+    for row, joint in zip(layout.motor_row, robot.joints, strict=True):
+        free[:, row] |= recording.sticks(joint, end, h)
+    return np.where(free, SLACK, 1.0)
 
 
 def first_command_time(recording: Recording) -> float:

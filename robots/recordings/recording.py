@@ -97,6 +97,8 @@ class Recording:
         goal: goal positions of a position-controlled robot [rad], NaN where a drive was off; None without.
         left_out: stretches (t0, t1) [s] in which something acted that does not belong to the robot: its equations of
             motion do not hold there, and no model is judged by them.
+        sticking: by joint, stretches (t0, t1) [s] in which dry friction holds it, or may: the torque in the equation of
+            its motor is any of a band, so that it tells nothing.
         posture: positions [rad] or [m] of joints that are not the robot's and stand still, by name.
         shortened: whether long holes were made short, so that times behind them are not those of the stamps.
     """
@@ -108,6 +110,7 @@ class Recording:
     notices: list[Notice] = field(default_factory=list)
     goal: Stream | None = None
     left_out: tuple[tuple[float, float], ...] = ()
+    sticking: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     posture: Mapping[str, float] = field(default_factory=dict)
     shortened: bool = False
 
@@ -176,7 +179,15 @@ class Recording:
 
     def are_judged(self, times: Array, horizon: Array | float = 0.0) -> NDArray[np.bool_]:
         """Whether what happened in the last `horizon` seconds before each time was all the robot's own, shape (m,)."""
-        judged = np.ones(len(times), bool)
-        for t0, t1 in self.left_out:
-            judged &= (times < t0) | (times - horizon > t1)
-        return judged
+        return ~_touched(self.left_out, times, horizon)
+
+    def sticks(self, joint: str, times: Array, horizon: Array | float = 0.0) -> NDArray[np.bool_]:
+        """Whether friction may have held a joint in the last `horizon` seconds before each time, shape (m,)."""
+        return _touched(self.sticking.get(joint, ()), times, horizon)
+
+
+def _touched(stretches: Sequence[tuple[float, float]], times: Array, horizon: Array | float) -> NDArray[np.bool_]:
+    touched = np.zeros(len(times), bool)
+    for t0, t1 in stretches:
+        touched |= (times >= t0) & (times - horizon <= t1)
+    return touched

@@ -70,6 +70,8 @@ def moved(
     counts: int = 0,
     pause: float = 0.0,
     seed: int = 1,
+    sticks: bool = False,
+    push: tuple[float, float, int, float] | None = None,
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -81,6 +83,8 @@ def moved(
         counts: of an encoder per turn; 0 for one that is only noisy.
         pause: share of the time in which the commands hold the joints at rest.
         seed: of motion, jitter and noise.
+        sticks: whether dry friction truly holds a joint that stands; else it turns over within a few mrad/s.
+        push: from and to [s], joint, torque [N m] of a hand.
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
     text = arm.urdf.format(options='<mujoco><compiler balanceinertia="false"/></mujoco>')
@@ -88,6 +92,10 @@ def moved(
     model.opt.timestep, model.opt.gravity[:] = STEP, arm.gravity
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     model.dof_armature[:], model.dof_damping[:] = arm.inertia, arm.viscous
+    dry = np.array(arm.dry)
+    if sticks:  # stiff enough that nothing is seen to creep
+        model.dof_frictionloss[:], dry = arm.dry, np.zeros(n)
+        model.dof_solref[:], model.dof_solimp[:] = (0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
     data = mujoco.MjData(model)
     middle, size = rng.uniform(-0.8, 0.8, n), np.where([a.isupper() for a in arm.axes], 0.06, 0.35)
     speeds, phases = rng.uniform(1.5, 9.0, (4, n)), rng.uniform(0.0, 6.0, (4, n))
@@ -103,7 +111,9 @@ def moved(
             target = middle + run * (size / 2.0 * (np.sin(speeds * t + phases) - np.sin(phases))).sum(axis=0)
             u = data.qfrc_bias + heavy * (150.0 * (target - data.qpos) - 12.0 * data.qvel)
             commands[sent], sent = u, sent + 1
-        data.qfrc_applied[:] = u - np.array(arm.dry) * np.tanh(SHARP * data.qvel)
+        data.qfrc_applied[:] = u - dry * np.tanh(SHARP * data.qvel)
+        if push is not None and push[0] <= k * STEP < push[1]:
+            data.qfrc_applied[push[2]] += push[3]
         mujoco.mj_step(model, data)
         path[k + 1] = data.qpos
     positions = np.column_stack([np.interp(sampled, STEP * np.arange(len(path)), column) for column in path.T])

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A joint that stands tells nothing by its equation of motion."""
 
-import numpy as np
+from types import SimpleNamespace
 
-from jointscope.graphs.problem.standstill import near, slowest_speed
+import numpy as np
+import pytest
+
+from jointscope.graphs.problem.standstill import leaving_standstill_out, near, slowest_speed
+from jointscope.robots.recordings.recording import Recording, Stream
+
+PERIOD, SIGMA = 4e-3, 1e-5
 
 
 def test_dry_friction_is_a_sign_from_the_slowest_speed_on():
@@ -17,3 +23,41 @@ def test_a_mask_is_widened_on_both_sides():
     mask[4] = True
     np.testing.assert_array_equal(np.flatnonzero(near(mask, 2)), [2, 3, 4, 5, 6])
     np.testing.assert_array_equal(near(mask, 0), mask)
+
+
+@pytest.fixture
+def stopping():
+    """A joint that moves with 0.5 rad/s, stands from 1 to 1.5 s, comes back, and crosses zero at once at 2.5 s."""
+    times = np.arange(0.0, 4.0, PERIOD)
+    v = np.select([times < 1.0, times < 1.5, times < 2.5], [0.5, 0.0, -0.5], 0.5)
+    q = PERIOD * np.cumsum(v)
+    command = Stream("command", times, np.ones((len(times), 1)), ("j",), "N m")
+    encoder = Stream("encoder", times, q[:, None], ("j.motor_position",), "rad")
+    return Recording("stop.mcap", "", 0, {"command": command, "encoder": encoder})
+
+
+def joint(sigma=SIGMA, sharpness=200.0, parameters=(), motors=()):
+    """What of a robot counts."""
+    encoder = SimpleNamespace(name="encoder", sigmas=np.array([sigma]))
+    return SimpleNamespace(
+        joints=("j",),
+        motor_encoder=encoder,
+        layout=SimpleNamespace(motors=motors),
+        parameters=dict.fromkeys(parameters),
+        sharpness_of=lambda name: sharpness,
+        has_effect=lambda effect, owner: False,
+    )
+
+
+def test_a_standstill_and_a_reversal_are_left_out_and_nothing_else(stopping):
+    found = leaving_standstill_out(joint(), stopping).sticking["j"]
+    np.testing.assert_allclose(found, [(1.0, 1.5), (2.5, 2.5)], atol=0.025)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [{"parameters": ("j.friction_sharpness",)}, {"sigma": 1e-3}, {"motors": ("j",)}],
+    ids=lambda told: next(iter(told)),
+)
+def test_standstill_stays_where_it_tells_something_or_nobody_sees_it(stopping, told):
+    assert leaving_standstill_out(joint(**told), stopping).sticking == {}

@@ -19,7 +19,7 @@ DELAY = "robot.command_delay.delay"
 @pytest.fixture(scope="module")
 def smooth():
     """A current that is a smooth function of time, sampled with the positions."""
-    return swing(6.0, 100.0, smooth_drive=True)
+    return swing(9.0, 100.0, smooth_drive=True)
 
 
 @pytest.fixture(scope="module")

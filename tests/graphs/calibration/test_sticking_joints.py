@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Arms whose dry friction truly holds a joint that stands: right values, and what is named is there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulated_arm import Arm, moved, written
+
+from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.presentation.judgement import judge
+
+pytestmark = pytest.mark.slow
+
+ARM = Arm("yxy", dry=(4.0, 1.5, 0.5))
+YAML = """
+format: 1
+name: arm
+urdf: arm.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [j0, j1, j2]
+model: {rigid_joints: [j0, j1, j2]}
+command: {topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: N m}
+sensors:
+  encoder: {kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: rad,
+            sigma: 1.0e-5}
+noise: {link_velocity: [0.3, 0.3, 0.3], motor_velocity: [0.3, 0.3, 0.3]}
+effects: ["motor_viscous@j0", "motor_viscous@j1", "motor_viscous@j2"]
+parameters:
+"""
+VALUES = """
+  jN.inertia: {value: 0.4, unit: kg m2}
+  jN.coulomb_torque: {value: 1.0, unit: N m}
+  jN.motor_viscous.coefficient: {value: 1.0, unit: N m s/rad, prior: 0.0, prior_sigma: 50.0, positive: false}
+"""
+LATE = 2e-3  # [s]
+PUSH = (4.0, 4.25, 1, 4.0)
+
+
+@pytest.fixture
+def robot(tmp_path):
+    written(ARM, tmp_path)
+    text = YAML + "".join(VALUES.replace("jN", joint) for joint in ARM.joints)
+    (tmp_path / "arm.yaml").write_text(text, encoding="utf-8")
+    return load_robot(tmp_path / "arm.yaml")
+
+
+def recorded(late=0.0, **how):
+    encoder, command = moved(ARM, encoder_rate=250.0, command_rate=250.0, sticks=True, **how)
+    command = replace(command, times=command.times - late)
+    return Recording("stick.mcap", "", 10**18, {"encoder": encoder, "command": command})
+
+
+def test_what_holds_a_joint_is_in_no_row_but_its_own(robot):
+    recording = replace(recorded(), sticking={"j1": ((2.0, 3.0),)})
+    steps = BagProblem.of(robot, recording).dynamics.steps
+    held, rows = np.nonzero(steps.slack > 1.0)
+    assert set(rows) == {1}
+    k = int(held[len(held) // 2])
+    middle = recording.command.times[k] + 0.5 * steps.h[k]
+    assert 2.0 < middle < 3.0
+    q = [np.interp(middle, recording.streams["encoder"].times, c) for c in recording.streams["encoder"].values.T]
+    M = robot.tree.mass_matrix(np.array([q]))[0] + np.diag([0.4, 0.4, 0.4])  # the rotors of the file
+    rows_of_torque = steps.weight[k] @ np.linalg.solve(M, np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(rows_of_torque[[0, 2]], 0.0, atol=1e-9 * abs(rows_of_torque[1]))
+
+
+def timing_check(result):
+    return next(check for check in judge(result).checks if check.name.endswith("at the same time"))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_sticking_arm_is_right_and_good_and_nothing_is_named(robot, seed):
+    result = calibrate(robot, [recorded(seed=seed)])
+    table = {p.name: p for p in result.parameters}
+    truth = {"inertia": ARM.inertia, "coulomb_torque": ARM.dry, "motor_viscous.coefficient": ARM.viscous}
+    for law, values in truth.items():
+        for joint, value in zip(ARM.joints, values, strict=True):
+            assert table[f"{joint}.{law}"].value == pytest.approx(value, rel=0.005), (joint, law)
+    assert judge(result).level == "good"
+    assert timing_check(result).level == "good"
+    assert result.bags[0].isolated == ()
+
+
+def test_a_command_that_acts_late_on_a_sticking_arm_is_found(robot):
+    result = calibrate(robot, [recorded(late=LATE)])
+    assert result.timing.delay == pytest.approx(LATE, rel=0.15)
+    assert timing_check(result).level == "warn"
+
+
+def test_a_push_on_a_sticking_arm_is_found_when_and_where_it_was(robot):
+    (moment,) = calibrate(robot, [recorded(push=PUSH)]).bags[0].isolated
+    assert moment.row == "j1.link"
+    assert moment.t0 < PUSH[0] + 0.1 and moment.t1 > PUSH[1] - 0.1
+    assert moment.torque == pytest.approx(PUSH[3], rel=0.2)
