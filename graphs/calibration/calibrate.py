@@ -22,6 +22,7 @@ from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
+from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.windows import windows_of
@@ -57,6 +58,7 @@ def calibrate(
     near: Sequence[Calibration] | None = None,
     solver: Solver = solve,
     sets: Sequence[SetProblem] = (),
+    memory: bool = True,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrates a robot with one or more recordings.
@@ -69,6 +71,7 @@ def calibrate(
             and noise are, too: nothing is guessed, no windows are cut.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
         sets: recordings of other kinds than motion, which share the robot's values.
+        memory: whether random torques may last, where the recordings say so; they are white otherwise.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -77,11 +80,11 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
-    result = _calibrated(robot, recordings, biases_only, near, solver, sets, report)
+    result = _calibrated(robot, recordings, biases_only, near, solver, sets, memory, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:
         report("again, with mountings held", 0.0)
-        anew = _calibrated(held(robot, turned), recordings, False, None, solver, sets, report)
+        anew = _calibrated(held(robot, turned), recordings, False, None, solver, sets, memory, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -94,12 +97,15 @@ def _calibrated(
     near: Sequence[Calibration] | None,
     solver: Solver,
     sets: Sequence[SetProblem],
+    memory: bool,
     report: Progress,
 ) -> CalibrationResult:
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     robot, found = told_drive_signal(robot, recordings)
     notices += found
+    if robot.noise.estimate:
+        robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
     problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in recordings]
@@ -119,6 +125,8 @@ def _calibrated(
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
+    if memory and near is None:
+        solved = stage.with_memory(solved)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)

@@ -111,7 +111,7 @@ def external_torques(
     whole = np.diff(edges) < 1.5 * BIN
     if np.sum(whole) < FEWEST:
         return ()
-    torque = _means(ticks, _impulses(robot, defects), edges)[whole]
+    torque = _means(ticks, _impulses(robot, ticks, x, defects), edges)[whole]
     centres = (0.5 * (edges[:-1] + edges[1:]))[whole]
     motion = JointStates.of(robot, ticks, x).at(centres)
     torque = np.where(_hold_still(robot, motion), 0.0, torque)
@@ -130,9 +130,14 @@ def _given(robot: Robot, recording: Recording) -> Array:
     return given
 
 
-def _impulses(robot: Robot, defects: Array) -> Array:
+def _impulses(robot: Robot, ticks: Array, x: Array, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
-    return defects[:, : robot.layout.n_link] * robot.free_inertias()
+    layout = robot.layout
+    lacking = defects[:, : layout.n_link]
+    if robot.noise.n_lasting:  # most of it is in the torques that last
+        w = x[:, layout.size - robot.noise.n_lasting :][:, : layout.n_link]
+        lacking = lacking + 0.5 * (w[1:] + w[:-1]) * np.diff(ticks)[:, None]
+    return lacking * robot.free_inertias()
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:

@@ -170,7 +170,9 @@ class Robot:
         elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
         links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
         motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
-        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(self.memories))
+        equations = [f"{name}.link" for name in links] + [f"{name}.motor" for name in motors]
+        lasting = [f"{name}_torque" for name in equations[: self.noise.n_lasting]]
+        return StateLayout(self.joints, tuple(links), tuple(motors), (*self.memories, *lasting))
 
     @cached_property
     def kinematic_tree(self) -> RigidTree:
@@ -191,7 +193,7 @@ class Robot:
 
     @property
     def memories(self) -> dict[str, Memory]:
-        """States that effects bring along, by the label of the effect, in the order of the layout."""
+        """States that effects bring along, by the label of the effect, the first memories of the layout."""
         laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
         return {label: law.memory for label, law in laws if law.memory is not None}
 
