@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,10 +11,8 @@ import numpy as np
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sensor_sections import topic
 from jointscope.robots.geometry.arm_chain import ArmChain
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters, pose_units
-from jointscope.robots.geometry.pose_effects import effect_units
+from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.yaml_section import Section, did_you_mean
@@ -91,21 +88,6 @@ def with_poses(robot: Robot, setup: PoseSetup) -> Robot:
     for part in LENGTHS:
         errors[f"{TOOL}.{part}"] = replace(errors[f"{TOOL}.{part}"], prior_sigma=setup.tool_sigma)
     return replace(robot, poses=setup, parameters={**errors, **robot.parameters})
-
-
-def check_pose_parameters(robot: Robot, parameters: Mapping[str, Parameter]) -> None:
-    """Complains about parameters of a robot of poses alone that are none.
-
-    Raises:
-        RobotError: unknown, or in another unit.
-    """
-    assert robot.poses is not None
-    units, place = pose_units(robot.joints) | effect_units(robot.joints), robot.path.name
-    for name, parameter in parameters.items():
-        if name not in units:
-            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
-        if parameter.unit != units[name]:
-            raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
 
 
 def write_tracker(section: Any, setup: PoseSetup) -> None:

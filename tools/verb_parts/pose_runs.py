@@ -44,7 +44,11 @@ def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
 
 
 def check_one_kind(
-    bags: Sequence[Path], poses: Sequence[Path], rests: Sequence[Path] | None, options: Mapping[str, bool]
+    bags: Sequence[Path],
+    poses: Sequence[Path],
+    rests: Sequence[Path] | None,
+    options: Mapping[str, bool],
+    frequency: Sequence[Path] | None = None,
 ) -> None:
     """Kinds of recordings that go together, and no option of another.
 
@@ -53,14 +57,21 @@ def check_one_kind(
         poses: as given.
         rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
+        frequency: as given; None of a verb that takes none.
 
     Raises:
         RecordingError: none, kinds that do not go together, or such an option without motion.
     """
-    if not bags and not poses and not rests:
+    if not bags and not poses and not rests and not frequency:
         other = "" if rests is None else ", or --rests BAG"
+        other += "" if frequency is None else ", or --frequency BAG"
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
+        )
+    if frequency and (bags or poses or rests):
+        raise RecordingError(
+            "frequency responses and other kinds in one estimate are not on the command line yet; give --frequency "
+            "alone, and the robot file that it writes as ROBOT with the others"
         )
     if poses and rests:
         raise RecordingError(
@@ -77,7 +88,7 @@ def check_one_kind(
         )
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
-        other = "--poses" if poses else "--rests"
+        other = "--poses" if poses else "--frequency" if frequency else "--rests"
         raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
 
 

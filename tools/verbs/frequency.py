@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             found.append(MeasuredResponse.of(signals, excitation))
     with ExitStack() as stack:
         if args.output is not None:
-            from jointscope.tools.verb_parts.response_files import write_responses
+            from jointscope.tools.export.response_files import write_responses
 
             write_responses(stack.enter_context(whole_file(args.output)), found, args.output.suffix.lower())
         write_report(stack, files, lambda: responses_report(found))
