@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_report
-from jointscope.tools.writing.whole_file import whole_file, write_json
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
 
 
 def add_frequency_option(parser: argparse.ArgumentParser) -> None:
@@ -53,15 +52,8 @@ def run_frequency_calibration(
     result = calibrate_frequency(robot, recordings, progress)
     content = result.to_json()
     checked = check_models(limits, {robot.name: content})
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            text = robot_text(result.robot, files.robot.parent, _origin(result, robot))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        write_report(stack, files, lambda: frequency_report(result, checked=checked))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+    page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
+    write_still(files, result.robot, _origin(result, robot), page, content)
     return frequency_calibration_text(result), checked
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_report
-from jointscope.tools.writing.whole_file import whole_file, write_json
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
+from jointscope.tools.writing.whole_file import write_json
 
 
 def add_poses_option(parser: argparse.ArgumentParser) -> None:
@@ -116,19 +116,13 @@ def run_pose_calibration(
     result = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress)
     content = pose_json(result)
     checked = check_models(limits, {robot.name: content})
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
+    others = {}
+    if urdf is not None:
+        from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
 
-            text = robot_text(result.robot, files.robot.parent, _origin(result, robot))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        if urdf is not None:
-            from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
-
-            stack.enter_context(whole_file(urdf)).write_text(calibrated_urdf(result.robot), encoding="utf-8")
-        write_report(stack, files, lambda: poses_report(result, checked=checked))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+        others[urdf] = calibrated_urdf(result.robot)
+    page, content = partial(poses_report, result, checked=checked), content | acceptance_json(checked)
+    write_still(files, result.robot, _origin(result, robot), page, content, others)
     return pose_calibration_text(result), checked
 
 
@@ -182,15 +176,8 @@ def run_pose_search(
         return pose_ranking_text(candidates, result.count)
     found = discover_poses(robot, sessions, [read_poses(path, robot) for path in holdout], progress)
     last = found.steps[-1].result
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            text = robot_text(found.robot, files.robot.parent, _origin(last, robot))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        write_report(stack, files, lambda: poses_report(last, found))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), _discovery(found, files.robot))
+    made, content = _origin(last, robot), _discovery(found, files.robot)
+    write_still(files, found.robot, made, partial(poses_report, last, found), content)
     return pose_discovery_text(found)
 
 
