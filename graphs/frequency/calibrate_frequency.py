@@ -27,6 +27,7 @@ from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.signals import Excitation, Signals
 
 Array = NDArray[np.float64]
@@ -123,10 +124,12 @@ def calibrate_frequency(
     problems = [first_stage(robot, ShakenPose.of(*recording)) for recording in recordings]
     problems, solution, iterations, stages = settled_stages(problems, [], report)
     calibration = solution.estimate.calibrations[0]
-    covariance = honest_covariance(problems, problems, solution)[calibration.columns[DYNAMICS]][
-        :, calibration.columns[DYNAMICS]
-    ]
-    found = with_sigmas(robot, calibration, covariance)
+    index = calibration.columns[DYNAMICS]
+    covariance = honest_covariance(problems, problems, solution)[index, index]
+    sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
+    found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    told = dict(zip(calibration.names, sigmas.tolist(), strict=True))
+    found = replace(found, parameters=with_sigmas(found.parameters, told))
     report("done", 1.0)
     return FrequencyCalibration(
         robot=found,
@@ -196,13 +199,3 @@ def honest_covariance(problems: Sequence[FrequencySet], everything: Sequence[Any
     shift = covariance[:, index] @ doubt
     widen = np.sqrt(np.maximum(np.diag(banded) / np.diag(covariance), 1.0))
     return np.asarray(covariance * np.outer(widen, widen) + np.outer(shift, shift))
-
-
-def with_sigmas(robot: Robot, calibration: Calibration, covariance: Array) -> Robot:
-    """The robot with the values of a calibration and their sigmas; covariance of the coordinates, shape (p, p)."""
-    sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
-    found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
-    parameters = dict(found.parameters)
-    for name, sigma in zip(calibration.names, sigmas.tolist(), strict=True):
-        parameters[name] = replace(parameters[name], sigma=sigma)
-    return replace(found, parameters=parameters)

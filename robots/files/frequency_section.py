@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.sensor_sections import topic
+from jointscope.robots.files.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, STIFFNESS, TILT_DAMPING, pose_units
 from jointscope.robots.geometry.pose_effects import effect_units
 from jointscope.robots.model.robot import SHARPNESS, Robot
@@ -43,8 +42,8 @@ def frequency_setup(section: Section, joints: tuple[str, ...]) -> FrequencySetup
         raise RobotError(f"{section.place}.joints: {strange!r} is no joint{did_you_mean(str(strange), joints)}")
     return FrequencySetup(
         shaken,
-        _topic(section, "torques", TORQUES, joints),
-        _topic(section, "positions", POSITIONS, joints),
+        topic_or_usual(section, "torques", TORQUES, joints),
+        topic_or_usual(section, "positions", POSITIONS, joints),
     )
 
 
@@ -81,9 +80,3 @@ def check_still_parameters(robot: Robot, parameters: Mapping[str, Parameter]) ->
         if parameter.unit != units[name]:
             raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
     check_frequency(robot)
-
-
-def _topic(section: Section, key: str, usual: Topic, joints: tuple[str, ...]) -> Topic:
-    if key not in section:
-        return replace(usual, names=joints)
-    return topic(section.section(key), joints, scaled=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.sensor_sections import topic
+from jointscope.robots.files.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters
 from jointscope.robots.model.robot import Robot
@@ -53,8 +53,8 @@ def pose_setup(section: Section, joints: tuple[str, ...]) -> PoseSetup:
         at=section.array("at", (3,), np.zeros(3)),
         tracker_link=section.text("tracker", None),
         tracker=section.array("tracker_pose", (4, 4), None),
-        joint_states=_topic(section, "joint_states", JOINT_STATES, joints),
-        positions=_topic(section, "positions", POSITIONS, ()),
+        joint_states=topic_or_usual(section, "joint_states", JOINT_STATES, joints),
+        positions=topic_or_usual(section, "positions", POSITIONS, ()),
         target_sigma=section.number("sigma", TARGET_SIGMA, positive=True),
         joint_sigmas=repeatability,
         estimate_sigma=section.flag("estimate_repeatability", True),
@@ -96,9 +96,3 @@ def write_tracker(section: Any, setup: PoseSetup) -> None:
         section["tracker_pose"] = [[float(f"{v:.10g}") for v in row] for row in setup.tracker.tolist()]
     if setup.estimate_sigma:
         section["repeatability"] = [float(f"{v:.4g}") for v in setup.joint_sigmas.tolist()]
-
-
-def _topic(section: Section, key: str, usual: Topic, joints: tuple[str, ...]) -> Topic:
-    if key not in section:
-        return replace(usual, names=joints)
-    return topic(section.section(key), joints, scaled=bool(joints))
