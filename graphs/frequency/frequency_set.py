@@ -132,7 +132,7 @@ class FrequencySet:
         """Slope of the cost that friction of the other size it may have would add, shape (p,)."""
         values = self.values(calibration)
         inverse = np.linalg.inv(self.with_friction(self.stiffness(values).Z, values))
-        column = self._each(values, COULOMB) * self.pose.friction_doubt(self._sharpness(values))
+        column = self._each(values, COULOMB) * self.pose.friction_doubt(self.sharpness(values))
         d = np.einsum("lij,elj->eli", self.stage.whiten @ inverse, column)
         d = np.sqrt(2.0) * np.swapaxes(d, 0, 1).reshape(len(inverse), -1)
         _, J = self.rows(calibration)
@@ -153,7 +153,7 @@ class FrequencySet:
         assert stage.friction is not None
         Z = self.with_friction(k.Z, values)
         r = np.einsum("lij,elj->eli", Z, pose.motion[:, pose.lines]) + stage.shift - pose.torques
-        sharper = np.log(self._sharpness(values) / stage.sharpness)
+        sharper = np.log(self.sharpness(values) / stage.sharpness)
         r += self._each(values, COULOMB) * (stage.friction[0] + sharper * stage.friction[1])
         for name, column in stage.geometry.items():
             r += (values[name] - stage.values[name]) * column
@@ -176,12 +176,12 @@ class FrequencySet:
         for spring, by in zip(self.arm.springs, k.by_spring, strict=True):
             column = np.einsum("lij,elj->eli", by, moved)
             by_name |= {spring.stiffness: column, spring.damping: jw * column}
-        mu, sharper = self._each(values, COULOMB), np.log(self._sharpness(values) / stage.sharpness)
+        mu, sharper = self._each(values, COULOMB), np.log(self.sharpness(values) / stage.sharpness)
         for i, joint in enumerate(self.arm.joints):
             own = np.eye(len(self.arm.joints))[i]
             by_name[f"{joint}.{VISCOUS}"] = jw * moved * own
             by_name[f"{joint}.{COULOMB}"] = own * (stage.friction[0] + sharper * stage.friction[1])
-            by_name[f"{joint}.{SHARPNESS}"] = own * mu * stage.friction[1] / self._sharpness(values)
+            by_name[f"{joint}.{SHARPNESS}"] = own * mu * stage.friction[1] / self.sharpness(values)
         return whitened(r), {name: whitened(column) for name, column in {**by_name, **stage.geometry}.items()}
 
     def response(self, values: Mapping[str, float]) -> Complex:
@@ -191,14 +191,12 @@ class FrequencySet:
     def log_errors(self) -> Complex:
         """Logarithm of the model's matrix over the measured one at the robot's values, shape (l, nu, nu)."""
         values = {name: p.value for name, p in self.robot.parameters.items()}
-        own = np.isin(self.pose.found.excitation.lines, self.pose.lines)
-        return np.asarray(np.log(self.response(values) / self.pose.matrix.G[own]))
+        return np.asarray(np.log(self.response(values) / self.pose.matrix.G[self.pose.used]))
 
     def logarithms(self, values: Mapping[str, float]) -> tuple[Complex, dict[str, Complex]]:
         """Whitened logarithm of the model's matrix over the measured one, shape (l, nu nu), and its derivatives."""
         k, jw = self.stiffness(values), 1j * self.pose.w[:, None, None]
         G = np.linalg.inv(self.with_friction(k.Z, values, dry=True))
-        own = np.isin(self.pose.found.excitation.lines, self.pose.lines)
         W = self.stage.whiten
 
         def whitened(column: Complex) -> Complex:
@@ -211,7 +209,7 @@ class FrequencySet:
         for i, joint in enumerate(self.arm.joints):
             column = -jw * (G[:, :, i, None] * G[:, i, None, :]) / G
             by_name |= {f"{joint}.{VISCOUS}": column, f"{joint}.{COULOMB}": np.asarray(self._seeming * column)}
-        r = np.log(G / self.pose.matrix.G[own])
+        r = np.log(G / self.pose.matrix.G[self.pose.used])
         return whitened(r), {name: whitened(column) for name, column in by_name.items()}
 
     @property
@@ -221,7 +219,8 @@ class FrequencySet:
         speed = 2.0 * np.abs(pose.carrier) * 2.0 * np.pi * pose.found.excitation.carrier
         return float(2.0 / (np.pi * np.mean(speed))) if pose.step else 0.0
 
-    def _sharpness(self, values: Mapping[str, float]) -> Array:
+    def sharpness(self, values: Mapping[str, float]) -> Array:
+        """How sharply the dry friction of each motor turns over, shape (nu,) [s/rad]."""
         return np.array([self.robot.sharpness_of(joint, values) for joint in self.arm.joints])
 
     def _each(self, values: Mapping[str, float], part: str) -> Array:

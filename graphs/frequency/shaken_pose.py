@@ -78,6 +78,11 @@ class ShakenPose:
         """Of the lines, shape (l,) [rad/s]."""
         return np.asarray(2.0 * np.pi * self.found.excitation.f0 * self.lines)
 
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which lines of the matrix are used, shape (L,)."""
+        return np.asarray(np.isin(self.found.excitation.lines, self.lines))
+
     @cached_property
     def motion(self) -> Complex:
         """Positions of the motors at all lines up to some beyond the highest one, shape (e, K, nu) [rad]."""

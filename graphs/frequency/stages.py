@@ -17,6 +17,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, Stage
 from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.graphs.responses.response_matrix import over_neighbours
 from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
@@ -24,7 +25,6 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 HARMONICS = 2  # of the arm about the motion that carries the excitation
-NEIGHBOURS = 4  # lines on each side whose residuals are taken together
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
 STEP = {"length": 1e-4, "angle": 1e-4}  # [m], [rad] of the differences for columns of geometry
 
@@ -33,8 +33,7 @@ def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
     """The pose with the logarithm of its matrix."""
     arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
     m = pose.matrix
-    own = np.isin(pose.found.excitation.lines, pose.lines)
-    relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[own]
+    relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[pose.used]
     parts = arm.linearised(pose.q, values).mean
     sharpness = np.array([robot.sharpness_of(joint, values) for joint in arm.joints])
     stage = Stage(parts, (1.0 / np.hypot(relative, LOG_FLOOR)).astype(complex), 0.0, None, sharpness, {}, values, True)
@@ -43,10 +42,8 @@ def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
 
 def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     """The pose with the torque balance about values that were found."""
-    values, pose, robot = before.values(calibration), before.pose, before.robot
-    arm = FlexibleArm(robot)
-    parts = arm.linearised(pose.q, values).mean
-    sharpness = np.array([robot.sharpness_of(joint, values) for joint in arm.joints])
+    values, pose, robot, arm = before.values(calibration), before.pose, before.robot, before.arm
+    parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
     geometry = before.stage.geometry or _geometry(arm, robot, pose, parts, values)
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
     stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False)
@@ -71,10 +68,7 @@ def _shift(arm: FlexibleArm, pose: ShakenPose, Z: Complex, values: Mapping[str, 
 def _covariance(r: Complex) -> Complex:
     """Of residuals at each line, shape (l, nu, nu), by those of its neighbours."""
     each = np.einsum("eli,elj->lij", r, r.conj()) / len(r)
-    sums = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)])
-    n = len(each)
-    low, high = np.maximum(np.arange(n) - NEIGHBOURS, 0), np.minimum(np.arange(n) + NEIGHBOURS + 1, n)
-    mean = (sums[high] - sums[low]) / (high - low)[:, None, None]
+    mean = over_neighbours(each)
     floor = 1e-6 * np.real(np.trace(mean, axis1=1, axis2=2))[:, None, None] * np.eye(r.shape[2])
     return np.asarray(mean + floor)
 

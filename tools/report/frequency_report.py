@@ -55,9 +55,8 @@ def _values(result: FrequencyCalibration) -> Section:
 def _pose(result: FrequencyCalibration, problem: FrequencySet, k: int) -> Section:
     """Bode grid from torques to accelerations, as in Fig. 11 of Neubauer et al. (2015)."""
     pose, m, panels = problem.pose, problem.pose.matrix, []
-    own = np.isin(pose.found.excitation.lines, pose.lines)
-    f, square = m.frequencies[own], (pose.w**2)
-    sigmas = m.sigmas(m.total)[own]
+    own = pose.used
+    f, square, sigmas = m.frequencies[own], pose.w**2, m.sigmas(m.total)[own]
     values = {name: p.value for name, p in result.robot.parameters.items()}
     before = {name: p.value for name, p in result.start.parameters.items()}
     model, start = problem.response(values), problem.response(before)
