@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prints what was promised of calibrations from poses beside what is measured.
+"""Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
 Usage: python benchmarks/bench_tx90l.py [--json FILE]; recordings that another program simulated lie in ../shared/data;
 arms with effects are simulated by MuJoCo.
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from measured_page import environment, write_section
+from tx90l_frequency import frequency_rows
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
@@ -64,6 +65,9 @@ def main() -> None:
     found: dict[str, Any] = {}
     if DATA.is_dir():
         found |= _made_elsewhere(robot)
+        rows, figures = frequency_rows(robot, DATA)
+        _tell("\n".join(rows) + "\n")
+        found |= figures
     if PANDA.is_dir():
         found |= _real()
     found |= _simulated(robot)

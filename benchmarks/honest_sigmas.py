@@ -24,6 +24,7 @@ from jointscope.tools.simulator import Disturbance, simulate
 SERIES = {
     "white torque": Disturbance(link=0.5, motor=0.5),
     "20 ms Gauss-Markov torque": Disturbance(link=0.5, motor=0.5, correlation_time=0.02),
+    "100 ms Gauss-Markov torque": Disturbance(link=0.5, motor=0.5, correlation_time=0.1),
 }
 LOWEST, HIGHEST = 0.90, 0.98
 FIRST_SEED, FIRST_HARDWARE_SEED = 100, 500
@@ -44,7 +45,7 @@ class Outcome:
 
 
 def run(quick: bool) -> Section:
-    """Counts, over both kinds of disturbance, how often the truth lies within 2 sigma."""
+    """Counts, over all kinds of disturbance, how often the truth lies within 2 sigma."""
     count, seconds = (4, 8.0) if quick else (20, 20.0)
     section = Section(
         "Honest sigmas",

@@ -9,7 +9,7 @@ to one encoder sigma, a thousandth of the tolerance, and needs no sample at the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,11 @@ class InitialStateFactor:
         links = eye[layout.joint_q] if self.A is None else self.A @ eye[layout.joint_q]
         deflections = links[elastic] - eye[layout.motor_q[elastic]]
         return np.vstack([deflections, eye[hinges], eye[layout.rates]])
+
+    def with_lasting(self, sigmas: Array) -> InitialStateFactor:
+        """The same with other tolerances of the last memories, the torques that last, shape (k,)."""
+        own = self.memory_sigmas[: len(self.memory_sigmas) - len(sigmas)]
+        return replace(self, memory_sigmas=(*own, *sigmas.tolist()))
 
     def select(self, samples: Samples) -> InitialStateFactor:
         """There is one sample only."""

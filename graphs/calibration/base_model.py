@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
@@ -67,8 +68,9 @@ class BaseModel:
         """
         torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
+        full = without_lasting(full)  # what is missing must not hide in torques that last
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near, standstill=True)
+        result = calibrate(full, recordings, near=near, standstill=True, memory=False)
         return BaseModel(
             result.robot,
             tuple(recordings),

@@ -22,6 +22,7 @@ from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
+from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
@@ -60,6 +61,7 @@ def calibrate(
     standstill: bool = False,
     solver: Solver = solve,
     sets: Sequence[SetProblem] = (),
+    memory: bool = True,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrates a robot with one or more recordings.
@@ -74,6 +76,7 @@ def calibrate(
             slow motion are looked for; else what these moments say is left out.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
         sets: recordings of other kinds than motion, which share the robot's values.
+        memory: whether random torques may last, where the recordings say so; they are white otherwise.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -82,11 +85,11 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
-    result = _calibrated(robot, recordings, biases_only, near, standstill, solver, sets, report)
+    result = _calibrated(robot, recordings, biases_only, near, standstill, solver, sets, memory, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:
         report("again, with mountings held", 0.0)
-        anew = _calibrated(held(robot, turned), recordings, False, None, standstill, solver, sets, report)
+        anew = _calibrated(held(robot, turned), recordings, False, None, standstill, solver, sets, memory, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
@@ -100,12 +103,15 @@ def _calibrated(
     standstill: bool,
     solver: Solver,
     sets: Sequence[SetProblem],
+    memory: bool,
     report: Progress,
 ) -> CalibrationResult:
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     robot, found = told_drive_signal(robot, recordings)
     notices += found
+    if robot.noise.estimate:
+        robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
     told = list(recordings)
@@ -129,6 +135,9 @@ def _calibrated(
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
+    standing = _standing(solved.problems[0].dynamics.steps.noise, noise)
+    if memory and near is None:
+        solved = stage.with_memory(solved)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
@@ -139,7 +148,8 @@ def _calibrated(
     moving = solved.problems, estimate.states[:motions], estimate.calibrations[:motions]
     following = result.robot
     if any(recording.sticking for recording in told):
-        following = replace(following, noise=_through_standstill(result.noise, noise))
+        lasting = np.ones(result.noise.n_lasting)
+        following = replace(following, noise=scaled(result.noise, np.concatenate([standing, lasting])))
     return replace(
         result,
         robot=following,
@@ -207,10 +217,10 @@ def _windows_stage(
     return noise, [bag.with_points(found.common) for bag in bags]
 
 
-def _through_standstill(moving: ProcessNoise, all_of_it: ProcessNoise) -> ProcessNoise:
-    """Noise for a filter that goes through standstills, too, where they ask for far more than the motion does."""
+def _standing(moving: ProcessNoise, all_of_it: ProcessNoise) -> Array:
+    """Factors on velocity densities for a filter that goes through standstills, too, where they ask for far more."""
     more = densities(all_of_it) / densities(moving)
-    return scaled(moving, np.where(more > STANDING, more, 1.0))
+    return np.where(more > STANDING, more, 1.0)
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

@@ -16,6 +16,7 @@ from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
@@ -198,6 +199,11 @@ class CalibrationResult:
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()
 
+    def _json_lasting(self) -> dict[str, Any]:
+        """Standard deviation [N m] and memory of the torques that last; empty where none do."""
+        torques = lasting_torques(self.robot)
+        return {"lasting_torques": {"memory": self.noise.correlation_time, "rms": torques}} if torques else {}
+
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
         return {
@@ -220,6 +226,7 @@ class CalibrationResult:
                 else "rad/s/sqrt(s)",
                 "link_velocity": list(map(float, self.noise.link_velocity)),
                 "motor_velocity": list(map(float, self.noise.motor_velocity)),
+                **self._json_lasting(),
             },
             "bags": [
                 {"path": bag.recording.path, "sha256": bag.recording.sha256}

@@ -111,7 +111,7 @@ def external_torques(
     whole = np.diff(edges) < 1.5 * BIN
     if np.sum(whole) < FEWEST:
         return ()
-    torque = _means(ticks, _impulses(robot, defects), edges)[whole]
+    torque = _means(ticks, _impulses(robot, ticks, x, defects), edges)[whole]
     centres = (0.5 * (edges[:-1] + edges[1:]))[whole]
     motion = JointStates.of(robot, ticks, x).at(centres)
     held = _held_by_friction(robot, recording, motion, float(np.max(np.diff(ticks))))
@@ -131,13 +131,17 @@ def _given(robot: Robot, recording: Recording) -> Array:
     return given
 
 
-def _impulses(robot: Robot, defects: Array) -> Array:
+def _impulses(robot: Robot, ticks: Array, x: Array, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
     moved, layout = robot.free_inertias(), robot.layout
     for link, joint in zip(layout.joint_link, robot.joints, strict=True):
         if joint not in layout.motors and joint not in robot.tree.massless:
             moved[link] += robot.drive_parameter(joint, "inertia").value
-    return defects[:, : layout.n_link] * moved
+    lacking = defects[:, : layout.n_link]
+    if robot.noise.n_lasting:  # most of it is in the torques that last
+        w = x[:, layout.size - robot.noise.n_lasting :][:, : layout.n_link]
+        lacking = lacking + 0.5 * (w[1:] + w[:-1]) * np.diff(ticks)[:, None]
+    return lacking * moved
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.noise.torque_memory import MEMORIES
+from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice
 
@@ -24,7 +26,7 @@ def findings(result: CalibrationResult, notices: Sequence[Notice] = ()) -> tuple
         result: a calibration without findings.
         notices: what the screening saw.
     """
-    said = [*_not_at_rest(result), *_isolated(result), _verdict(result)]
+    said = [*_not_at_rest(result), *_isolated(result), _verdict(result), *_lasting(result)]
     said += [*_unsettled(result), *_sensor_noise(result), *_other_sigmas(result), *_process_noise(result)]
     said += _coloured(result)
     said += [direction.text for direction in result.weak_directions]
@@ -112,16 +114,31 @@ def _process_noise(result: CalibrationResult) -> list[str]:
     robot, said = result.robot, []
     if robot.free_links:
         return []
-    densities = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
+    drifts = result.noise.drift(0.1)
     bag = result.bags[0]
     layout = robot.layout
     v = bag.states[:, layout.velocities]
     for j, side in enumerate([f"{name} link" for name in layout.links] + [f"{name} motor" for name in layout.motors]):
         # velocity that the model cannot explain after a tenth of a second, against the velocity itself
-        drift, size = densities[j] * np.sqrt(0.1), float(np.sqrt(np.mean(v[:, j] ** 2)))
+        drift, size = drifts[j], float(np.sqrt(np.mean(v[:, j] ** 2)))
         if size > 0 and drift > 0.1 * size:
             said.append(f"{side}: {100 * drift / size:.0f} % of its velocity is unexplained after 0.1 s")
     return said
+
+
+def _lasting(result: CalibrationResult) -> list[str]:
+    """How large torques are that come and go by no law, and how long they last."""
+    robot = result.robot
+    torques = lasting_torques(robot)
+    if not torques:
+        return []
+    memory = robot.noise.correlation_time
+    units = {name: robot.unit_at(name.rsplit(".", 1)[0], "N m") for name in torques}
+    listed = ", ".join(f"{name} {size:.2g} {units[name]}" for name, size in torques.items())
+    said = f"random torques last: {listed} (rms), with a memory of {1e3 * memory:g} ms; sigmas include them"
+    if memory == MEMORIES[-1]:
+        said += "; no longer memory was tried: a drift, a tone or a missing effect looks like this"
+    return [said]
 
 
 def _coloured(result: CalibrationResult) -> list[str]:

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import IterationRecord
 from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.noise.lasting_noise import NoiseWindows, states_in
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
+from jointscope.graphs.noise.torque_memory import likeliest_memory, memory_windows
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve
 from jointscope.graphs.solving.convergence import measured_rows
@@ -95,6 +97,24 @@ class WholeStage:
         solved = self._settled(problems, noise, estimate)
         return self._from_below(solved) if blunt and noise.estimate else solved
 
+    def with_memory(self, white: Solved) -> Solved:
+        """The solution with random torques that last, where the recordings ask for them; else the one that is given."""
+        if self.hold or not white.robot.noise.estimate:
+            return white
+        self.progress("memory of random torques", 0.9)
+        estimate, motions = white.solution.estimate, len(white.problems)
+        try:
+            found = likeliest_memory(_noise_windows(white))
+            if found is None:
+                return white
+            robot, before = found.robot, white.robot.layout
+            now = anchored([p.of_robot(robot) for p in white.problems], estimate.calibrations)
+            states = [robot.layout.carried_over(x, before) for x in estimate.states[:motions]]
+            start = self._with_sets(Estimate(tuple(states), estimate.calibrations[:motions]))
+            return self._settled(now, robot.noise, start)
+        except SolveError:
+            return white
+
     def _settled(
         self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
     ) -> Solved:
@@ -145,6 +165,21 @@ class WholeStage:
         starts = [other.start(estimate.calibrations[0]) for other in self.sets]
         states, calibrations = [x for x, _ in starts], [c for _, c in starts]
         return Estimate((*estimate.states, *states), (*estimate.calibrations, *calibrations))
+
+
+def _noise_windows(solved: Solved) -> NoiseWindows:
+    """Windows of a solution on which its noise is looked at."""
+    estimate, problems = solved.solution.estimate, solved.problems
+    pieces = memory_windows([p.recording for p in problems])
+    calibrations = [estimate.calibrations[i] for i, _ in pieces]
+
+    def on(robot: Robot) -> list[BagProblem]:
+        return anchored([BagProblem.of(robot, piece) for _, piece in pieces], calibrations)
+
+    robot = replace(solved.robot, noise=problems[0].dynamics.steps.noise)
+    whole = [(problems[i], estimate.states[i]) for i, _ in pieces]
+    states = [states_in(window, *of) for window, of in zip(on(robot), whole, strict=True)]
+    return NoiseWindows(robot, on, states, calibrations)
 
 
 def blunt_sharpness(robot: Robot, recordings: Sequence[Recording]) -> tuple[float, ...]:

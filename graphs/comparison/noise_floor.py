@@ -2,9 +2,9 @@
 """The prediction error that sensor noise and state uncertainty alone would leave, channel by channel.
 
 A missing effect inflates the process noise of a calibration. The floor therefore uses only the white part of it, with
-free torques beside (see `white_noise`). A disturbance that lasts longer than a few milliseconds cannot be told from a
-missing effect and is no part of the floor. An encoder's floor grows with the uncertainty of the motion, a gyro's about
-an axis that nothing turns about stays at its noise.
+torques that last beside it (see `lasting_noise`). A disturbance that lasts longer than a few milliseconds cannot be
+told from a missing effect and is no part of the floor. An encoder's floor grows with the uncertainty of the motion, a
+gyro's about an axis that nothing turns about stays at its noise.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.comparison.causal_filter import filter_around
-from jointscope.graphs.noise.white_noise import separate_noise
+from jointscope.graphs.noise.lasting_noise import separate_noise, without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.sensor_placement import factor_on_state
 from jointscope.robots.errors import SolveError
@@ -48,7 +48,7 @@ def are_judged(problem: BagProblem, start: NDArray[np.intp], horizon: float) -> 
 def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> dict[str, float]:
     """Root mean square of the expected error `horizon` seconds ahead, in sensor sigmas, by channel.
 
-    A model may contradict its recording so much that free torques beside it run away; no more is known of its floor
+    A model may contradict its recording so much that torques beside it run away; no more is known of its floor
     then than the noise of the sensors.
 
     Args:
@@ -57,6 +57,9 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
         calibration: shared values.
         horizon: prediction horizon [s].
     """
+    if problem.robot.noise.n_lasting:
+        own = without_lasting(problem.robot)
+        x, problem = own.layout.carried_over(x, problem.robot.layout), problem.of_robot(own)
     try:
         quiet = problem.with_noise(separate_noise(problem, x, calibration).white)
     except SolveError:

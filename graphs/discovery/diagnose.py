@@ -25,14 +25,13 @@ from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_v
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
     SENSOR_FLOOR,
-    ValidatedRefit,
     excess_share,
     judge,
     ranked,
     worth_a_refit,
 )
-from jointscope.graphs.refits.refit import refit
-from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error, reported_heldout_error
+from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
+from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -230,7 +229,7 @@ def _by_predictions(
 ) -> tuple[list[Candidate], Mapping[str, Robot]]:
     """Candidates judged by predictions after their refits, best first, and the robots refitted."""
     validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
-    seconds = sum((s.t1 - s.t0) * base.recordings[s.bag].judged_share(s.t0, s.t1) for s in spans[1])
+    seconds = judged_seconds(base, spans[1])
     judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     return ranked(judged), {label: t.refit.robot for label, t in validated.items()}
 
@@ -276,8 +275,6 @@ def _refit_and_validate(
     """A refit on the pieces to fit, judged on those between; None where it ran away."""
     base, fit, spans, holdout = shared
     try:
-        found = refit(base, fit, score)
-        errors: ValidationError = judged_error(base, found.robot, found.biases, spans)
+        return refit_and_validate(base, (fit, spans), score, holdout=holdout)
     except (JointscopeError, np.linalg.LinAlgError):
         return None
-    return ValidatedRefit(found, errors, reported_heldout_error(found.robot, holdout))

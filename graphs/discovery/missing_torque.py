@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.comparison.compare import smooth
 from jointscope.graphs.discovery.explained_torque import explained_torque, spring_and_drive
-from jointscope.graphs.noise.free_torque import FreeTorques
-from jointscope.graphs.noise.white_noise import separate_noise
+from jointscope.graphs.noise.lasting_noise import separate_noise
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import first_step, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.model.lasting_torques import equation_inertias
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.robots.units import of_slide
@@ -72,7 +72,7 @@ def estimate_missing_torque(
     calibration: Calibration | None = None,
     explained_by: Mapping[str, Robot] | None = None,
 ) -> MissingTorque:
-    """Smooths a recording with a free torque in every equation of motion.
+    """Smooths a recording with a torque that lasts in every equation of motion.
 
     Biases of the gyros are estimated along; parameters and mounting stay. A rigid joint has one equation for motor and
     link: its missing torque stands in the link's row, that of the motor is zero.
@@ -91,24 +91,26 @@ def estimate_missing_torque(
         problem, states, calibration = smooth(robot, recording)
     else:
         problem = BagProblem.of(robot, recording)
-    separate = separate_noise(problem, states, calibration, LASTING)
-    free = separate.free
-    with_free = BagProblem.of(replace(free.robot, noise=separate.noise), recording)
-    x, sigmas = _smoothed(with_free, problem, states, calibration)
+    free = separate_noise(problem, states, calibration, LASTING).robot
+    x, sigmas = _smoothed(BagProblem.of(free, recording), problem, states, calibration)
     return _answer(problem, free, x, sigmas, explained_by or {})
 
 
 def _answer(
-    problem: BagProblem, free: FreeTorques, x: Array, sigmas: Array, explained_by: Mapping[str, Robot]
+    problem: BagProblem, free: Robot, x: Array, sigmas: Array, explained_by: Mapping[str, Robot]
 ) -> MissingTorque:
-    """Puts together torques and motion from states with free torques and their sigmas, shape (m, d) each."""
-    joints = free.robot.joints
+    """Puts together torques and motion from states with lasting torques and their sigmas, shape (m, d) each."""
+    joints, layout = free.joints, free.layout
     rows = tuple(f"{joint}.{side}" for side in ("link", "motor") for joint in joints)
-    places = [rows.index(row) for row in free.rows]
     torque, sigma = np.zeros((2, len(x), len(rows)))
-    torque[:, places], sigma[:, places] = x[:, free.columns], sigmas[:, free.columns]
-    q_link, v_link, q_motor, v_motor = np.split(free.robot.layout.by_joint(x), 4, axis=1)
-    own = x[:, : problem.robot.layout.size]
+    first = layout.size - free.noise.n_lasting
+    for i, inertia in enumerate(equation_inertias(free).tolist()):
+        name = layout.rate_names[i]
+        if name in rows:  # hinges of a bearing are no joints
+            for found, of in ((torque, x), (sigma, sigmas)):
+                found[:, rows.index(name)] = inertia * of[:, first + i]
+    q_link, v_link, q_motor, v_motor = np.split(layout.by_joint(x), 4, axis=1)
+    own = problem.robot.layout.carried_over(x, layout)
     tau_spring, tau_drive = spring_and_drive(problem, own)
     return MissingTorque(
         joints=joints,
@@ -128,7 +130,7 @@ def _answer(
 
 
 def _smoothed(free: BagProblem, own: BagProblem, states: Array, calibration: Calibration) -> tuple[Array, Array]:
-    """States with free torques and their standard deviations, shape (m, d) each."""
+    """States with lasting torques and their standard deviations, shape (m, d) each."""
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in free.robot.gyros))
     known = Calibration.of(free.robot).with_points({b: calibration[b] for b in calibration.blocks if b != DYNAMICS})
     start = Estimate((free.robot.layout.carried_over(states, own.robot.layout),), (known,))

@@ -15,9 +15,9 @@ import numpy as np
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.discovery.diagnosis_result import Candidate
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
-from jointscope.graphs.discovery.verdicts import ValidatedRefit, judge, yielding
-from jointscope.graphs.refits.refit import refit
-from jointscope.graphs.refits.validation import ValidationError, judged_error, reported_heldout_error
+from jointscope.graphs.discovery.verdicts import judge, yielding
+from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
+from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect
@@ -66,7 +66,7 @@ class SpringTrials:
         tried = {f"{SPRING}@{joint}": self._fitted(joint) for joint in self._far(missing)}
         if not tried:
             return list(candidates), {}
-        seconds = sum(span.t1 - span.t0 for span in self.spans[1])
+        seconds = judged_seconds(self.base, self.spans[1])
         springs = [
             judge(c, self.before, tried[c.label], seconds, tried[c.label] is None)
             for c in scored.candidates
@@ -102,11 +102,9 @@ class SpringTrials:
         label = f"{SPRING}@{joint}"
         try:
             elastic = BaseModel.of(add_effect(self.base.result.start, label), self.base.recordings)
-            found = refit(elastic, self.spans[0], None, label)
-            errors = judged_error(elastic, found.robot, found.biases, self.spans[1])
+            return refit_and_validate(elastic, self.spans, label=label, holdout=self.holdout)
         except (JointscopeError, np.linalg.LinAlgError):
             return None
-        return ValidatedRefit(found, errors, reported_heldout_error(found.robot, self.holdout))
 
     def _rival(self, first: Candidate | None, torques: Mapping[str, Robot]) -> float:
         """Error on validation blocks of the first other candidate that is missing; infinite without one."""
@@ -116,8 +114,7 @@ class SpringTrials:
             return first.validation_error
         try:
             grown = BaseModel.of(torques[first.label], self.base.recordings, self.base)
-            found = refit(grown, self.spans[0], None, first.label)
-            return judged_error(grown, found.robot, found.biases, self.spans[1]).error
+            return refit_and_validate(grown, self.spans, label=first.label).validation.error
         except (JointscopeError, np.linalg.LinAlgError):
             return float("inf")
 

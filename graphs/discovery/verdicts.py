@@ -9,13 +9,13 @@ enters here.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
-from jointscope.graphs.refits.refit import Refit
+from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
 
@@ -26,21 +26,6 @@ HORIZON = 0.1  # [s] predictions of this length that do not overlap count as ind
 SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
 HARM = 3.0  # times the error on a block from which an effect is said to harm there
 SAME = 0.02  # relative difference of errors that decides nothing
-
-
-@dataclass(frozen=True)
-class ValidatedRefit:
-    """A candidate that was refitted.
-
-    Attributes:
-        refit: the fit.
-        validation: its errors on validation blocks.
-        heldout: its error on the held-out recording; NaN without one.
-    """
-
-    refit: Refit
-    validation: ValidationError
-    heldout: float = float("nan")
 
 
 def judge(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
+from jointscope.factors.initial_state import InitialStateFactor
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence, after_step
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import eliminate
@@ -29,11 +30,13 @@ class Smoothed:
         x: smoothed states, shape (m, d).
         process: evidence of the dynamics.
         sensors: evidence of the channels of each sensor that was asked about.
+        evidence: logarithm of the likelihood of the noise, without what all noises of these factors share.
     """
 
     x: Array
     process: NoiseEvidence
     sensors: dict[str, NoiseEvidence]
+    evidence: float
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,8 @@ class LinearSmoother:
             widened: by sensor, factor on the sigma of each channel, shape (c,); evidence is wanted for these sensors.
         """
         parts = list(self._with(noise, widened))
-        elimination = eliminate(accumulate(parts, self.x, self.calibration, with_shared=False))
+        system = accumulate(parts, self.x, self.calibration, with_shared=False)
+        elimination = eliminate(system)
         dx = elimination.states(np.zeros(0))
         posterior = StatePosterior.of(elimination, np.zeros((0, 0)))
         process = NoiseEvidence.empty(self.problem.robot.layout.n_rates)
@@ -78,13 +82,26 @@ class LinearSmoother:
             process.add(part)
             if part.factor.name in sensors:
                 sensors[part.factor.name] += NoiseEvidence.of_rows(part)
-        return Smoothed(self.x + dx, process, sensors)
+        least = system.cost - 0.5 * float(elimination.w @ elimination.w)
+        volume = float(np.sum(np.log(elimination.columns[:, :, 0]))) + self._log_sigmas(noise)
+        return Smoothed(self.x + dx, process, sensors, -least - volume)
+
+    def _log_sigmas(self, noise: ProcessNoise) -> float:
+        """Logarithm of the volume of one sigma of all steps and of the initial state."""
+        dynamics, initial = self.problem.dynamics.with_noise(noise), self.problem.initial.with_lasting(noise.lasting)
+        found = float(np.sum(np.log(dynamics.sigmas)) + np.sum(np.log(initial.sigmas)))
+        if noise.n_lasting:  # a step of what decays is no plain difference
+            decay = dynamics.steps.h / noise.correlation_time
+            found -= noise.n_lasting * float(np.sum(np.log1p(decay / 2.0 + decay**2 / 12.0)))
+        return found
 
     def _with(self, noise: ProcessNoise, widened: Mapping[str, Array]) -> Iterator[Linearized]:
         """The linearised factors with this noise."""
         for factor, ticks, linear in self.parts:
             if isinstance(factor, DynamicsFactor):
                 yield factor.with_noise(noise), ticks, linear
+            elif isinstance(factor, InitialStateFactor):
+                yield factor.with_lasting(noise.lasting), ticks, linear
             elif factor.name in widened:
                 weight = 1.0 / widened[factor.name]
                 by_state = tuple(J * weight[:, None] for J in linear.by_state)

@@ -42,7 +42,7 @@ from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 
-SMALLEST_MEMORY = 1e-3  # density of a memory that is estimated, too
+SMALLEST_LASTING = 1e-3  # [rad/s^2/sqrt(s)] density of torques that last
 CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
 FAR = 5.0  # [sigma times misfit] a Gauss-Newton step beyond this is checked and damped
 LARGEST_UPDATE = 1.6  # one update changes the logarithm of a density by this at the most
@@ -92,32 +92,34 @@ class NoiseEvidence:
         return np.where(told, np.sqrt(self.squares / np.maximum(self.freedom, 1.0)), 1.0)
 
 
-def scaled(noise: ProcessNoise, factors: Array, memories: int = 0) -> ProcessNoise:
-    """Noise with each density multiplied, not below the smallest.
+def scaled(noise: ProcessNoise, factors: Array) -> ProcessNoise:
+    """Noise with each density multiplied, not below the smallest; memories of effects keep theirs.
 
     Args:
         noise: densities.
         factors: by density, shape (r,).
-        memories: how many of the last memories are scaled, too; the others keep their density.
     """
     link, motor, memory = np.split(
         factors, [len(noise.link_velocity), len(noise.link_velocity) + len(noise.motor_velocity)]
     )
-    kept = len(noise.memory) - memories
-    free = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_MEMORY)
+    kept = len(noise.memory) - noise.n_lasting
+    lasting = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_LASTING)
     velocities = np.concatenate([noise.link_velocity * link, noise.motor_velocity * motor])
     links, motors = np.split(np.maximum(velocities, noise.smallest), [len(link)])
     return replace(
         noise,
         link_velocity=links,
         motor_velocity=motors,
-        memory=np.concatenate([noise.memory[:kept], free]),
+        memory=np.concatenate([noise.memory[:kept], lasting]),
     )
 
 
 def not_below(noise: ProcessNoise, smallest: float) -> ProcessNoise:
-    """Noise with the smaller densities raised; those of memories stay."""
-    return scaled(noise, np.maximum(smallest / densities(noise), 1.0))
+    """Noise with the smaller densities of velocities raised."""
+    factors = np.ones(len(densities(noise)))
+    velocities = np.concatenate([noise.link_velocity, noise.motor_velocity])
+    factors[: len(velocities)] = np.maximum(smallest / velocities, 1.0)
+    return scaled(noise, factors)
 
 
 def densities(noise: ProcessNoise) -> Array:
@@ -130,11 +132,9 @@ class FixedPoint:
     """Updates of all densities, each extrapolated from the last two.
 
     Attributes:
-        memories: how many of the last memories are estimated, too.
         before: logarithms of the densities at the last update, and the change that it asked for.
     """
 
-    memories: int = 0
     before: tuple[Array, Array] | None = None
 
     def update(self, noise: ProcessNoise, factors: Array) -> ProcessNoise:
@@ -142,7 +142,7 @@ class FixedPoint:
         now = np.log(densities(noise)), np.log(factors)
         boost = np.ones_like(now[1]) if self.before is None else _aitken(self.before, now)
         self.before = now
-        return scaled(noise, np.exp(np.clip(now[1] * boost, -LARGEST_UPDATE, LARGEST_UPDATE)), self.memories)
+        return scaled(noise, np.exp(np.clip(now[1] * boost, -LARGEST_UPDATE, LARGEST_UPDATE)))
 
 
 def settled(before: ProcessNoise, now: ProcessNoise) -> bool:

@@ -27,6 +27,7 @@ from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_names
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.poses import Poses
 
 Array = NDArray[np.float64]
@@ -220,9 +221,7 @@ def _result(
     own = covariance[index, index]
     sigmas = np.sqrt(np.diag(own)) * first.value_by_coordinate
     found = robot.with_values(dict(zip(first.names, first.values.tolist(), strict=True)))
-    parameters = dict(found.parameters)
-    for name, sigma in zip(first.names, sigmas.tolist(), strict=True):
-        parameters[name] = replace(parameters[name], sigma=sigma)
+    parameters = with_sigmas(found.parameters, dict(zip(first.names, sigmas.tolist(), strict=True)))
     assert robot.poses is not None
     setup = replace(robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale)
     found = replace(found, parameters=parameters, poses=setup)

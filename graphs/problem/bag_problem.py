@@ -27,6 +27,7 @@ from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.lasting_torques import memory_spreads
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -79,7 +80,7 @@ class BagProblem:
         steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
-        spreads = tuple(memory.spread for memory in robot.memories.values())
+        spreads = tuple(memory_spreads(robot).tolist())
         # what only weighs takes the file's matrix: it must not move with its elements while they are estimated
         seen = None if robot.transmission is None else np.asarray(np.linalg.inv(robot.transmission), dtype=np.float64)
         initial = InitialStateFactor(
@@ -100,11 +101,21 @@ class BagProblem:
 
     def with_noise(self, noise: ProcessNoise) -> BagProblem:
         """The same problem with another process noise."""
-        return replace(self, dynamics=self.dynamics.with_noise(noise))
+        placed = self.placed
+        if noise.n_lasting:
+            placed = (replace(placed[0], factor=self.initial.with_lasting(noise.lasting)), *placed[1:])
+        return replace(self, dynamics=self.dynamics.with_noise(noise), placed=placed)
 
     def of_robot(self, robot: Robot) -> BagProblem:
         """The same recording, the same piece, of a robot with other choices, constants or sensors."""
         return replace(BagProblem.of(robot, self.recording), owner=self.owner)
+
+    @property
+    def initial(self) -> InitialStateFactor:
+        """The prior of the first state."""
+        first = self.placed[0].factor
+        assert isinstance(first, InitialStateFactor)
+        return first
 
     @property
     def sensors(self) -> tuple[Placed, ...]:

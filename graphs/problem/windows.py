@@ -19,12 +19,16 @@ FEWEST_SAMPLES = 10  # of every sensor; a window inside a gap is left out
 TOTAL = 6.4  # [s] all windows together
 
 
-def windows_of(recordings: Sequence[Recording]) -> list[tuple[int, Recording]]:
+def windows_of(recordings: Sequence[Recording], total: float = TOTAL) -> list[tuple[int, Recording]]:
     """Windows with the index of their recording; a recording that is short comes whole.
 
     Windows are spread evenly over the time after the first command.
+
+    Args:
+        recordings: all of them.
+        total: length of all windows together [s].
     """
-    wanted = TOTAL / len(recordings)
+    wanted = total / len(recordings)
     pieces: list[tuple[int, Recording]] = []
     for i, recording in enumerate(recordings):
         start = first_command_time(recording)

@@ -79,7 +79,7 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
         miss = (each - G).reshape(R, len(lines), -1)
         total = np.einsum("rla,rlb->lab", miss, miss.conj()) / ((R - 1) * R)
         if R < MANY:
-            total = _smoothed(total)
+            total = over_neighbours(total)
         text = f"the scatter of {R} realisations" + (f", {2 * NEIGHBOURS + 1} lines together" if R < MANY else "")
     else:
         total = _about_neighbours(G)
@@ -119,11 +119,11 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
         by_output = np.einsum("epli,eplj->elij", E[block], E[block].conj()) / ((P - 1) * P)
         part = np.einsum("elij,lea,leb->liajb", by_output, inverse, inverse.conj())
         total += part.reshape(total.shape) / R**2
-    return _smoothed(total)
+    return over_neighbours(total)
 
 
-def _smoothed(covariance: Complex) -> Complex:
-    """Mean over neighbouring lines, fewer at the ends."""
+def over_neighbours(covariance: Complex) -> Complex:
+    """Mean of each line, shape (l, ...), and its neighbours, fewer at the ends."""
     n = len(covariance)
     sums = np.concatenate([np.zeros_like(covariance[:1]), np.cumsum(covariance, axis=0)])
     low, high = np.maximum(np.arange(n) - NEIGHBOURS, 0), np.minimum(np.arange(n) + NEIGHBOURS + 1, n)

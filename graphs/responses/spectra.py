@@ -8,17 +8,18 @@ excitation (gravity, a motion that carries it, even distortion) is not in it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.signals import Excitation, Experiment, Signal, Signals, whole_periods
+from jointscope.robots.recordings.signals import Excitation, Signal, Signals, whole_periods
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Change = Callable[[Array], Array]
 CLIPPED = 2e-3  # share of samples that stay at exactly the largest or smallest value, as no signal within its limits
 EXCITED = 3.0  # times what is between the lines, or what changes from period to period
 
@@ -73,22 +74,8 @@ def spectra(signals: Signals, excitation: Excitation) -> Spectra:
     """
     _check_clipping(signals)
     _check_rates(signals, excitation)
-    steady = min(e.periods - e.transient for e in excitation.experiments)
-    pairs: dict[tuple[int, int], dict[int, tuple[Complex, Complex]]] = {}
-    for experiment in excitation.experiments:
-        found = tuple(
-            _periods(s, excitation, experiment, steady, signals.path) for s in (signals.inputs, signals.outputs)
-        )
-        pairs.setdefault((experiment.realisation, experiment.number), {})[experiment.sign] = (found[0], found[1])
-    lonely = [key for key, pair in pairs.items() if len(pair) == 1]
-    if lonely and len(lonely) < len(pairs):
-        raise RecordingError(
-            f"{signals.path}: experiment {lonely[0][1]} of realisation {lonely[0][0]} has one sign, others have both; "
-            "leave it out, or record the other sign"
-        )
-    keys = sorted(pairs)
-    U, Y = (_differences([pairs[key] for key in keys], i) for i in (0, 1))
-    common = None if lonely else np.array([(pairs[key][1][1] + pairs[key][-1][1]) / 2 for key in keys])
+    _check_pairs(signals, excitation)
+    (U, _), (Y, common) = (steady_spectra(s, excitation, signals.path) for s in (signals.inputs, signals.outputs))
     K = min(U.shape[2], Y.shape[2])
     made = Spectra(
         signals.path,
@@ -98,30 +85,59 @@ def spectra(signals: Signals, excitation: Excitation) -> Spectra:
         U[:, :, :K],
         Y[:, :, :K],
         None if common is None else common[:, :, :K],
-        np.array([key[0] for key in keys], dtype=np.intp),
+        np.array([key[0] for key in _keys(excitation)], dtype=np.intp),
     )
     _check_excited(made)
     return made
 
 
-def _differences(pairs: Sequence[dict[int, tuple[Complex, Complex]]], i: int) -> Complex:
-    """Half the difference of both signs, or the one that is there, seen with a positive sign."""
-    each = [
-        (pair[1][i] - pair[-1][i]) / 2 if len(pair) == 2 else sign * both[i]
-        for pair in pairs
-        for sign, both in [next(iter(pair.items()))]
-    ]
-    return np.array(each)
+def steady_spectra(
+    signal: Signal, excitation: Excitation, path: str, change: Change | None = None
+) -> tuple[Complex, Complex | None]:
+    """Spectra of a signal's steady periods, both signs subtracted, shape (e, p, K, c), and half their sum.
 
+    Args:
+        signal: the samples.
+        excitation: how it was excited; experiments have one sign, or all of them both.
+        path: of the recording.
+        change: made to the samples, period by period, shape (p, N, c), before their spectra are taken; it may return
+            other channels, and more samples of the same time.
 
-def _periods(signal: Signal, excitation: Excitation, experiment: Experiment, steady: int, path: str) -> Complex:
-    """Spectra of the last steady periods of an experiment, shape (p, K, c), phases as of its start."""
+    Raises:
+        RecordingError: an experiment is not in it, or periods are not whole.
+    """
     N = whole_periods(excitation.f0, signal.step, path)
-    begin = experiment.start + (experiment.periods - steady) / excitation.f0
-    x, first = signal.even(begin, steady * N, path)
-    X = np.fft.rfft(x.reshape(steady, N, -1), axis=1) / N
-    late = np.exp(-2j * np.pi * excitation.f0 * np.arange(X.shape[1]) * (first - begin))
-    return np.asarray(X * late[None, :, None])
+    steady = min(e.periods - e.transient for e in excitation.experiments)
+    found: dict[tuple[int, int], dict[int, Complex]] = {key: {} for key in _keys(excitation)}
+    for e in excitation.experiments:
+        begin = e.start + (e.periods - steady) / excitation.f0
+        x, first = signal.even(begin, steady * N, path)
+        x = x.reshape(steady, N, -1)
+        x = x if change is None else change(x)
+        X = np.fft.rfft(x, axis=1) / x.shape[1]
+        late = np.exp(-2j * np.pi * excitation.f0 * np.arange(X.shape[1]) * (first - begin))  # phases as of its start
+        found[e.realisation, e.number][e.sign] = X * late[None, :, None]
+    pairs = list(found.values())
+    if len(pairs[0]) == 1:
+        return np.array([sign * X for pair in pairs for sign, X in pair.items()]), None
+    return np.array([(p[1] - p[-1]) / 2 for p in pairs]), np.array([(p[1] + p[-1]) / 2 for p in pairs])
+
+
+def _keys(excitation: Excitation) -> list[tuple[int, int]]:
+    """Realisation and number of all experiments, pairs once."""
+    return sorted({(e.realisation, e.number) for e in excitation.experiments})
+
+
+def _check_pairs(signals: Signals, excitation: Excitation) -> None:
+    signs = {
+        key: {e.sign for e in excitation.experiments if (e.realisation, e.number) == key} for key in _keys(excitation)
+    }
+    lonely = [key for key, both in signs.items() if len(both) == 1]
+    if lonely and len(lonely) < len(signs):
+        raise RecordingError(
+            f"{signals.path}: experiment {lonely[0][1]} of realisation {lonely[0][0]} has one sign, others have both; "
+            "leave it out, or record the other sign"
+        )
 
 
 def _check_rates(signals: Signals, excitation: Excitation) -> None:

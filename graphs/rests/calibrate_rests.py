@@ -27,6 +27,7 @@ from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.rests import Rests
 
 Array = NDArray[np.float64]
@@ -121,9 +122,7 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
     told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
     known = {p.name for p in told}
     found = robot.with_values({p.name: p.value for p in told})
-    parameters = {n: replace(p, sigma=next(t.sigma for t in told if t.name == n)) if n in known else p
-                  for n, p in found.parameters.items()}  # fmt: skip
-    found = replace(found, parameters=parameters)
+    found = replace(found, parameters=with_sigmas(found.parameters, {p.name: p.sigma for p in told}))
     derived = [
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known

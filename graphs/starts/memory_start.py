@@ -28,6 +28,6 @@ def with_filled_memories(problems: Sequence[BagProblem], start: Estimate, hold: 
     Raises:
         SolveError: no states fit the parameters.
     """
-    if not problems[0].robot.layout.memories:
+    if not problems[0].robot.memories:
         return start
     return solve(problems, start, max_iterations=ITERATIONS, hold=(DYNAMICS, *hold)).estimate

@@ -29,6 +29,7 @@ from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
 from jointscope.robots.dynamics.transmission import Transmission, parted
 from jointscope.robots.model.joint_parameters import JointParameters
+from jointscope.robots.model.lasting_torques import LastingTorques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import StructuredTree
 
@@ -54,6 +55,7 @@ class ElasticJoints:
         self.names = parameters.names
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)
         self._bearings = BearingSprings(robot.effects, layout, self.names)
+        self._lasting = LastingTorques(robot, parameters)
         self._transmission = Transmission.of(robot, self.names)
         weight = CarriedWeight(robot, self.names)
         self._behind, self._effects = (
@@ -265,5 +267,6 @@ class ElasticJoints:
             self._transmission.carry(terms, x, values)
         self._motors.add(terms, x, values, sharpness)
         self._bearings.add(terms, x, values)
+        self._lasting.add(x, values, terms.value, terms.by_state, terms.by_parameter)
         self._effects.add(terms, x, springs, values, outside, sharpness)
         return terms

@@ -26,6 +26,7 @@ from jointscope.robots.dynamics.transmission import Transmission, is_behind
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.model.joint_parameters import JointParameters
+from jointscope.robots.model.lasting_torques import LastingTorques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import StructuredTree
 
@@ -178,6 +179,7 @@ def linear_torques(
         transmission.carry(terms, x, values)
     motors.add(terms, x, without_friction)
     BearingSprings(robot.effects, robot.layout, parameters.names).add(terms, x, values)
+    LastingTorques(robot, parameters).add(x, values, terms.value, terms.by_state, terms.by_parameter)
     assert terms.by_state is not None
     return terms.by_state[0]
 

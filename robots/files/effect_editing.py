@@ -15,7 +15,7 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
-from jointscope.robots.files.noise_section import HINGE_DENSITY, smallest_densities
+from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
@@ -156,14 +156,19 @@ def carried_noise(old: Robot, new: Robot) -> ProcessNoise:
     before, after, noise = old.layout, new.layout, old.noise
     link = dict(zip(before.links, noise.link_velocity, strict=True))
     motor = dict(zip(before.motors, noise.motor_velocity, strict=True))
-    memory = dict(zip(before.memories, noise.memory, strict=True))
-    return replace(
-        noise,
+    memory = dict(zip(old.memories, noise.white.memory, strict=True))
+    white = replace(
+        noise.white,
         link_velocity=np.array([link.get(name, HINGE_DENSITY) for name in after.links]),
         motor_velocity=np.array([motor.get(name, link.get(name, HINGE_DENSITY)) for name in after.motors]),
         memory=np.array([memory.get(label, m.noise) for label, m in new.memories.items()]),
         smallest=smallest_densities(new),
     )
+    if not noise.n_lasting:
+        return white
+    lasting = dict(zip(before.rate_names, noise.lasting, strict=False))
+    sizes = [lasting.get(name, HINGE_LASTING) for name in after.rate_names[: after.n_link + after.n_motor]]
+    return white.with_lasting(noise.correlation_time, np.array(sizes))
 
 
 def _entry(parameter: Parameter) -> CommentedMap:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.model.lasting_torques import equation_inertias
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.yaml_section import Section
@@ -15,6 +16,7 @@ Array = NDArray[np.float64]
 
 SMALLEST_TURNING, SMALLEST_SLIDING = 1e-3, 1e-5  # [rad/s/sqrt(s)], [m/s/sqrt(s)]
 HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
+HINGE_LASTING = 0.1  # [rad/s^2] standard deviation of what lasts there
 
 
 def process_noise(section: Section, robot: Robot) -> ProcessNoise:
@@ -43,7 +45,7 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
     motor = dict(zip(layout.joints, joints["motor_velocity"], strict=True))
     memory = [own.number(label, m.noise, positive=True) for label, m in robot.memories.items()]
     own.finish()
-    return ProcessNoise(
+    white = ProcessNoise(
         estimate=section.flag("estimate", True),
         model=model,
         link_velocity=np.array([link[name] for name in layout.links]),
@@ -52,6 +54,20 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
         memory=np.array(memory),
         smallest=smallest_densities(robot),
     )
+    return _with_lasting(white, section, robot)
+
+
+def _with_lasting(white: ProcessNoise, section: Section, robot: Robot) -> ProcessNoise:
+    """With the torques that last, where the file names any."""
+    if "lasting_torques" not in section:
+        return white
+    lasting = section.section("lasting_torques")
+    time = lasting.number("correlation_time", positive=True)
+    layout = robot.layout
+    names = layout.rate_names[: layout.n_link + layout.n_motor]
+    torques = np.array([lasting.number(name, positive=True) for name in names])
+    lasting.finish()
+    return white.with_lasting(time, torques / equation_inertias(robot))
 
 
 def smallest_densities(robot: Robot) -> Array:

@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.sensor_sections import topic
+from jointscope.robots.files.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_chain import ArmChain
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters, pose_units
-from jointscope.robots.geometry.pose_effects import effect_units
+from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.yaml_section import Section, did_you_mean
@@ -56,8 +53,8 @@ def pose_setup(section: Section, joints: tuple[str, ...]) -> PoseSetup:
         at=section.array("at", (3,), np.zeros(3)),
         tracker_link=section.text("tracker", None),
         tracker=section.array("tracker_pose", (4, 4), None),
-        joint_states=_topic(section, "joint_states", JOINT_STATES, joints),
-        positions=_topic(section, "positions", POSITIONS, ()),
+        joint_states=topic_or_usual(section, "joint_states", JOINT_STATES, joints),
+        positions=topic_or_usual(section, "positions", POSITIONS, ()),
         target_sigma=section.number("sigma", TARGET_SIGMA, positive=True),
         joint_sigmas=repeatability,
         estimate_sigma=section.flag("estimate_repeatability", True),
@@ -93,30 +90,9 @@ def with_poses(robot: Robot, setup: PoseSetup) -> Robot:
     return replace(robot, poses=setup, parameters={**errors, **robot.parameters})
 
 
-def check_pose_parameters(robot: Robot, parameters: Mapping[str, Parameter]) -> None:
-    """Complains about parameters of a robot of poses alone that are none.
-
-    Raises:
-        RobotError: unknown, or in another unit.
-    """
-    assert robot.poses is not None
-    units, place = pose_units(robot.joints) | effect_units(robot.joints), robot.path.name
-    for name, parameter in parameters.items():
-        if name not in units:
-            raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")
-        if parameter.unit != units[name]:
-            raise RobotError(f"{place}: parameters.{name}.unit: expected {units[name]!r}, got {parameter.unit!r}")
-
-
 def write_tracker(section: Any, setup: PoseSetup) -> None:
     """Writes where the tracker was found to stand, where no link of the URDF says it, and how well the arm repeats."""
     if setup.tracker is not None and setup.tracker_link is None:
         section["tracker_pose"] = [[float(f"{v:.10g}") for v in row] for row in setup.tracker.tolist()]
     if setup.estimate_sigma:
         section["repeatability"] = [float(f"{v:.4g}") for v in setup.joint_sigmas.tolist()]
-
-
-def _topic(section: Section, key: str, usual: Topic, joints: tuple[str, ...]) -> Topic:
-    if key not in section:
-        return replace(usual, names=joints)
-    return topic(section.section(key), joints, scaled=bool(joints))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.files.frequency_section import check_frequency, frequency_units
 from jointscope.robots.files.needed_spring import needed_spring
 from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.geometry.error_parameters import pose_units
@@ -24,6 +25,7 @@ def check_robot(robot: Robot) -> None:
         RobotError: a sensor on no link, no encoder, a parameter that is missing, unknown or in another unit.
     """
     place = robot.path.name
+    check_frequency(robot)
     for gyro in robot.gyros:
         if gyro.body not in robot.tree.bodies:
             raise RobotError(
@@ -201,7 +203,8 @@ def _check_parameters(robot: Robot, place: str) -> None:
             name: unit for pair in robot.torque_sensor.parameters for name, unit in zip(pair, ("1", "N m"), strict=True)
         }
     of_poses = {} if robot.poses is None else effect_units(robot.joints) | pose_units(robot.joints)
-    units = of_poses | units
+    of_frequency = {} if robot.frequency is None else frequency_units(robot.joints)
+    units = of_poses | of_frequency | units
     for name, parameter in robot.parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")

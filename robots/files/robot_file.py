@@ -22,8 +22,9 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.files.derived_section import derived_results
 from jointscope.robots.files.effect_catalogue import parse_effect
+from jointscope.robots.files.frequency_section import check_still_parameters, frequency_setup
 from jointscope.robots.files.noise_section import process_noise
-from jointscope.robots.files.pose_section import check_pose_parameters, pose_setup, with_poses
+from jointscope.robots.files.pose_section import pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
 from jointscope.robots.files.transmission_section import transmission_matrix
@@ -79,7 +80,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         raise RobotError(f"{path.name}: joints: expected different names, got {', '.join(joints) or 'none'}")
     choices = top.section("model", {}).build(lambda s: _model_choices(s, joints))
     gravity = top.array("gravity", (3,))
-    motion = "poses" not in top or "command" in top or "sensors" in top
+    motion = not {"poses", "frequency"} & set(top.keys()) or "command" in top or "sensors" in top
     urdf, masses = _urdf_path(top.text("urdf"), path), motion and choices.link_dynamics == "model"
     locked = top.section("locked", {}).build(_locked)
     try:
@@ -90,6 +91,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         raise
     constants = top.section("constants", {}).build(_constants)
     poses = top.section("poses").build(lambda s: pose_setup(s, joints)) if "poses" in top else None
+    shaken = top.section("frequency").build(lambda s: frequency_setup(s, joints)) if "frequency" in top else None
     command = top.section("command").build(lambda s: _command(s, joints)) if motion else NO_COMMAND
     sensors = {name: s.build(sensor(name, joints)) for name, s in top.section("sensors", *_none(motion)).sections()}
     parameters = {name: s.build(_parameter(name)) for name, s in top.section("parameters", *_none(motion)).sections()}
@@ -114,6 +116,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         controller=controller,
         transmission=matrix,
         motion=motion,
+        frequency=shaken,
     )
     if poses is not None:
         robot = with_poses(robot, poses)
@@ -123,10 +126,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
     top.finish()
-    if motion:
-        check_robot(robot)
-    else:
-        check_pose_parameters(robot, parameters)
+    check_robot(robot) if motion else check_still_parameters(robot, parameters)
     return robot
 
 

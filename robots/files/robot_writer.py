@@ -14,6 +14,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from jointscope.robots.files.pose_section import write_tracker
 from jointscope.robots.files.robot_file import dump_document, urdf_reference
 from jointscope.robots.files.transmission_section import write_transmission
+from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 
@@ -118,9 +119,15 @@ def _write_noise(section: Any, robot: Robot) -> None:
     before = dict(zip(layout.joints, section["motor_velocity"], strict=True))
     section["motor_velocity"] = _row(np.array([motors.get(joint, before[joint]) for joint in layout.joints]), 4)
     own = {name: v for name, v in zip(layout.links, noise.link_velocity, strict=True) if name not in layout.joints}
-    own |= dict(zip(layout.memories, noise.memory, strict=True))
+    own |= dict(zip(robot.memories, noise.white.memory, strict=True))
     if own:
         section["effects"] = _flow({name: _rounded(value, 4) for name, value in own.items()})
+    section.pop("lasting_torques", None)
+    if noise.n_lasting:
+        section["lasting_torques"] = _flow(
+            {"correlation_time": noise.correlation_time}
+            | {name: _rounded(torque, 4) for name, torque in lasting_torques(robot).items()}
+        )
 
 
 def _rounded(value: float, digits: int = 9) -> float:

@@ -55,6 +55,13 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     return Topic(*place, unit, names, scale, wraps or 0.0, each, _stamped_by(section, joints))
 
 
+def topic_or_usual(section: Section, key: str, usual: Topic, joints: tuple[str, ...]) -> Topic:
+    """A topic of a section, or the usual one where the section names none; arguments and errors as of `topic`."""
+    if key not in section:
+        return replace(usual, names=joints)
+    return topic(section.section(key), joints, scaled=bool(joints))
+
+
 def _stamped_by(section: Section, joints: tuple[str, ...]) -> tuple[str, ...]:
     """The sensor with the stamps of each joint; empty where the message has those of all."""
     sensors = section.texts("stamped_by", ()) if joints else ()

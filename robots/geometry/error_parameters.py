@@ -21,6 +21,8 @@ RIPPLE = ("gear_ripple.cos", "gear_ripple.sin", "gear_ripple.order")  # of a gea
 STIFFNESS = "stiffness"  # of a drive
 CUBIC = "spring_cubic.stiffness"  # of a drive that hardens
 BEARING = ("bearing.stiffness_x", "bearing.stiffness_y")
+DAMPING = "damping"  # of a drive
+TILT_DAMPING = ("bearing.damping_x", "bearing.damping_y")
 PAYLOAD = "robot.payload.mass"  # a point at the target, which the URDF does not know
 LINK_MASS = "link_mass.mass"  # what the link behind a joint weighs more than in the URDF, at its centre of mass
 

@@ -23,6 +23,7 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 from jointscope.robots.parts.derived import Derived
+from jointscope.robots.parts.frequency_setup import FrequencySetup
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
@@ -58,6 +59,7 @@ class Robot:
         document: the file's content with comments, for writing it again.
         transmission: joint angles per motor angle, q_joint = T q_motor, shape (n, n); None for the identity.
         poses: what is measured of the arm at rest; None where nothing is.
+        frequency: what is shaken for frequency responses; None where nothing is.
         motion: whether the file describes drives and sensors, too, so that recordings of motion can be used.
         derived: results in other words and units, which follow from the parameters.
         held_at_mean: joints in `locked` that move in recordings, and are held on the user's word.
@@ -82,6 +84,7 @@ class Robot:
     held_at_mean: tuple[str, ...] = ()
     transmission: Array | None = None
     poses: PoseSetup | None = None
+    frequency: FrequencySetup | None = None
     motion: bool = True
     derived: tuple[Derived, ...] = ()
 
@@ -123,11 +126,12 @@ class Robot:
             )
 
     def need_motion(self) -> None:
-        """Raises RobotError for a robot file that describes poses alone, without drives and sensors."""
+        """Raises RobotError for a robot file without drives and sensors."""
         if not self.motion:
+            kinds = [kind for kind in ("poses", "frequency") if getattr(self, kind) is not None]
             raise RobotError(
-                f"{self.path.name} has no `command` and no `sensors`: it describes poses; give them with --poses, or "
-                "add both sections for recordings of motion"
+                f"{self.path.name} has no `command` and no `sensors`: it describes {' and '.join(kinds)}; give them "
+                f"with --{' or --'.join(kinds)}, or add both sections for recordings of motion"
             )
 
     @property
@@ -170,7 +174,9 @@ class Robot:
         elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
         links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
         motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
-        return StateLayout(self.joints, tuple(links), tuple(motors), tuple(self.memories))
+        equations = [f"{name}.link" for name in links] + [f"{name}.motor" for name in motors]
+        lasting = [f"{name}_torque" for name in equations[: self.noise.n_lasting]]
+        return StateLayout(self.joints, tuple(links), tuple(motors), (*self.memories, *lasting))
 
     @cached_property
     def kinematic_tree(self) -> RigidTree:
@@ -191,7 +197,7 @@ class Robot:
 
     @property
     def memories(self) -> dict[str, Memory]:
-        """States that effects bring along, by the label of the effect, in the order of the layout."""
+        """States that effects bring along, by the label of the effect, the first memories of the layout."""
         laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
         return {label: law.memory for label, law in laws if law.memory is not None}
 
@@ -240,8 +246,7 @@ class Robot:
     def friction_sharpness(self, values: Mapping[str, float] | None = None) -> Array:
         """Sharpness k in tanh(k v) of the dry friction of every joint, shape (n,) [s/rad, of joints that slide s/m].
 
-        Args:
-            values: parameters by full name that count before the robot's own.
+        Parameters in `values`, by full name, count before the robot's own.
         """
         return np.array([self.sharpness_of(joint, values) for joint in self.joints])
 
@@ -274,8 +279,7 @@ class Robot:
     def in_posture(self, positions: Mapping[str, float]) -> Robot:
         """The same robot with other joints held as in a recording, beside or instead of where its file locks them.
 
-        Args:
-            positions: of joints of the URDF [rad] or [m]; others than those that matter are left out.
+        Positions are those of joints of the URDF [rad] or [m]; others than those that matter are left out.
         """
         filed = self.as_filed or self.tree
         held = filed.locked | filed.posture(positions)

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -48,3 +49,8 @@ class Parameter:
     def coordinate_sigma(self) -> float:
         """Prior sigma of what is estimated: relative where that is the logarithm."""
         return self.prior_sigma / self.prior if self.positive else self.prior_sigma
+
+
+def with_sigmas(parameters: Mapping[str, Parameter], sigmas: Mapping[str, float]) -> dict[str, Parameter]:
+    """The same parameters, some with the standard deviation that was found, by name."""
+    return {name: replace(p, sigma=sigmas[name]) if name in sigmas else p for name, p in parameters.items()}

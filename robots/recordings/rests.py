@@ -130,7 +130,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         )
     if not found:
         raise RecordingError(_why_none(recording, standing, stretches, swinging))
-    share = standing_share(recording, robot)
+    share = _share(standing, stream.times)
     if len(found) < FEWEST and share < OFTEN:
         raise RecordingError(
             f"{recording.path}: the motors stand {100 * share:.0f} % of the time only; expected rests; a recording of "
@@ -151,8 +151,11 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
 
 def standing_share(recording: Recording, robot: Robot) -> float:
     """Part of a recording in which all motors stand."""
-    times = recording.streams[robot.motor_encoder.name].times
-    return float(sum(t1 - t0 for t0, t1 in _standing(recording, robot))) / max(float(np.ptp(times)), 1e-9)
+    return _share(_standing(recording, robot), recording.streams[robot.motor_encoder.name].times)
+
+
+def _share(stretches: Sequence[tuple[float, float]], times: Array) -> float:
+    return float(sum(t1 - t0 for t0, t1 in stretches)) / max(float(np.ptp(times)), 1e-9)
 
 
 def _standing(recording: Recording, robot: Robot) -> list[tuple[float, float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class Signal:
     values: Array
     names: tuple[str, ...]
 
-    @property
+    @cached_property
     def step(self) -> float:
         """Between two samples [s]."""
         return float(np.median(np.diff(self.times)))

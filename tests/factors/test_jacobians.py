@@ -95,6 +95,9 @@ def _robots_with_effects():
         owner = effect.owners_of(robot)[-1]
         yield f"{effect.id}@{owner}", add_effect(robot, f"{effect.id}@{owner}", dict(effect.example))
     yield "rigid joint", base["joint_elasticity"]
+    for label, robot in (("torques that last", ROBOT), ("lasting torques, rigid joint", base["joint_elasticity"])):
+        sigma = np.ones(robot.layout.n_link + robot.layout.n_motor)
+        yield label, replace(robot, noise=robot.noise.with_lasting(0.02, sigma))
 
 
 def _factors_with_effects():

@@ -12,7 +12,7 @@ from jointscope.graphs.fixed_lag import EstimatedState, FixedLagEstimator
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 
-DISTURBANCE = 0.3  # [N m sqrt(s)] of every link and motor, at 1 kHz
+DISTURBANCE = 0.3  # [N m] of every link and motor, at 1 kHz
 ORDER = ("command", "motor_encoder", "imu1", "imu2")
 Message = tuple[str, float, np.ndarray]
 
@@ -48,20 +48,22 @@ class Run:
 
     def error(self, state: EstimatedState) -> np.ndarray:
         """Estimated minus true, in standard deviations, shape (12,)."""
-        return (state.mean - self.truth(state.time)) / state.sigma
+        return (state.mean[:12] - self.truth(state.time)) / state.sigma[:12]
 
     def nees(self, state: EstimatedState) -> float:
         """Normalised error squared per degree of freedom."""
-        e = state.mean - self.truth(state.time)
-        return float(e @ np.linalg.solve(state.covariance, e)) / len(e)
+        e = state.mean[:12] - self.truth(state.time)
+        return float(e @ np.linalg.solve(state.covariance[:12, :12], e)) / len(e)
 
 
-def simulated_run(motion: str = "moves", seconds: float = 2.5, seed: int = 5, **options: float) -> Run:
-    """A recording with white disturbances, and the robot as it was."""
+def simulated_run(
+    motion: str = "moves", seconds: float = 2.5, seed: int = 5, memory: float = 0.0, **options: float
+) -> Run:
+    """A recording with disturbances, white or with a memory [s], and the robot as it was."""
     from jointscope.tools.simulator import Disturbance, simulate
 
     robot = load_robot("doggy")
-    disturbance = Disturbance(link=DISTURBANCE, motor=DISTURBANCE)
+    disturbance = Disturbance(link=DISTURBANCE, motor=DISTURBANCE, correlation_time=memory)
     sim = simulate(robot, motion, seconds, seed, friction="smooth", disturbance=disturbance, **options)
     true = sim.truth["parameters"]
     robot = robot.with_values({name: float(value) for name, value in true.items() if name in robot.parameters})
@@ -75,6 +77,9 @@ def simulated_run(motion: str = "moves", seconds: float = 2.5, seed: int = 5, **
     noise = replace(
         robot.noise, link_velocity=per_root_second / alone, motor_velocity=per_root_second / inertia, estimate=False
     )
+    if memory:
+        noise = replace(noise, link_velocity=np.full(3, 3e-3), motor_velocity=np.full(3, 3e-3))
+        noise = noise.with_lasting(memory, DISTURBANCE / np.concatenate([alone, inertia]))
     return Run(replace(robot, noise=noise), sim.recording, sim.states)
 
 

@@ -45,6 +45,12 @@ def coupled(robot):
     return replace(robot, transmission=T, parameters={**robot.parameters, **elements})
 
 
+def lasting(robot):
+    """The robot with random torques that last, of another size in each equation."""
+    equations = robot.layout.n_link + robot.layout.n_motor
+    return replace(robot, noise=robot.noise.with_lasting(0.02, np.linspace(0.5, 2.0, equations)))
+
+
 def _known_drives(robot):
     known = replace(robot.parameters["motor.k_pwm"], fixed=True)
     return replace(robot, parameters={**robot.parameters, known.name: known})
@@ -62,6 +68,9 @@ def _every():
     yield "without Coriolis terms", _without_coriolis(READY)
     yield "joint 2 rigid", _rigid(READY, "joint2")
     yield "all joints rigid", _rigid(READY, *READY.joints)
+    yield "torques that last", lasting(READY)
+    yield "torques that last, joint 2 rigid", lasting(_rigid(READY, "joint2"))
+    yield "torques that last and hysteresis", lasting(_with(catalogue()["hysteresis"], READY))
     bases = {
         "coriolis": _without_coriolis(READY),
         "joint_elasticity": _rigid(READY, "joint3"),

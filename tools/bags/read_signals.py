@@ -15,7 +15,7 @@ import numpy as np
 
 from jointscope.graphs.responses.find_excitation import find_excitation
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.excitation_file import excitation_beside, read_excitation
+from jointscope.robots.recordings.excitation_file import excitation_beside, read_excitation
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.fitting_messages import read_columns
@@ -25,20 +25,21 @@ from jointscope.tools.bags.messages.open_bag import Bag, RawTopic, bag_sha256, o
 INPUT, OUTPUT, COMMAND = "/joint_states:effort", "/joint_states:position", "/motor_command:effort"
 
 
-def read_signals(path: Path, source: str = "", target: str = "") -> tuple[Signals, Signal]:
+def read_signals(path: Path, source: str = "", target: str = "", led: bool = False) -> tuple[Signals, Signal]:
     """The signals of a bag, and the one that drives them: the command where there is one and nothing was named.
 
     Args:
         path: a bag.
         source: what goes in.
         target: what comes out.
+        led: whether the command drives although signals are named.
 
     Raises:
         RecordingError: the bag cannot be read, or has no such signal.
     """
     with open_bag(path) as bag:
         specs = [source or INPUT, target or OUTPUT]
-        led = not source and not target and COMMAND.partition(":")[0] in bag.topics
+        led = (led or not source + target) and COMMAND.partition(":")[0] in bag.topics
         specs += [COMMAND] if led else []
         topics = list(dict.fromkeys(spec.partition(":")[0] for spec in specs))
         absent = next((topic for topic in topics if topic not in bag.topics), None)

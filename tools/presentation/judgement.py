@@ -138,21 +138,21 @@ def _colour_level(correlation: float, chi2: float) -> str:
 
 def _even(result: CalibrationResult) -> Check:
     """The worst window in practical size: with many samples every deviation is significant, few matter."""
-    noise, velocities = result.noise, result.robot.layout.velocities
-    density = np.concatenate([noise.link_velocity, noise.motor_velocity])
+    layout, drift = result.robot.layout, result.noise.drift(DRIFT)
+    k, lasting = len(drift), layout.n_rates - len(drift) if result.noise.n_lasting else 0
     worst, where, when = 0.0, "", 0.0
     for bag in result.bags:
-        edges, rms = strength(bag.ticks[:-1], (bag.process / bag.process_sigma)[:, : len(density)])
-        size = np.sqrt(np.mean(bag.states[:, velocities] ** 2, axis=0))
-        share = rms * density * np.sqrt(DRIFT) / np.where(size > 0, size, np.inf)
-        k, i = np.unravel_index(int(np.nanargmax(share)), share.shape)
-        if share[k, i] > worst:
-            worst, where, when = float(share[k, i]), equation_names(result)[i], float(edges[k])
-    level = _level(worst, UNEXPLAINED)
+        edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
+        rms = np.maximum(rms[:, :k], rms[:, lasting : lasting + k])  # what is missing shows in either
+        size = np.sqrt(np.mean(bag.states[:, layout.velocities] ** 2, axis=0))
+        share = rms * drift / np.where(size > 0, size, np.inf)
+        at, i = np.unravel_index(int(np.nanargmax(share)), share.shape)
+        if share[at, i] > worst:
+            worst, where, when = float(share[at, i]), equation_names(result)[i], float(edges[at])
+    tail = "." if (level := _level(worst, UNEXPLAINED)) == "good" else ": an effect may be missing that acts there."
     text = (
         f"At its worst ({where} equation, around {when:.1f} s) the dynamics leave {significant(100 * worst, 2)} % of "
-        f"the velocity open after {DRIFT:g} s"
-        + ("." if level == "good" else ": an effect may be missing that acts there.")
+        f"the velocity open after {DRIFT:g} s{tail}"
     )
     return Check(level, "Dynamics hold throughout", text)
 

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frequency responses on one screen: entries with their noise and distortion, resonances with sigmas."""
+"""Frequency responses, and an arm calibrated from them, on one screen."""
 
 from __future__ import annotations
 
+from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
+from jointscope.tools.presentation.frequency_sentences import (
+    identifiable_sentence,
+    matrix_sentence,
+    one_realisation,
+    value_rows,
+)
 from jointscope.tools.presentation.numbers import percent, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
@@ -53,3 +60,19 @@ def resonance_rows(found: MeasuredResponse) -> list[list[str]]:
             [kind, *names, *with_sigma(r.frequency, r.frequency_sigma), *with_sigma(r.damping, r.damping_sigma)]
         )
     return rows
+
+
+def frequency_calibration_text(result: FrequencyCalibration) -> str:
+    """The summary of a calibration."""
+    paths = ", ".join(problem.pose.path for problem in result.problems)
+    lines = [
+        f"{result.robot.name} from {paths}: {len(result.problems)} poses, calibrated in {result.wall_seconds:.1f} s, "
+        f"{result.iterations} iterations in {result.stages} stages",
+        "",
+        f"  - {matrix_sentence(result)}",
+        f"  - {identifiable_sentence(result)}",
+        *(f"  - {sentence}" for sentence in one_realisation(result)),
+        "",
+        text_table(["parameter", "start", "value", "± sigma", "unit", ""], value_rows(result), "<>>><<"),
+    ]
+    return "\n".join(lines)

@@ -63,10 +63,10 @@ def verdict(result: RestCalibration) -> str:
     error = result.errors.error
     if error > DOUBTFUL:
         return "No, do not rely on this yet: links do not rest where the model says."
-    owner, values = max(Counter(p.name.split(".")[0] for p in result.parameters).items(), key=lambda item: item[1])
-    if result.count <= values:
-        rests = counted(result.count, "rest")
-        return f"No, do not rely on this yet: {rests} for {values} values of {owner}; nothing could contradict them."
+    for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
+        if result.count <= values:
+            few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
+            return f"No, do not rely on this yet: {few}; nothing could contradict them."
     values_of = result.robot.parameters
     told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
     loose = [p for p in told if p.sigma > LOOSE * p.value]

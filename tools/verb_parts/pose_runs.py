@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_report
-from jointscope.tools.writing.whole_file import whole_file, write_json
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
+from jointscope.tools.writing.whole_file import write_json
 
 
 def add_poses_option(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +44,11 @@ def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
 
 
 def check_one_kind(
-    bags: Sequence[Path], poses: Sequence[Path], rests: Sequence[Path] | None, options: Mapping[str, bool]
+    bags: Sequence[Path],
+    poses: Sequence[Path],
+    rests: Sequence[Path] | None,
+    options: Mapping[str, bool],
+    frequency: Sequence[Path] | None = None,
 ) -> None:
     """Kinds of recordings that go together, and no option of another.
 
@@ -53,14 +57,21 @@ def check_one_kind(
         poses: as given.
         rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
+        frequency: as given; None of a verb that takes none.
 
     Raises:
         RecordingError: none, kinds that do not go together, or such an option without motion.
     """
-    if not bags and not poses and not rests:
+    if not bags and not poses and not rests and not frequency:
         other = "" if rests is None else ", or --rests BAG"
+        other += "" if frequency is None else ", or --frequency BAG"
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
+        )
+    if frequency and (bags or poses or rests):
+        raise RecordingError(
+            "frequency responses and other kinds in one estimate are not on the command line yet; give --frequency "
+            "alone, and the robot file that it writes as ROBOT with the others"
         )
     if poses and rests:
         raise RecordingError(
@@ -77,7 +88,7 @@ def check_one_kind(
         )
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
-        other = "--poses" if poses else "--rests"
+        other = "--poses" if poses else "--frequency" if frequency else "--rests"
         raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
 
 
@@ -105,19 +116,13 @@ def run_pose_calibration(
     result = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress)
     content = pose_json(result)
     checked = check_models(limits, {robot.name: content})
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
+    others = {}
+    if urdf is not None:
+        from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
 
-            text = robot_text(result.robot, files.robot.parent, _origin(result, robot))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        if urdf is not None:
-            from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
-
-            stack.enter_context(whole_file(urdf)).write_text(calibrated_urdf(result.robot), encoding="utf-8")
-        write_report(stack, files, lambda: poses_report(result, checked=checked))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+        others[urdf] = calibrated_urdf(result.robot)
+    page, content = partial(poses_report, result, checked=checked), content | acceptance_json(checked)
+    write_still(files, result.robot, _origin(result, robot), page, content, others)
     return pose_calibration_text(result), checked
 
 
@@ -171,15 +176,8 @@ def run_pose_search(
         return pose_ranking_text(candidates, result.count)
     found = discover_poses(robot, sessions, [read_poses(path, robot) for path in holdout], progress)
     last = found.steps[-1].result
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            text = robot_text(found.robot, files.robot.parent, _origin(last, robot))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        write_report(stack, files, lambda: poses_report(last, found))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), _discovery(found, files.robot))
+    made, content = _origin(last, robot), _discovery(found, files.robot)
+    write_still(files, found.robot, made, partial(poses_report, last, found), content)
     return pose_discovery_text(found)
 
 

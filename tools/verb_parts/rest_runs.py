@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,7 @@ from jointscope.robots.recordings.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds, write_report
-from jointscope.tools.writing.whole_file import whole_file, write_json
+from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds, write_still
 
 
 def add_rests_option(parser: argparse.ArgumentParser) -> None:
@@ -60,16 +59,8 @@ def run_rest_calibration(
     result = calibrate_rests(robot, read_all_rests(paths, robot, progress), progress)
     content = result.to_json()
     checked = check_models(limits, {robot.name: content})
-    with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            origin = made_from(robot.path.name) | other_kinds(result)
-            text = robot_text(result.robot, files.robot.parent, origin)
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
-        write_report(stack, files, lambda: rests_report(result, checked=checked))
-        if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), content | acceptance_json(checked))
+    page, content = partial(rests_report, result, checked), content | acceptance_json(checked)
+    write_still(files, result.robot, made_from(robot.path.name) | other_kinds(result), page, content)
     return rest_calibration_text(result), checked
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -73,11 +73,12 @@ class ResultFiles:
         return self.report is not None or self.rrd is not None or self.figures is not None
 
 
-def add_result_options(parser: argparse.ArgumentParser) -> None:
-    """Adds --report, --figures, --rrd and --json, which every verb that estimates something takes."""
+def add_result_options(parser: argparse.ArgumentParser, viewer: bool = True) -> None:
+    """Adds --report, --figures and --json, which every verb that estimates something takes, and --rrd for motion."""
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="write every picture of the report as SVG")
-    parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
+    if viewer:
+        parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
 
 
@@ -98,11 +99,7 @@ def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_
         JointscopeError: a file cannot be written; then none is.
     """
     with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            text = robot_text(result.robot, files.robot.parent, provenance(result))
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        write_robot(stack, files, result.robot, provenance(result))
         from jointscope.tools.report import calibration_report
         from jointscope.tools.rerun_log import log_calibration
 
@@ -147,14 +144,8 @@ def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
         JointscopeError: a file cannot be written; then none is.
     """
     with ExitStack() as stack:
-        if files.robot is not None:
-            from jointscope.robots.files.robot_writer import robot_text
-
-            last = len(result.steps) - 1
-            text = robot_text(
-                result.robot, files.robot.parent, step_provenance(result.steps[last], last, start, result.recordings)
-            )
-            stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
+        last = len(result.steps) - 1
+        write_robot(stack, files, result.robot, step_provenance(result.steps[last], last, start, result.recordings))
         from jointscope.tools.report import discovery_report
         from jointscope.tools.rerun_log import log_discovery
 
@@ -201,6 +192,46 @@ def _write_views(
         log(result, stack.enter_context(whole_file(files.rrd)))
     if files.json is not None:
         write_json(stack.enter_context(whole_file(files.json)), result.to_json() | acceptance_json(checked))
+
+
+def write_still(
+    files: ResultFiles,
+    robot: Robot,
+    made: dict[str, Any],
+    report: Callable[[], str],
+    content: dict[str, Any],
+    others: Mapping[Path, str] | None = None,
+) -> None:
+    """Writes what was found without motion: robot file, report, JSON.
+
+    Args:
+        files: where to.
+        robot: that was found.
+        made: where its numbers come from.
+        report: makes the page.
+        content: of the JSON.
+        others: texts of further files.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        write_robot(stack, files, robot, made)
+        for path, text in (others or {}).items():
+            stack.enter_context(whole_file(path)).write_text(text, encoding="utf-8")
+        write_report(stack, files, report)
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), content)
+
+
+def write_robot(stack: ExitStack, files: ResultFiles, robot: Robot, made: dict[str, Any]) -> None:
+    """The robot file, where it is asked for, and where its numbers come from; it takes its place with the others."""
+    if files.robot is None:
+        return
+    from jointscope.robots.files.robot_writer import robot_text
+
+    text = robot_text(robot, files.robot.parent, made)
+    stack.enter_context(whole_file(files.robot)).write_text(text, encoding="utf-8")
 
 
 def write_report(stack: ExitStack, files: ResultFiles, report: Callable[[], str]) -> None:

@@ -13,6 +13,7 @@ from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
+from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, run_frequency_calibration
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
@@ -22,6 +23,7 @@ from jointscope.tools.writing.whole_file import check_outputs
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
   jointscope calibrate tx90l --poses poses.csv -o arm.yaml --urdf arm.urdf --report arm.html
+  jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 -o arm.yaml --report arm.html
   jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
@@ -54,6 +56,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_poses_option(parser)
     add_rests_option(parser)
+    add_frequency_option(parser)
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
     add_accept_option(parser)
     add_leave_out_option(parser)
@@ -69,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
     files = ResultFiles.of(args)
     _check_kinds(args)
     check_outputs(
-        [*files.all, *filter(None, [args.urdf])], inputs=[*args.bags, *args.poses, *args.rests, *args.effects]
+        [*files.all, *filter(None, [args.urdf])],
+        inputs=[*args.bags, *args.poses, *args.rests, *args.frequency, *args.effects],
     )
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
@@ -86,9 +90,10 @@ def run(args: argparse.Namespace) -> int:
         print(text)
         files.tell(args.urdf)
         return print_acceptance(checked)
-    if args.rests and not args.bags:
+    if (args.rests or args.frequency) and not args.bags:
         with progress_bar() as progress:
-            text, checked = run_rest_calibration(robot, args.rests, files, limits, progress)
+            still = run_rest_calibration if args.rests else run_frequency_calibration
+            text, checked = still(robot, args.rests or args.frequency, files, limits, progress)
         print(text)
         files.tell()
         return print_acceptance(checked)
@@ -128,7 +133,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--solver samples": args.solver == "samples",
         "--leave-out": bool(args.leave_out),
     }
-    check_one_kind(args.bags, args.poses, args.rests, of_motion)
+    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
     if args.urdf is not None and not args.poses:
         raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
 

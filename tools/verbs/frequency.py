@@ -10,7 +10,7 @@ from typing import Any
 
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.terminal.progress import progress_bar
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_report
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_report
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 EXAMPLE = """example:
@@ -47,9 +47,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="describes the excitation; default: excitation.yaml beside the bag",
     )
-    parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="write every picture of the report as SVG")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    add_result_options(parser, viewer=False)
     parser.set_defaults(run=run)
 
 
@@ -73,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
             found.append(MeasuredResponse.of(signals, excitation))
     with ExitStack() as stack:
         if args.output is not None:
-            from jointscope.tools.verb_parts.response_files import write_responses
+            from jointscope.tools.export.response_files import write_responses
 
             write_responses(stack.enter_context(whole_file(args.output)), found, args.output.suffix.lower())
         write_report(stack, files, lambda: responses_report(found))

@@ -19,6 +19,7 @@ from jointscope.graphs.fixed_lag.window.newest_state import NewestState
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
 from jointscope.robots.dynamics.transmission import joint_angles
+from jointscope.robots.model.lasting_torques import memory_spreads
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -102,7 +103,7 @@ def first_state(
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
     variance[own.motor_q] = sigma**2
-    variance[own.memory] = [memory.spread**2 for memory in robot.memories.values()]
+    variance[own.memory] = memory_spreads(robot) ** 2
     if walking is not None:
         mean[layout.walking] = walking.mean[layout.walking]
         covariance = np.diag(variance)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.comparison.compare import compare_model, smooth
+from jointscope.graphs.noise.lasting_noise import separate_noise
 from jointscope.graphs.noise.linear_smoother import LinearSmoother
 from jointscope.graphs.noise.noise_estimation import densities, scaled
-from jointscope.graphs.noise.white_noise import separate_noise
 from jointscope.robots.parts.process_noise import ProcessNoise
 
 
@@ -53,14 +53,15 @@ def test_white_densities_never_exceed_the_models_own_and_known_values_smooth_as_
     np.testing.assert_allclose(again, x, atol=1e-5)
 
 
-def test_only_the_last_memories_are_scaled_where_asked():
-    noise = ProcessNoise(True, "integrated", np.ones(1), np.ones(1), memory=np.array([0.5, 2.0]))
-    factors = np.array([2.0, 3.0, 5.0, 7.0])
-    np.testing.assert_allclose(densities(scaled(noise, factors)), [2.0, 3.0, 0.5, 2.0])
-    np.testing.assert_allclose(densities(scaled(noise, factors, memories=1)), [2.0, 3.0, 0.5, 14.0])
+def test_torques_that_last_are_scaled_and_memories_of_effects_are_not():
+    noise = ProcessNoise(True, "integrated", np.ones(1), np.ones(1), memory=np.array([0.5]))
+    factors = np.array([2.0, 3.0, 5.0, 7.0, 11.0])
+    np.testing.assert_allclose(densities(scaled(noise, factors[:3])), [2.0, 3.0, 0.5])
+    lasting = noise.with_lasting(0.02, np.array([1.0, 2.0]))
+    np.testing.assert_allclose(densities(scaled(lasting, factors)), [2.0, 3.0, 0.5, 70.0, 220.0])
 
 
-def test_where_free_torques_run_away_the_floor_is_the_noise_of_the_sensors(monkeypatch, doggy):
+def test_where_lasting_torques_run_away_the_floor_is_the_noise_of_the_sensors(monkeypatch, doggy):
     from types import SimpleNamespace
 
     from jointscope.graphs.comparison import noise_floor

@@ -8,8 +8,8 @@ import pytest
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.discovery.missing_torque import estimate_missing_torque
-from jointscope.graphs.noise.free_torque import FreeTorques
 from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.lasting_torques import lasting_torques
 
 RIGHT_ROW = 4  # "joint2.motor"
 SETTLED = 0.2  # [s]
@@ -77,10 +77,12 @@ def test_nothing_is_missing_from_a_clean_recording(doggy):
     assert np.std(found.tau_spring[:, 0]) == pytest.approx(stiffness * np.std(deflection), rel=0.1)
 
 
-def test_a_rigid_joint_has_one_free_torque(doggy):
+def test_a_rigid_joint_has_one_torque_that_lasts(doggy):
     rigid = replace(doggy, choices=replace(doggy.choices, rigid_joints=("joint2",)))
     noise = replace(rigid.noise, motor_velocity=rigid.noise.motor_velocity[:2])
-    free = FreeTorques.of(replace(rigid, noise=noise))
-    assert free.rows == ("joint1.link", "joint2.link", "joint3.link", "joint1.motor", "joint3.motor")
-    assert free.white(free.robot.noise).memory.shape == (0,)
-    assert list(free.columns) == list(range(10, 15))
+    free = replace(rigid, noise=noise.with_lasting(0.01, np.ones(5)))
+    names = ("joint1.link", "joint2.link", "joint3.link", "joint1.motor", "joint3.motor")
+    assert tuple(lasting_torques(free)) == names
+    assert free.noise.white.memory.shape == (0,)
+    assert free.layout.memories == tuple(f"{name}_torque" for name in names)
+    assert free.layout.memory == slice(10, 15)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
-from jointscope.graphs.discovery.verdicts import ValidatedRefit, excess_share, judge, worth_a_refit
+from jointscope.graphs.discovery.verdicts import excess_share, judge, worth_a_refit
+from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore

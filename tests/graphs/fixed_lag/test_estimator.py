@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from online_doggy import feed, told
+from online_doggy import feed, simulated_run, told
 
 from jointscope.graphs.fixed_lag import FixedLagEstimator
 from jointscope.robots.errors import EstimatorError
@@ -41,6 +43,16 @@ def test_errors_are_as_large_as_the_covariance_says(followed):
     # errors stay alike for some 20 ms: about 25 independent states of 12 dimensions
     assert 0.7 < nees.mean() < 1.4
     assert nees.max() < 5.0
+
+
+@pytest.mark.parametrize("memory", [0.02, 0.1])
+def test_errors_are_as_large_as_the_covariance_says_where_torques_last(memory):
+    pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
+    run = simulated_run(seconds=1.6, memory=memory)
+    nees = nees_over(run, FixedLagEstimator(run.robot, 0.1), run.messages(REST, 1.6))
+    assert 0.7 < nees.mean() < 1.4
+    white = replace(run.robot, noise=run.robot.noise.white)
+    assert nees_over(run, FixedLagEstimator(white, 0.1), run.messages(REST, 0.9)).mean() > 5.0
 
 
 def test_innovations_are_as_large_as_expected(followed):

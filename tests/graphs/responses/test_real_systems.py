@@ -10,6 +10,8 @@ import pytest
 
 from jointscope.graphs.responses.find_excitation import find_excitation
 from jointscope.graphs.responses.measured_response import MeasuredResponse
+from jointscope.graphs.responses.response_matrix import response_matrix
+from jointscope.graphs.responses.spectra import spectra
 from jointscope.robots.recordings.signals import Signal, Signals
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
@@ -51,7 +53,7 @@ def test_noise_and_distortion_of_the_mirror_are_told_apart_and_its_response_pred
     signals = Signals("mirror", "", Signal(t, u, ("a", "b", "c")), Signal(t, y, ("x", "y", "z")))
     excitation = find_excitation(signals.inputs, 3, "mirror")
     assert len(excitation.lines) == 3839 and len(excitation.experiments) == 6
-    matrix = MeasuredResponse.of(signals, excitation).matrix
+    matrix = response_matrix(spectra(signals, excitation))
     # noise is that of the mean of two blocks of two periods, half of what two periods of one block differ by / sqrt(2)
     periods = 100.0 * np.sqrt(8.0) * matrix.relative(matrix.noise)
     blocks = 100.0 * np.median(np.abs(matrix.each[0] - matrix.each[1]) / np.abs(matrix.G), axis=0)

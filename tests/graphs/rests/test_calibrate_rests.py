@@ -115,6 +115,7 @@ def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
     assert verdict(calibrate_rests(robot, [hanging(60, 1)])).startswith("Yes")
     few = calibrate_rests(robot, [hanging(4, 1)])
     assert "4 rests for 5 values of swing; nothing could contradict them" in verdict(few)
+    assert verdict(replace(few, parameters=())).startswith("Yes")  # nothing was asked of them
     share = {"swing.stiffness": 0.5, "swing.coulomb_torque": 0.1}
     loose = tuple(replace(p, sigma=share.get(p.name, 0.0) * p.value) for p in few.parameters)
     said = verdict(replace(few, parameters=loose, problems=few.problems * 2))

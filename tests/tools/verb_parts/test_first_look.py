@@ -55,8 +55,8 @@ def test_verbs_that_take_long_say_it_before_they_begin(verb, doggy, swapped, tmp
 
     bag = tmp_path / "odd.mcap"
     write_bag(bag, swapped, doggy)
-    room = "calibration" if verb == "calibrate" else "discovery"
-    monkeypatch.setattr(f"jointscope.graphs.{room}.{verb}.{verb}", begin)
+    place = "tools.notebook.calls.calibrate_motion" if verb == "calibrate" else f"graphs.discovery.{verb}.{verb}"
+    monkeypatch.setattr(f"jointscope.{place}", begin)
     output = ["-o", str(tmp_path / "out.yaml")] if verb != "diagnose" else []
     assert main([verb, "doggy", str(bag), *output]) == 1
     first, second, last = capsys.readouterr().err.splitlines()

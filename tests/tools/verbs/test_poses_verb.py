@@ -90,7 +90,7 @@ def test_a_calibrated_file_is_the_start_of_the_next_calibration(calibrated, tmp_
             "there is no none.csv; expected a table",
         ),
         (["calibrate", "doggy", "--poses", "p.csv", "-o", "a.yaml"], "doggy.yaml has no section `poses`"),
-        (["info", "x.mcap", "--robot", "tx90l"], "it describes poses; give them with --poses"),
+        (["info", "x.mcap", "--robot", "tx90l"], "it describes poses and frequency; give them with --poses"),
         (["calibrate", "doggy", "x.mcap", "--urdf", "a.urdf", "-o", "a.yaml"], "--urdf writes the geometry that poses"),
     ],
 )

@@ -21,6 +21,7 @@ from jointscope.robots.dynamics.state_rates import StateRates
 
 FACTORS = {"simpson": SimpsonDynamics, "midpoint": MidpointDynamics, "euler": EulerDynamics}
 CHOSEN = ("doggy", "doggy_paper", "friction on links", "joint 2 rigid", "bearing_flexibility", "hysteresis")
+CHOSEN += ("torques that last",)
 COUNT, H = 8, 1e-3
 
 

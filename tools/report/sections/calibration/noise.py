@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult
+from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.tools.presentation.judgement import equation_names
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.sensor_signals import COLOURS
@@ -19,13 +20,17 @@ from jointscope.tools.report.sections.calibration.per_bag import per_bag
 
 def noise(result: CalibrationResult) -> Section:
     """Densities before and after, and the residual of the dynamics over time."""
-    now = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity])
+    now, lost = np.concatenate([result.noise.link_velocity, result.noise.motor_velocity]), result.noise.drift(0.1)
     before = np.concatenate([result.start.noise.link_velocity, result.start.noise.motor_velocity])
     rows = [
-        [escape(name), significant(b), f"<b>{significant(a)}</b>", significant(a / b, 2), significant(a * np.sqrt(0.1))]
-        for name, a, b in zip(equation_names(result), now, before, strict=True)
+        [escape(name), significant(b), f"<b>{significant(a)}</b>", significant(a / b, 2), significant(v)]
+        for name, a, b, v in zip(equation_names(result), now, before, lost, strict=True)
     ]
     head = ["equation", "start [rad/s/√s]", "estimated [rad/s/√s]", "ratio", "velocity lost in 0.1 s [rad/s]"]
+    torques = lasting_torques(result.robot)
+    if torques:
+        head.append("torque that lasts, rms [N m]")
+        rows = [[*row, significant(size)] for row, size in zip(rows, torques.values(), strict=True)]
 
     def draw(bag: BagFit, group: str) -> str:
         edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
@@ -45,4 +50,7 @@ def noise(result: CalibrationResult) -> Section:
         f"How much the velocities wander beside the model ({estimated} as a random walk). Small and even is good; "
         "peaks show when the model misses something."
     )
-    return Section("noise", "Process noise", table(head, rows, [1, 2, 3, 4]) + per_bag(result, draw), lead)
+    if torques:
+        memory = 1e3 * result.noise.correlation_time
+        lead += f" Beside them torques come and go that no law explains, with a memory of {memory:g} ms."
+    return Section("noise", "Process noise", table(head, rows, list(range(1, len(head)))) + per_bag(result, draw), lead)

@@ -23,7 +23,7 @@ def torque_maps(
 ) -> Section:
     """The most telling maps, then all others of a joint against its own signals."""
     lead = (
-        "The torque that each equation of motion lacks, estimated as a free torque, against what may cause it. Line: "
+        "The torque that each equation of motion lacks, estimated as a lasting one, against what may cause it. Line: "
         "median, band: middle half of the samples. In colour: what the best candidates would add. A flat line at zero "
         "is good. The percentage is the part of the torque's variance that follows the signal, beyond chance."
     )

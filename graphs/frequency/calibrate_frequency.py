@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Stiffnesses and dampings of drives and bearings from frequency responses, with sigmas that hold what is in doubt.
+
+First the logarithm of the response matrices, which finds the way from far; then the torque balance, stage after stage,
+until the values stay. Sigmas are those of the residuals, or of their bands of neighbouring lines where these are of one
+cause, and hold what velocities above half of their band are worth in the friction.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.graphs.frequency.stages import first_stage, next_stage
+from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.posterior import posteriors
+from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.errors import SolveError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
+from jointscope.robots.recordings.signals import Excitation, Signals
+
+Array = NDArray[np.float64]
+MOST_STAGES = 10
+AGREES = 0.3  # [sigma] that no value may move in a stage any more
+MOST_ITERATIONS = 80
+TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
+
+
+@dataclass(frozen=True)
+class FrequencyCalibration:
+    """Result of a calibration from frequency responses.
+
+    Attributes:
+        robot: with the values that were found and their sigmas.
+        start: before.
+        problems: the poses.
+        names: of the free parameters, shape (p,).
+        covariance: of their coordinates (logarithms of positive ones), shape (p, p).
+        iterations: of all stages.
+        stages: how many there were.
+        cost: at the end.
+        wall_seconds: of the whole.
+    """
+
+    robot: Robot
+    start: Robot
+    problems: tuple[FrequencySet, ...]
+    names: tuple[str, ...]
+    covariance: Array
+    iterations: int
+    stages: int
+    cost: float
+    wall_seconds: float
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Names of the parameters that the responses tell."""
+        sigmas, parameters = np.sqrt(np.diag(self.covariance)), self.robot.parameters
+        return tuple(
+            n for n, s in zip(self.names, sigmas.tolist(), strict=True) if s < TOLD * parameters[n].coordinate_sigma
+        )
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Springs, dampers and friction of the motors that they do not tell."""
+        asked = {spring.stiffness for spring in self.problems[0].arm.springs}
+        asked |= {spring.damping for spring in self.problems[0].arm.springs}
+        return tuple(name for name in self.names if name in asked and name not in self.told)
+
+    def rms_log(self, robot: Robot) -> dict[str, Any]:
+        """How far the model's matrix is from the measured one: rms of the logarithm, and of each entry."""
+        parts = [p.of_robot(robot).log_errors() for p in self.problems]
+        square = np.mean([np.mean(np.abs(part) ** 2, axis=0) for part in parts], axis=0)
+        entries = {f"{i + 1},{j + 1}": float(np.sqrt(square[i, j])) for i, j in np.ndindex(square.shape)}
+        return {"rms_log": float(np.sqrt(square.mean())), "entries": entries}
+
+    def to_json(self) -> dict[str, Any]:
+        """The content of `--json`."""
+        parameters = self.robot.parameters
+        table = {
+            n: {"value": p.value, "sigma": p.sigma, "unit": p.unit} for n, p in parameters.items() if n in self.names
+        }
+        return {
+            "converged": True,
+            "iterations": self.iterations,
+            "samples": sum(problem.measured for problem in self.problems),
+            "wall_seconds": self.wall_seconds,
+            "cost": self.cost,
+            "parameters": table,
+            "told": list(self.told),
+            "undetermined": [{name: 1.0} for name in self.silent],
+            "frequency": self.rms_log(self.robot),
+            "frequency_before": self.rms_log(self.start),
+        }
+
+
+@in_solver_context
+def calibrate_frequency(
+    robot: Robot, recordings: Sequence[tuple[Signals, Excitation]], progress: Progress | None = None
+) -> FrequencyCalibration:
+    """Calibrates an arm from frequency responses.
+
+    Args:
+        robot: with a section `frequency`, start values and priors.
+        recordings: torques of the motors that are shaken, positions of all joints, and the excitation, of each pose.
+        progress: called with a text and the share done.
+
+    Raises:
+        RecordingError: a recording shows no response.
+        SolveError: no convergence.
+    """
+    began, report = time.perf_counter(), progress or (lambda text, share: None)
+    problems = [first_stage(robot, ShakenPose.of(*recording)) for recording in recordings]
+    problems, solution, iterations, stages = settled_stages(problems, [], report)
+    calibration = solution.estimate.calibrations[0]
+    index = calibration.columns[DYNAMICS]
+    covariance = honest_covariance(problems, problems, solution)[index, index]
+    sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
+    found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    told = dict(zip(calibration.names, sigmas.tolist(), strict=True))
+    found = replace(found, parameters=with_sigmas(found.parameters, told))
+    report("done", 1.0)
+    return FrequencyCalibration(
+        robot=found,
+        start=robot,
+        problems=tuple(problem.of_robot(found) for problem in problems),
+        names=calibration.names,
+        covariance=covariance,
+        iterations=iterations,
+        stages=stages,
+        cost=solution.cost,
+        wall_seconds=time.perf_counter() - began,
+    )
+
+
+def settled_stages(
+    problems: list[FrequencySet], others: Sequence[SetProblem], report: Progress
+) -> tuple[list[FrequencySet], Solution, int, int]:
+    """Poses at the stage after which nothing moves, their solution, iterations and stages.
+
+    Args:
+        problems: at their first stage.
+        others: recordings of other kinds in the same graph.
+        report: as of `calibrate_frequency`.
+
+    Raises:
+        SolveError: no convergence.
+    """
+    common, iterations, before = Calibration.of(problems[0].robot), 0, None
+    for stage in range(MOST_STAGES):
+        everything = [*problems, *others]
+        starts = [problem.start(common) for problem in everything]
+        estimate = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts))
+        solution = solve(everything, estimate, max_iterations=MOST_ITERATIONS)
+        iterations += len(solution.iterations)
+        report(f"stage {stage + 1}, cost {solution.cost:.6g}", (stage + 1) / MOST_STAGES)
+        if not (solution.converged or solution.flat):
+            break
+        known = solution.estimate.calibrations[0]
+        common = known.carried_to(common)
+        if before is not None:
+            index = known.columns[DYNAMICS]
+            sigmas = np.sqrt(np.diag(posteriors(everything, solution)[1])[index])
+            if np.max(np.abs(known.dynamics - before) / sigmas) < AGREES:
+                return problems, solution, iterations, stage + 1
+        before = None if stage == 0 else known.dynamics
+        problems = [next_stage(problem, known) for problem in problems]
+    raise SolveError(
+        f"no convergence after {iterations} iterations and {stage + 1} stages over {len(problems)} poses; torques, "
+        "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+    )
+
+
+def honest_covariance(problems: Sequence[FrequencySet], everything: Sequence[Any], solution: Solution) -> Array:
+    """Covariance of all shared coordinates of a solution, what is in doubt included, shape (p, p).
+
+    Args:
+        problems: poses at their last stage.
+        everything: these and recordings of other kinds, as they were solved; poses come first.
+        solution: theirs.
+    """
+    covariance = np.asarray(posteriors(list(everything), solution)[1])
+    pairs = list(zip(problems, solution.estimate.calibrations, strict=False))
+    index = pairs[0][1].columns[DYNAMICS]
+    slopes = np.vstack([problem.slopes(calibration) for problem, calibration in pairs])[:, index]
+    doubt = np.sum([problem.doubt(calibration) for problem, calibration in pairs], axis=0)[index]
+    banded = covariance[:, index] @ (slopes.T @ slopes) @ covariance[index]
+    shift = covariance[:, index] @ doubt
+    widen = np.sqrt(np.maximum(np.diag(banded) / np.diag(covariance), 1.0))
+    return np.asarray(covariance * np.outer(widen, widen) + np.outer(shift, shift))

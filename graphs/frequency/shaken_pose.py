@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An arm that was shaken in one pose: spectra of its torques and motions, of its dry friction, and what carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.responses.response_matrix import ResponseMatrix, response_matrix
+from jointscope.graphs.responses.spectra import Spectra, spectra, steady_spectra
+from jointscope.robots.recordings.signals import Excitation, Signals
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+FINER = 4  # times the sampling rate: friction turns over within milliseconds, and what folds back is not of its line
+LARGE = 50.0  # beyond it 1 / cosh^2 is zero
+VELOCITY_BAND = 0.8  # of half the rate: beyond it positions tell nothing but noise of the velocity that friction sees
+
+
+@dataclass(frozen=True)
+class ShakenPose:
+    """A pose.
+
+    Attributes:
+        signals: torques of the motors that are shaken, and their positions.
+        sha256: of the bag.
+        q: mean positions of all joints, shape (n,) [rad].
+        found: spectra of torques and positions.
+        matrix: response from torques to positions.
+        lines: that are used, in multiples of f0, shape (l,).
+        carrier: complex amplitude of the motion that goes on beside the excitation, of each motor, shape (nu,) [rad].
+    """
+
+    signals: Signals
+    sha256: str
+    q: Array
+    found: Spectra
+    matrix: ResponseMatrix
+    lines: NDArray[np.intp]
+    carrier: Complex
+
+    @staticmethod
+    def of(signals: Signals, excitation: Excitation) -> ShakenPose:
+        """The pose of a recording whose outputs are the positions of all joints.
+
+        Raises:
+            RecordingError: it shows no response.
+        """
+        places = [signals.outputs.names.index(joint) for joint in signals.inputs.names]
+        own = replace(signals.outputs, values=signals.outputs.values[:, places], names=signals.inputs.names)
+        motors = replace(signals, outputs=own)
+        found = spectra(motors, excitation)
+        step = _carrier_line(excitation)
+        together = found.Y if found.common is None else found.common
+        carrier = together[:, :, step].mean(axis=(0, 1)) if step else np.zeros(len(places), dtype=complex)
+        lines = excitation.lines
+        if step and found.common is None:  # no pairs: what carries the excitation stands on its own lines
+            lines = lines[lines % step != 0]
+        q = signals.outputs.values.mean(axis=0)
+        return ShakenPose(motors, signals.sha256, q, found, response_matrix(found), lines, carrier)
+
+    @property
+    def path(self) -> str:
+        """Of the bag."""
+        return self.signals.path
+
+    @property
+    def step(self) -> int:
+        """Line of the carrying motion; 0 for none."""
+        return _carrier_line(self.found.excitation)
+
+    @property
+    def w(self) -> Array:
+        """Of the lines, shape (l,) [rad/s]."""
+        return np.asarray(2.0 * np.pi * self.found.excitation.f0 * self.lines)
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Which lines of the matrix are used, shape (L,)."""
+        return np.asarray(np.isin(self.found.excitation.lines, self.lines))
+
+    @cached_property
+    def motion(self) -> Complex:
+        """Positions of the motors at all lines up to some beyond the highest one, shape (e, K, nu) [rad]."""
+        K = min(int(self.lines.max()) + 1 + 7 * max(self.step, 1), self.found.Y.shape[2])
+        return np.asarray(self.found.Y[:, :, :K].mean(axis=1))
+
+    @cached_property
+    def torques(self) -> Complex:
+        """Of the motors at the lines, shape (e, l, nu) [N m]."""
+        return np.asarray(self.found.U.mean(axis=1)[:, self.lines])
+
+    def friction(self, sharpness: Array) -> tuple[Complex, Complex]:
+        """Dry friction of unit size at the lines, tanh(k v) of each motor, and its derivative by log k.
+
+        Args:
+            sharpness: k of each motor, shape (nu,) [s/rad].
+
+        Returns:
+            Shape (e, l, nu) each.
+        """
+
+        def law(x: Array) -> Array:
+            y = sharpness * self._velocity(x, VELOCITY_BAND)
+            return np.concatenate([np.tanh(y), y / np.cosh(np.minimum(np.abs(y), LARGE)) ** 2], axis=2)
+
+        size, sharper = np.split(self._of_positions(law), 2, axis=2)
+        return size, sharper
+
+    def friction_doubt(self, sharpness: Array) -> Complex:
+        """What half of the band of the velocities is worth in friction of unit size; above it they are not known."""
+
+        def law(x: Array) -> Array:
+            fine, coarse = (np.tanh(sharpness * self._velocity(x, part * VELOCITY_BAND)) for part in (1.0, 0.5))
+            return np.asarray(fine - coarse)
+
+        return self._of_positions(law)
+
+    def _of_positions(self, law: Callable[[Array], Array]) -> Complex:
+        found, _ = steady_spectra(self.signals.outputs, self.found.excitation, self.path, law)
+        return np.asarray(found.mean(axis=1)[:, self.lines])
+
+    def _velocity(self, x: Array, band: float) -> Array:
+        """Velocities from periods of positions, shape (p, FINER N, c) [rad/s], up to a share of half the rate."""
+        X, k = np.fft.rfft(x, axis=1), np.arange(x.shape[1] // 2 + 1)
+        w = np.where(k <= band * k[-1], 2j * np.pi * self.found.excitation.f0 * k, 0.0)
+        return np.asarray(FINER * np.fft.irfft(X * w[None, :, None], FINER * x.shape[1], axis=1))
+
+
+def _carrier_line(excitation: Excitation) -> int:
+    return round(excitation.carrier / excitation.f0)

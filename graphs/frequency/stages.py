@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From stage to stage: the arm about where it was found, what carries the excitation, and how large residuals are.
+
+Residuals of the torque balance are what friction laws, sensors and a motion beside the excitation leave. Their
+covariance at each line is that of the last stage's residuals at neighbouring lines, over all experiments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.frequency_set import FrequencySet, Stage
+from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
+from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.graphs.responses.response_matrix import over_neighbours
+from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
+from jointscope.robots.geometry.flexible_arm import FlexibleArm
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+HARMONICS = 2  # of the arm about the motion that carries the excitation
+LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
+STEP = {"length": 1e-4, "angle": 1e-4}  # [m], [rad] of the differences for columns of geometry
+
+
+def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
+    """The pose with the logarithm of its matrix."""
+    arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
+    m = pose.matrix
+    relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[pose.used]
+    parts = arm.linearised(pose.q, values).mean
+    sharpness = np.array([robot.sharpness_of(joint, values) for joint in arm.joints])
+    stage = Stage(parts, (1.0 / np.hypot(relative, LOG_FLOOR)).astype(complex), 0.0, None, sharpness, {}, values, True)
+    return FrequencySet(robot, pose, stage)
+
+
+def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
+    """The pose with the torque balance about values that were found."""
+    values, pose, robot, arm = before.values(calibration), before.pose, before.robot, before.arm
+    parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
+    geometry = before.stage.geometry or _geometry(arm, robot, pose, parts, values)
+    eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
+    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False)
+    k = motor_stiffness(arm, parts, pose.w, values)
+    if pose.step:
+        stage = replace(stage, shift=_shift(arm, pose, k.Z, values))
+    now = FrequencySet(robot, pose, stage)
+    r = now.torque_balance(values, k)
+    root = np.linalg.cholesky(_covariance(r))
+    whiten = np.asarray(np.linalg.solve(root, now.with_friction(k.Z, values)), dtype=np.complex128)
+    return replace(now, stage=replace(stage, whiten=whiten))
+
+
+def _shift(arm: FlexibleArm, pose: ShakenPose, Z: Complex, values: Mapping[str, float]) -> Complex:
+    """Torques about the carrying motion less those of the arm that stands."""
+    excitation = pose.found.excitation
+    about = arm.linearised(pose.q, values, pose.carrier, 2.0 * np.pi * excitation.carrier, HARMONICS)
+    moving = carried_torque(arm, about, excitation.f0, pose.step, pose.motion, values)[:, pose.lines]
+    return np.asarray(moving - np.einsum("lij,elj->eli", Z, pose.motion[:, pose.lines]))
+
+
+def _covariance(r: Complex) -> Complex:
+    """Of residuals at each line, shape (l, nu, nu), by those of its neighbours."""
+    each = np.einsum("eli,elj->lij", r, r.conj()) / len(r)
+    mean = over_neighbours(each)
+    floor = 1e-6 * np.real(np.trace(mean, axis1=1, axis2=2))[:, None, None] * np.eye(r.shape[2])
+    return np.asarray(mean + floor)
+
+
+def _geometry(
+    arm: FlexibleArm, robot: Robot, pose: ShakenPose, parts: tuple[Array, Array, Array], values: Mapping[str, float]
+) -> dict[str, Complex]:
+    """Columns of the geometric errors that are parameters of the robot, shape (e, l, nu), by differences."""
+    Z, found = motor_stiffness(arm, parts, pose.w, values).Z, {}
+    kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
+    for joint in robot.joints:
+        for part, step in kinds.items():
+            name = f"{joint}.{part}"
+            if name in robot.parameters and not robot.parameters[name].fixed:
+                moved = {**values, name: values[name] + step}
+                other = motor_stiffness(arm, arm.linearised(pose.q, moved).mean, pose.w, moved).Z
+                found[name] = np.einsum("lij,elj->eli", (other - Z) / step, pose.motion[:, pose.lines])
+    return found

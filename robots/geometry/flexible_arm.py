@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An arm with a spring behind each motor that is shaken and springs in its bearings, linearised about a motion.
+
+    M(t) x'' + C(t) x' + G(t) x + D x' + K x = E (d m' + k m)
+
+x are the turns of the joints behind the drives and the tilts of their bearings about y' and x', m the turns of the
+motors; K and D are diagonal. Other joints are locked. Where a motion carries the excitation, M, C and G change with its
+phase; they come as coefficients of a Fourier series in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from jointscope.robots.errors import RobotError
+from jointscope.robots.geometry.arm_chain import across, turned
+from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, LENGTHS, STIFFNESS, TILT_DAMPING
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.structured_tree import joint_motion_axis
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+PHASES = 16  # of the motion at which the arm is linearised
+LOOKS = 3  # at gravity, for the place where the arm sags
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Fourier coefficients of M, C and G in the phase of a motion, from that of e^(-i h phase) to e^(i h phase).
+
+    Attributes:
+        M: inertias, shape (2 h + 1, n, n).
+        C: by velocities, same shape.
+        G: by positions, same shape.
+    """
+
+    M: Complex
+    C: Complex
+    G: Complex
+
+    @property
+    def mean(self) -> tuple[Array, Array, Array]:
+        """What does not change with the phase."""
+        middle = len(self.M) // 2
+        return self.M[middle].real, self.C[middle].real, self.G[middle].real
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring and its damper.
+
+    Attributes:
+        stiffness, damping: names of their parameters.
+        coordinate: place in x.
+        motor: number of the motor on its other side; None for a bearing.
+    """
+
+    stiffness: str
+    damping: str
+    coordinate: int
+    motor: int | None
+
+
+class FlexibleArm:
+    """The arm of a robot with a section `frequency`.
+
+    Args:
+        robot: the robot.
+
+    Attributes:
+        joints: whose motors are shaken.
+        springs: of drives and bearings, in the order of x.
+
+    Raises:
+        RobotError: a joint that is shaken does not turn.
+    """
+
+    def __init__(self, robot: Robot):
+        assert robot.frequency is not None
+        slide = next((joint for joint in robot.frequency.joints if robot.tree.is_slide(joint)), None)
+        if slide is not None:
+            raise RobotError(f"{robot.path.name}: frequency.joints: {slide} slides; expected joints that turn")
+        self._tree, self.joints = robot.tree, robot.frequency.joints
+        springs: list[Spring] = []
+        model = robot.tree.model
+        self._order = [model.names[j] for j in range(1, model.njoints) if model.names[j] in self.joints]
+        for joint in self._order:
+            motor = self.joints.index(joint)
+            springs.append(Spring(f"{joint}.{STIFFNESS}", f"{joint}.{DAMPING}", len(springs), motor))
+            if all(f"{joint}.{part}" in robot.parameters for part in (*BEARING, *TILT_DAMPING)):
+                for i in (1, 0):  # y', then x'
+                    names = f"{joint}.{BEARING[i]}", f"{joint}.{TILT_DAMPING[i]}"
+                    springs.append(Spring(*names, len(springs), None))
+        self.springs = tuple(springs)
+        self.driven = np.array([next(s.coordinate for s in springs if s.motor == i) for i in range(len(self.joints))])
+        self._soft = {spring.stiffness.split(".")[0] for spring in springs if spring.motor is None}
+
+    def linearised(
+        self,
+        q: Array,
+        values: Mapping[str, float],
+        carrier: Complex | None = None,
+        speed: float = 0.0,
+        harmonics: int = 0,
+    ) -> Linearised:
+        """The arm about a pose, or about a motion q + 2 Re(carrier e^(i phase)) of the joints that are shaken.
+
+        Args:
+            q: mean positions of all joints of the robot, shape (n,) [rad].
+            values: geometric errors and stiffnesses by name.
+            carrier: complex amplitude of the motion of each motor, shape (n shaken,) [rad]; None for none.
+            speed: of its phase [rad/s].
+            harmonics: h of the result.
+        """
+        model = self._model(q, values)
+        data = model.createData()
+        at = np.zeros(model.nq)
+        at[self.driven] = [q[self._tree.joints.index(joint)] for joint in self.joints]
+        k = np.array([values[spring.stiffness] for spring in self.springs])
+        rest = at.copy()
+        for _ in range(LOOKS):
+            rest = at - pin.computeGeneralizedGravity(model, data, rest) / k
+        found = []
+        phases = 2.0 * np.pi * np.arange(PHASES if harmonics else 1) / PHASES
+        for phase in phases:
+            here, v, a = rest.copy(), np.zeros(model.nv), np.zeros(model.nv)
+            if carrier is not None and harmonics:
+                turning = 2.0 * carrier * np.exp(1j * phase)
+                here[self.driven] += turning.real
+                v[self.driven] = (1j * speed * turning).real
+                a[self.driven] = (-(speed**2) * turning).real
+            pin.computeRNEADerivatives(model, data, here, v, a)
+            M = np.triu(data.M) + np.triu(data.M, 1).T
+            found.append((M, data.dtau_dv.copy(), data.dtau_dq.copy()))
+        series = [np.fft.fft(np.array(part), axis=0) / len(phases) for part in zip(*found, strict=True)]
+        kept = np.arange(-harmonics, harmonics + 1)
+        return Linearised(*(part[kept] for part in series))
+
+    def _model(self, q: Array, values: Mapping[str, float]) -> pin.Model:
+        """The bodies with hinges for drives and bearings, other joints welded where they stand."""
+        old, new = self._tree.model, pin.Model()
+        new.gravity = old.gravity
+        host: dict[int, tuple[int, pin.SE3]] = {0: (0, pin.SE3.Identity())}
+        for j in range(1, old.njoints):
+            name, (parent, T) = old.names[j], host[old.parents[j]]
+            along, x, y = across(joint_motion_axis(old, j)[3:])
+            placed = T * _with_errors(old.jointPlacements[j], name, values, (along, x, y))
+            if name in self.joints:
+                parent = new.addJoint(parent, pin.JointModelRevoluteUnaligned(along), placed, name)
+                for axis, end in ((y, ".y"), (x, ".x")) if name in self._soft else ():
+                    parent = new.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), pin.SE3.Identity(), name + end)
+                host[j] = parent, pin.SE3.Identity()
+            elif name in self._tree.joints:
+                turn = turned(along, np.array(q[self._tree.joints.index(name)]))
+                host[j] = parent, placed * pin.SE3(turn, np.zeros(3))
+            else:
+                host[j] = parent, placed
+            new.appendBodyToJoint(host[j][0], old.inertias[j], host[j][1])
+        return new
+
+
+def _with_errors(
+    placement: pin.SE3, name: str, values: Mapping[str, float], axes: tuple[Array, Array, Array]
+) -> pin.SE3:
+    """Where a joint is with its geometric errors, as in `ArmChain`."""
+    along, x, y = axes
+    R = np.array(placement.rotation)
+    for part, axis in (("mis_y", y), ("mis_x", x), ("offset", along)):
+        R = R @ turned(axis, np.array(values.get(f"{name}.{part}", 0.0)))
+    shift = np.array([values.get(f"{name}.{part}", 0.0) for part in LENGTHS])
+    return pin.SE3(R, np.array(placement.translation) + shift)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The marked commands of README and docs, executed in order in one folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sysconfig
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
+SHOWN = re.compile(r"<!-- executed by tests/test_readme.py -->\n```bash\n(.*?)```", re.DOTALL)
+BEFORE = re.compile(r"<!-- before, by tests/test_readme.py:\n(.*?)-->", re.DOTALL)
+"""What a page takes for granted: the reader's own files are made up by these commands."""
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def commands(page: Path) -> list[str]:
+    blocks = [*BEFORE.findall(text_of(page)), *SHOWN.findall(text_of(page))]
+    return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.strip()]
+
+
+def named(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+EXECUTED = [page for page in PAGES if SHOWN.search(text_of(page))]
+
+
+def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    return subprocess.run(
+        command, shell=True, cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=1200
+    )
+
+
+def check_commands(page: Path, folder: Path) -> None:
+    """Every command of a page works without a word on standard error, and the files that it names are there."""
+    for command in commands(page):
+        done = run(command, folder)
+        assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
+        assert done.stderr == "", command
+    files = {name for command in commands(page) for name in re.findall(r"[\w.]+\.(?:mcap|yaml|html|rrd|csv)", command)}
+    assert files <= {file.name for file in folder.iterdir()}

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a calibration from frequency responses: measured and model side by side, what is left, values."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
+from jointscope.tools.presentation.frequency_sentences import (
+    identifiable_sentence,
+    matrix_sentence,
+    one_realisation,
+    value_rows,
+)
+from jointscope.tools.presentation.numbers import percent
+from jointscope.tools.report.page.acceptance import acceptance
+from jointscope.tools.report.page.page import Key, Section, figure, page, table
+from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+
+SIGMAS = 2.0  # half width of the bands that are drawn
+SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
+
+
+def frequency_report(result: FrequencyCalibration, checked: AcceptedBy = NO_LIMITS) -> str:
+    """The whole page as text, without references to anything outside of itself.
+
+    Args:
+        result: the calibration.
+        checked: limits that the user has declared, as they came out.
+    """
+    paths = ", ".join(problem.pose.path for problem in result.problems)
+    items = [matrix_sentence(result), identifiable_sentence(result), *one_realisation(result)]
+    verdict = "".join(f"<li>{escape(item)}</li>" for item in items)
+    sections = [
+        Section("verdict", "What was found", f"<ul>{verdict}</ul>", f"{len(result.problems)} poses."),
+        *acceptance(checked),
+        _values(result),
+        *(_pose(result, problem, k) for k, problem in enumerate(result.problems)),
+        *(_balance(problem, k) for k, problem in enumerate(result.problems)),
+    ]
+    return page(f"{result.robot.name}: drives and bearings from frequency responses", paths, sections)
+
+
+def _values(result: FrequencyCalibration) -> Section:
+    rows = [[escape(cell) for cell in row] for row in value_rows(result)]
+    head = ["parameter", "start", "value", "± sigma", "unit", ""]
+    lead = "Sigmas hold the residuals, what neighbouring lines have in common, and what is in doubt of friction."
+    return Section("values", "Values", table(head, rows, (1, 2, 3)), lead)
+
+
+def _pose(result: FrequencyCalibration, problem: FrequencySet, k: int) -> Section:
+    """Bode grid from torques to accelerations, as in Fig. 11 of Neubauer et al. (2015)."""
+    pose, m, panels = problem.pose, problem.pose.matrix, []
+    own = pose.used
+    f, square, sigmas = m.frequencies[own], pose.w**2, m.sigmas(m.total)[own]
+    values = {name: p.value for name, p in result.robot.parameters.items()}
+    before = {name: p.value for name, p in result.start.parameters.items()}
+    model, start = problem.response(values), problem.response(before)
+    for i, joint in enumerate(m.outputs):
+        for j, motor in enumerate(m.inputs):
+            size, half = square * np.abs(m.G[own, i, j]), SIGMAS * square * sigmas[:, i, j]
+            marks: list[Mark] = [
+                Band("two sigmas", f, np.maximum(size - half, SMALLEST * size), size + half, "k0"),
+                Curve("measured", f, size, "k0"),
+                Curve("start", f, square * np.abs(start[:, i, j]), "k2", "dashed"),
+                Curve("model", f, square * np.abs(model[:, i, j]), "k1"),
+            ]
+            axes = Axes(f"{motor} to {joint} [rad/s^2/(N m)]", "frequency [Hz]", 510, 220, log_x=True, log_y=True)
+            panels.append(plot(axes, marks))
+    keys = [Key("measured", "k0"), Key("two sigmas", "k0", "band"), Key("model", "k1"), Key("start", "k2", "dashed")]
+    lead = "From the torque of a motor to the acceleration of another; the model with friction as a sine sees it."
+    return Section(f"bode{k}", f"Response in {pose.path}", figure(panels, keys), lead)
+
+
+def _balance(problem: FrequencySet, k: int) -> Section:
+    """What torques are left at each line, beside those that excited."""
+    values = {name: p.value for name, p in problem.robot.parameters.items()}
+    pose = problem.pose
+    left = np.sqrt(np.mean(np.abs(problem.torque_balance(values, problem.stiffness(values))) ** 2, axis=0))
+    given = np.sqrt(np.mean(np.abs(pose.torques) ** 2, axis=0))
+    f, panels = np.asarray(pose.w / (2.0 * np.pi)), []
+    for i, joint in enumerate(problem.arm.joints):
+        marks: list[Mark] = [Curve("motor", f, given[:, i], "k0"), Curve("left over", f, left[:, i], "k1")]
+        panels.append(plot(Axes(f"{joint}: torque [N m]", "frequency [Hz]", height=200, log_x=True, log_y=True), marks))
+    shares = ", ".join(percent(float(s)) for s in np.sqrt(np.mean(left**2, axis=0) / np.mean(given**2, axis=0)))
+    lead = f"What the torque balance leaves of each motor's torque: {shares} (rms)."
+    return Section(
+        f"left{k}", f"What is left in {pose.path}", figure(panels, [Key("motor", "k0"), Key("left over", "k1")]), lead
+    )
