@@ -51,7 +51,9 @@ def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     encoder, found = robot.motor_encoder, {}
     stream = recording.streams[encoder.name]
     for j, joint in enumerate(robot.joints):
-        told = f"{joint}.{SHARPNESS}" in robot.parameters or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
+        own = robot.parameters.get(f"{joint}.{SHARPNESS}")
+        asked = own is not None and not own.fixed
+        told = asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
         rounded = SATURATED / robot.sharpness_of(joint)
         if joint in robot.layout.motors or told:
             continue
