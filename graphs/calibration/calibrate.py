@@ -125,22 +125,19 @@ def _calibrated(
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
-    if memory and near is None:
-        solved = stage.with_memory(solved)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
-    if near is not None or biases_only:
-        return result
-    estimate = solved.solution.estimate
-    motions = len(solved.problems)
-    moving = solved.problems, estimate.states[:motions], estimate.calibrations[:motions]
-    return replace(
-        result,
-        timing=drive_timing(*moving),
-        masses=wrong_masses(*moving),
-        regressed=regressed_values(result.robot, recordings),
-    )
+    if near is None and not biases_only:
+        moving = solved.of_motions
+        result = replace(result, timing=drive_timing(*moving), masses=wrong_masses(*moving))
+        if memory and not result.has_named_causes:  # else torques that last would hide them
+            lasting = stage.with_memory(solved)
+            if lasting is not solved:
+                other = summarize(robot, lasting, tuple(history.records), notices, hold)
+                result = replace(other, timing=result.timing, masses=result.masses)
+        result = replace(result, regressed=regressed_values(result.robot, recordings))
+    return result
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
