@@ -141,28 +141,22 @@ def _calibrated(
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
-    standing = _standing(solved.problems[0].dynamics.steps.noise, noise)
-    if memory and near is None:
-        solved = stage.with_memory(solved)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
-    if near is not None or biases_only:
-        return result
-    estimate = solved.solution.estimate
-    motions = len(solved.problems)
-    moving = solved.problems, estimate.states[:motions], estimate.calibrations[:motions]
-    following = result.robot
+    if near is None and not biases_only:
+        moving = solved.of_motions
+        result = replace(result, timing=drive_timing(*moving), masses=wrong_masses(*moving))
+        if memory and not result.has_named_causes:  # else torques that last would hide them
+            lasting = stage.with_memory(solved)
+            if lasting is not solved:
+                other = summarize(robot, lasting, tuple(history.records), notices, hold)
+                result = replace(other, timing=result.timing, masses=result.masses)
+        result = replace(result, regressed=regressed_values(result.robot, recordings))
     if any(recording.sticking for recording in told):
-        lasting = np.ones(result.noise.n_lasting)
-        following = replace(following, noise=scaled(result.noise, np.concatenate([standing, lasting])))
-    return replace(
-        result,
-        robot=following,
-        timing=drive_timing(*moving),
-        masses=wrong_masses(*moving),
-        regressed=regressed_values(result.robot, recordings),
-    )
+        factors = _standing(solved.problems[0].dynamics.steps.noise, noise, result.noise.n_lasting)
+        result = replace(result, robot=replace(result.robot, noise=scaled(result.noise, factors)))
+    return result
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
@@ -223,10 +217,10 @@ def _windows_stage(
     return noise, [bag.with_points(found.common) for bag in bags]
 
 
-def _standing(moving: ProcessNoise, all_of_it: ProcessNoise) -> Array:
-    """Factors on velocity densities for a filter that goes through standstills, too, where they ask for far more."""
+def _standing(moving: ProcessNoise, all_of_it: ProcessNoise, lasting: int) -> Array:
+    """Factors on densities for a filter that goes through standstills, too, where these ask for far more."""
     more = densities(all_of_it) / densities(moving)
-    return np.where(more > STANDING, more, 1.0)
+    return np.concatenate([np.where(more > STANDING, more, 1.0), np.ones(lasting)])
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

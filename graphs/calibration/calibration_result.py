@@ -199,6 +199,18 @@ class CalibrationResult:
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()
 
+    @property
+    def found(self) -> dict[str, Value]:
+        """Values with their sigmas, by name."""
+        return {p.name: Value(p.value, p.sigma) for p in self.parameters}
+
+    @property
+    def has_named_causes(self) -> bool:
+        """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass."""
+        late = self.timing is not None and bool(self.timing.moved(self.found))
+        heavy = any(mass.moved(self.found) for mass in self.masses)
+        return late or heavy or any(bag.isolated for bag in self.bags)
+
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""
         torques = lasting_torques(self.robot)

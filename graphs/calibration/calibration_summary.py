@@ -69,6 +69,12 @@ class Solved:
         """The robot before the calibration, with the noise of sensors and motion that was used."""
         return self.problems[0].robot
 
+    @property
+    def of_motions(self) -> tuple[list[BagProblem], Sequence[Array], Sequence[Calibration]]:
+        """Problems, states and values of each motion."""
+        estimate, motions = self.solution.estimate, len(self.problems)
+        return self.problems, estimate.states[:motions], estimate.calibrations[:motions]
+
     def encoder_sigmas(self, encoder: MotorEncoder | LinkEncoder) -> Array:
         """Sigmas that the residuals of an encoder ask for, shape (n,)."""
         bags = [(p, c.series[encoder.name]) for p, c in zip(self.problems, self.residuals, strict=True)]

@@ -11,7 +11,7 @@ by how much it would change the values. Nothing is estimated anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_system import Segment
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.time_shift import TimeShift
@@ -31,6 +32,8 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 EFFECT, OWNER = "command_delay", "robot"
+EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
+MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,17 @@ class DriveTiming:
     def label(self) -> str:
         """The effect that calibrates it, ID@OWNER."""
         return f"{EFFECT}@{OWNER}"
+
+    def moved(self, found: Mapping[str, Value]) -> list[str]:
+        """Names of the values that the delay would change by much; none where it may be chance.
+
+        Args:
+            found: calibrated values with their sigmas, by name.
+        """
+        if abs(self.delay) < EARLY_OR_LATE * self.sigma:
+            return []
+        (sigmas, share), changes = MOVES, {n: abs(self.changes[n]) for n in found if n in self.changes}
+        return [n for n, d in changes.items() if d > sigmas * found[n].sigma and d > share * abs(found[n].value)]
 
 
 def drive_timing(

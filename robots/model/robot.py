@@ -186,10 +186,7 @@ class Robot:
         return tree.with_coriolis(True) if any(_is(here.effect, "coriolis") for here in self.effects) else tree
 
     def free_inertias(self) -> NDArray[np.float64]:
-        """Inertia of each link coordinate while all others are free, that of the rotor where it moves nothing else.
-
-        Shape (n_link,) [kg m^2].
-        """
+        """Inertia of each link coordinate while others are free, or its rotor's alone, shape (n_link,) [kg m^2]."""
         alone = self.kinematic_tree.free_inertias()
         for joint in self.tree.massless:
             alone[self.layout.joint_link[self.joints.index(joint)]] = self.drive_parameter(joint, "inertia").value

@@ -27,8 +27,6 @@ UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open af
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
-EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
-MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
@@ -217,11 +215,11 @@ def _same_time(result: CalibrationResult) -> Check:
     if timing is None:
         return Check("info", name, "The model has times of its own, or this was not looked at.")
     delay, sigma = abs(timing.delay), timing.sigma
-    moved = [p for p in result.parameters if _matters(p, timing.changes.get(p.name, 0.0))]
-    if delay < EARLY_OR_LATE * sigma or not moved:
+    names = timing.moved(result.found)
+    if not names:
         text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
         return Check("good", name, text)
-    worst = max(moved, key=lambda p: abs(timing.changes[p.name]) / p.sigma)
+    worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
     other = worst.value + timing.changes[worst.name]
     return Check(
         "warn",
@@ -267,11 +265,6 @@ def _apart(found: ParameterEstimate, value: float, sigma: float) -> float:
     if distance <= APART[1] * max(abs(found.value), abs(value)):
         return 0.0
     return float(distance / max(np.hypot(found.sigma, sigma), 1e-300))
-
-
-def _matters(parameter: ParameterEstimate, change: float) -> bool:
-    sigmas, share = MOVES
-    return abs(change) > sigmas * parameter.sigma and abs(change) > share * abs(parameter.value)
 
 
 def equation_names(result: CalibrationResult) -> list[str]:

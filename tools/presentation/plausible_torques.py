@@ -22,8 +22,6 @@ CONSTANT = "torque_constant"
 MASSES = (0.05, 0.25)  # share by which one N m of the command may be off: fine up to the first, bad beyond the second
 SURE = 3.5  # [sigma]
 ALIKE = 0.1  # share by which constants of drives may differ that are one number, in spite of wrong moments
-BY_CHANCE = 1e-4  # p-value of a wrong mass; 7 arms and legs without one had 0.02 to 0.4, four with one below 3e-6
-MOVED = 0.02  # relative change of a value that a wrong mass must make
 STRONGEST = 500.0  # [N m/A] behind the largest gears of industrial robots
 
 
@@ -71,15 +69,10 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 def _load(result: CalibrationResult) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
     for mass in result.masses:
-        # inertias of rotors are left out: a link and its rotor share theirs, and only the sum is told
-        shares = {
-            p.name: mass.changes[p.name] / abs(p.value)
-            for p in result.parameters
-            if p.name in mass.changes and not p.name.endswith(".inertia") and abs(mass.changes[p.name]) > SURE * p.sigma
-        }
-        worst = max(shares, key=lambda name: abs(shares[name]), default=None)
-        if worst is None or mass.p_value > BY_CHANCE or abs(shares[worst]) < MOVED:
+        shares = mass.moved(result.found)
+        if not shares:
             continue
+        worst = max(shares, key=lambda name: abs(shares[name]))
         return "bad", (
             f"The recording asks for another mass behind {mass.joint}, by {mass.mass:+.2g} ± "
             f"{significant(mass.sigma, 1)} kg if all of it were in the link there: a load that "
