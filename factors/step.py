@@ -24,9 +24,6 @@ from jointscope.robots.parts.state_layout import StateLayout
 Array = NDArray[np.float64]
 
 
-FREE = 20.0  # [rad/s / sqrt(s)] least density of velocities where nothing is asked to hold, however small the noise
-
-
 @dataclass(frozen=True)
 class Steps:
     """Steps between consecutive ticks.
@@ -39,8 +36,8 @@ class Steps:
         weight: W of each step, shape (m, n_link, n_link); None for the identity.
         path: how the commands act, where effects change them; None where they act as logged.
         index: place of each step in the path, shape (m,).
-        slack: factor on the standard deviations of the velocities in each step, shape (m, k); None for 1. Large where
-            something acts that no law tells, such as a hand, or friction that holds; velocities are then nearly free.
+        free: least density of the velocities in each step [rad/s/sqrt(s)], shape (m, k), where something acts that no
+            law tells, such as a hand, or friction that holds; 0 where the equation binds, None where all do.
     """
 
     h: Array
@@ -50,7 +47,7 @@ class Steps:
     weight: Array | None = None
     path: CommandPath | None = None
     index: NDArray[np.intp] | None = None
-    slack: Array | None = None
+    free: Array | None = None
 
     def __len__(self) -> int:
         return len(self.h)
@@ -59,8 +56,8 @@ class Steps:
         """Some of the steps."""
         weight = None if self.weight is None else self.weight[samples]
         index = None if self.index is None else self.index[samples]
-        slack = None if self.slack is None else self.slack[samples]
-        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index, slack=slack)
+        free = None if self.free is None else self.free[samples]
+        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index, free=free)
 
     def acting(self, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
         """Commands that act, shape (m, n), and their derivatives by parameters of effects, by full name.
@@ -83,12 +80,11 @@ class Steps:
         """Standard deviations of the rows (velocities, memories, positions; link before motor), shape (m, d)."""
         h, root = self.h[:, None], np.sqrt(self.h)[:, None]
         rates, k = rate_sigmas(self.noise, h), len(self.layout.velocities)
-        if self.slack is not None:  # memories follow the motion, which the sensors see
-            free = np.where(self.slack > 1.0, FREE, 0.0) * root
-            rates[:, :k] = np.maximum(rates[:, :k] * self.slack, free)
+        if self.free is not None:  # memories follow the motion, which the sensors see
+            rates[:, :k] = np.maximum(rates[:, :k], self.free * root)
         positions = position_sigmas(self.noise, rates[:, :k], h)
-        if self.slack is not None and not self.integrated:
-            positions = positions * self.slack
+        if self.free is not None and not self.integrated:
+            positions = np.maximum(positions, self.free * root * h)
         return np.hstack([rates, positions])
 
     def combine(self, d_v: Array, d_q: Array) -> Array:

@@ -94,10 +94,10 @@ def collect(
         if isinstance(part.factor, DynamicsFactor):
             sigmas = np.broadcast_to(part.factor.sigmas, part.residual.shape)
             expected = sigmas * np.sqrt(np.clip(1.0 - part.leverage, 1e-6, 1.0))
-            slack = part.factor.steps.slack
-            if slack is not None:  # what binds nothing follows the sensors, and is no deviation
-                k = slack.shape[1]
-                expected[:, :k] = np.where(slack > 1.0, sigmas[:, :k], expected[:, :k])
+            free = part.factor.steps.free
+            if free is not None:  # what binds nothing follows the sensors, and is no deviation
+                k = free.shape[1]
+                expected[:, :k] = np.where(free > 0.0, sigmas[:, :k], expected[:, :k])
             rates = problem.robot.layout.n_rates
             collected.process.append(((part.residual * sigmas)[:, :rates], expected[:, :rates]))
         elif part.factor.name in collected.series:

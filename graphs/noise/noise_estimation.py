@@ -73,11 +73,11 @@ class NoiseEvidence:
     def add(self, part: ResidualPart) -> None:
         """Takes in some residuals; those of other factors are ignored."""
         if isinstance(part.factor, DynamicsFactor):
-            half, slack = len(self.squares), part.factor.steps.slack
+            half, free = len(self.squares), part.factor.steps.free
             told = np.ones((len(part.residual), half))
-            if slack is not None:  # memories follow motors that no law holds, too, but not a hand
-                k = slack.shape[1]
-                told[:, :k], told[:, k:] = slack == 1.0, np.any(slack == 1.0, axis=1, keepdims=True)
+            if free is not None:  # memories follow motors that no law holds, too, but not a hand
+                k = free.shape[1]
+                told[:, :k], told[:, k:] = free == 0.0, np.any(free == 0.0, axis=1, keepdims=True)
             self.squares += np.sum(told * part.residual[:, :half] ** 2, axis=0)
             self.freedom += np.sum(told * (1.0 - part.leverage[:, :half]), axis=0)
 

@@ -42,7 +42,8 @@ INTEGRATORS: dict[str, type[DynamicsFactor]] = {
 DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
-SLACK = 1e3  # on the process noise where something unknown acts; the sensors alone tell the states there
+FREE = 20.0  # [rad/s / sqrt(s)] density of velocities where something unknown acts; the sensors alone tell states there
+BANDS = 10.0  # times the dry friction that the robot file says, by which the torque that holds a joint may be off
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,8 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        acting, slack = path if path.changes else None, _slack(robot, recording, timeline)
-        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, slack)
+        acting, free = path if path.changes else None, _free(robot, recording, timeline)
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory_spreads(robot).tolist())
@@ -152,15 +153,18 @@ def _add_rotors(M: Array, robot: Robot, recording: Recording, timeline: Timeline
     M[sticks] = (M[sticks] + np.diag(rotors)) * (alone / (alone + rotors))[:, :, None]
 
 
-def _slack(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
+def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
     """Where steps bind no motion: all in a stretch that is left out, one joint where it sticks; None for neither."""
     if not recording.left_out and not recording.sticking:
         return None
     end, h, layout = timeline.ticks[1:], timeline.h, robot.layout
-    free = np.repeat(~recording.are_judged(end, h)[:, None], len(layout.velocities), axis=1)
-    for row, joint in zip(layout.motor_row, robot.joints, strict=True):
-        free[:, row] |= recording.sticks(joint, end, h)
-    return np.where(free, SLACK, 1.0)
+    free = np.repeat(FREE * ~recording.are_judged(end, h)[:, None], len(layout.velocities), axis=1)
+    for row, link, joint in zip(layout.motor_row, layout.joint_link, robot.joints, strict=True):
+        if joint in recording.sticking:
+            moves = robot.free_inertias()[link] + robot.drive_parameter(joint, "inertia").value
+            held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / moves * np.sqrt(h)
+            free[:, row] = np.maximum(free[:, row], np.where(recording.sticks(joint, end, h), held, 0.0))
+    return free
 
 
 def first_command_time(recording: Recording) -> float:

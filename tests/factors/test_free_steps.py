@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointscope.factors.step import FREE, Steps
+from jointscope.factors.step import Steps
 
 
 @pytest.mark.parametrize("share", (1.0, 1e-9))
@@ -20,11 +20,10 @@ def test_rows_that_nothing_binds_are_free_and_all_others_as_they_were(doggy, sha
     )
     steps = Steps(np.full(4, 2.5e-3), np.zeros((4, doggy.n)), noise, doggy.layout)
     k = len(doggy.layout.velocities)
-    slack = np.ones((4, k))
-    slack[1], slack[2, 0] = 1e3, 1e3
-    free = replace(steps, slack=slack).sigmas
-    np.testing.assert_array_equal(free[[0, 3]], steps.sigmas[[0, 3]])
-    np.testing.assert_array_equal(free[2, 1:k], steps.sigmas[2, 1:k])
-    wanted = np.maximum(1e3 * steps.sigmas[1, :k], FREE * np.sqrt(2.5e-3))
-    np.testing.assert_allclose(free[1, :k], wanted)
-    np.testing.assert_allclose(free[2, 0], wanted[0])
+    free = np.zeros((4, k))
+    free[1], free[2, 0] = 20.0, 0.5
+    sigmas = replace(steps, free=free).sigmas
+    np.testing.assert_array_equal(sigmas[[0, 3]], steps.sigmas[[0, 3]])
+    np.testing.assert_array_equal(sigmas[2, 1:k], steps.sigmas[2, 1:k])
+    np.testing.assert_allclose(sigmas[1, :k], 20.0 * np.sqrt(2.5e-3))
+    assert sigmas[2, 0] == pytest.approx(0.5 * np.sqrt(2.5e-3))
