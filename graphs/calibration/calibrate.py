@@ -19,7 +19,6 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import summarize
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
-from jointscope.graphs.calibration.sticking_joints import asked_again, holding, sticking_joints
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
@@ -92,11 +91,6 @@ def calibrate(
         report("again, with mountings held", 0.0)
         anew = _calibrated(held(robot, turned), recordings, False, None, standstill, solver, sets, memory, report)
         result = released(robot, anew, turned)
-    stuck = {} if near is not None or biases_only or standstill else sticking_joints(result)
-    if stuck:
-        report("again, without the standstill of joints that stick", 0.0)
-        anew = _calibrated(holding(robot, stuck), recordings, False, None, standstill, solver, sets, memory, report)
-        result = asked_again(robot, anew, stuck)
     report("done", 1.0)
     return replace(result, wall_seconds=time.perf_counter() - started)
 
