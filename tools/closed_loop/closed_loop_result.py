@@ -23,7 +23,7 @@ class LoopRun:
     """One controller with one source.
 
     Attributes:
-        controller: "p" or "state_feedback".
+        controller: of `CONTROLLERS`.
         source: "true", "estimator" or "encoders".
         states: true (q_link, v_link, q_motor, v_motor) at the ticks, shape (m, 4 n_joints).
         estimates: the same as the controller knew them.
@@ -66,6 +66,7 @@ class ClosedLoopResult:
         cutoff: of the low-pass behind the differences [Hz].
         mismatch: relative standard deviation of the model's parameters about the true ones; 0 for a given model.
         model_told: where the model comes from, in words.
+        unstable: a sentence for each controller whose gains make the model's loop unstable.
     """
 
     robot: Robot
@@ -79,6 +80,7 @@ class ClosedLoopResult:
     cutoff: float
     mismatch: float
     model_told: str
+    unstable: tuple[str, ...] = ()
 
     def run(self, controller: str, source: str) -> LoopRun | None:
         """The run of a controller with a source, if there was one."""
@@ -99,12 +101,22 @@ class ClosedLoopResult:
             "cutoff": self.cutoff,
             "mismatch": self.mismatch,
             "hits": hits,
+            "unstable": list(self.unstable),
             "runs": [_as_json(run) for run in self.runs],
             "truth": self.truth,
         }
 
 
-CONTROLLERS = {"p": "P", "state_feedback": "state feedback"}
+CONTROLLERS = {
+    "p": "P",
+    "state_feedback": "state feedback",
+    "pd_link": "PD in q",
+    "pd_link_gravity": "PD in q, gravity",
+    "pd_both": "PD in q and motor, gravity",
+    "pd_both_friction": "PD in q and motor, gravity, friction",
+    "pd_motor_friction": "PD in motor, gravity, friction",
+    "inverse_dynamics": "inverse dynamics, friction",
+}
 SOURCES = {"true": "true state", "estimator": "estimator", "encoders": "encoders"}
 """How controllers and sources are called on the screen."""
 
@@ -118,6 +130,8 @@ def _as_json(run: LoopRun) -> dict[str, Any]:
         "link_velocity_rms": t.link_velocity_rms,
         "link_position_rms_by_joint": t.link_position.tolist(),
         "link_velocity_rms_by_joint": t.link_velocity.tolist(),
+        "motor_position_rms_by_joint": t.motor_position.tolist(),
+        "e_rms": t.e_rms,
         "head_position_rms": t.head_position,
         "head_velocity_rms": t.head_velocity,
         "hit_position_rms": t.hit_position,

@@ -12,15 +12,19 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RobotError, SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Sensor
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.closed_loop.controllers.control_law import ControlLaw
+from jointscope.tools.closed_loop.controllers.flexible_joint_control import RECIPES, ROBOTS, FlexibleJointControl
 from jointscope.tools.closed_loop.controllers.proportional_control import ProportionalControl
 from jointscope.tools.closed_loop.controllers.state_feedback import StateFeedback
 from jointscope.tools.closed_loop.loop import Loop
 from jointscope.tools.closed_loop.planning.hitting_plan import hitting_plan
+from jointscope.tools.closed_loop.planning.loop_stability import growth
+from jointscope.tools.closed_loop.planning.moves_plan import moves_plan
 from jointscope.tools.closed_loop.planning.plan import Plan
 from jointscope.tools.closed_loop.planning.reference import model_reference
 from jointscope.tools.closed_loop.planning.tracking import tracking
@@ -44,6 +48,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 SECONDS = 10.0  # [s]
+USUAL = ("p", "state_feedback")  # controllers of a robot that has no others
+PLANS = {"hits": hitting_plan, "moves": moves_plan}
 MISMATCH = 0.02  # relative standard deviation of a well calibrated model's parameters
 
 
@@ -52,24 +58,27 @@ class LoopOptions:
     """What is compared, and how the sources are set.
 
     Attributes:
-        controllers: of "p" and "state_feedback".
+        controllers: of `CONTROLLERS`; none: those that are made for the robot.
         sources: of "true", "encoders" and "estimator".
         lag: of the estimator [s].
         cutoff: of the low-pass behind the differences [Hz].
         mismatch: relative standard deviation of the parameters where no model is given.
         make_estimator: makes an estimator of a model and a lag.
+        motion: "hits" of balls, or "moves", far ones of all joints; none: what is usual for the robot.
     """
 
-    controllers: Sequence[str] = tuple(CONTROLLERS)
+    controllers: Sequence[str] | None = None
     sources: Sequence[str] = tuple(SOURCES)
     lag: float = LAG
     cutoff: float = CUTOFF
     mismatch: float = MISMATCH
     make_estimator: MakeEstimator = fixed_lag_estimator
+    motion: str | None = None
 
     def __post_init__(self) -> None:
         for what, given, known in (
-            ("controller", self.controllers, CONTROLLERS),
+            ("controller", tuple(CONTROLLERS) if self.controllers is None else self.controllers, CONTROLLERS),
+            ("motion", PLANS if self.motion is None else (self.motion,), PLANS),
             ("source", self.sources, SOURCES),
         ):
             unknown = [name for name in given if name not in known]
@@ -90,8 +99,9 @@ def run_closed_loop(
     conditions: Conditions | None = None,
     options: LoopOptions | None = None,
     progress: Progress | None = None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> ClosedLoopResult:
-    """Lets every controller hit balls with every state source.
+    """Lets every controller hit balls, or make far moves, with every state source.
 
     Args:
         robot: the robot; its published values are the truth.
@@ -102,14 +112,18 @@ def run_closed_loop(
         conditions: hidden effects, friction, disturbances, sampling.
         options: what is compared.
         progress: called with a text and the share done.
+        say: called before the first run with a sentence for each controller that makes the model's loop unstable.
 
     Raises:
         SimulationError: an option is impossible, or a simulation diverged.
         RobotError: the model is of another robot.
     """
     conditions, options = conditions or Conditions(), options or LoopOptions()
-    pairs = [(controller, source) for controller in options.controllers for source in options.sources]
-    occasion = Occasion(robot, "hits", seconds, seed, conditions)
+    own = robot.name in ROBOTS
+    controllers = options.controllers or (tuple(RECIPES) if own else USUAL)
+    motion = options.motion or ("moves" if own else "hits")
+    pairs = [(controller, source) for controller in controllers for source in options.sources]
+    occasion = Occasion(robot, motion, seconds, seed, conditions)
     nominal = true_robot(robot, {})
     told = (
         f"robot file {model.path.name}"
@@ -118,12 +132,15 @@ def run_closed_loop(
     )
     model = model or _nearly_true(nominal, occasion, options.mismatch, seed)
     _check_same_robot(robot, model)
-    plan = hitting_plan(nominal, occasion.times, occasion.start, occasion.random("targets"))
-    rehearsal = _Rehearsal(model, plan, _planned_head(occasion.engine, nominal, plan.q), options)
+    plan = PLANS[motion](nominal, occasion.times, occasion.start, occasion.random("targets"))
+    rehearsal = _Rehearsal(nominal, model, plan, _planned_head(occasion.engine, nominal, plan.q), options)
+    unstable = tuple(line for name in controllers for line in rehearsal.growing(name))
+    for line in unstable:
+        say(line)
     runs = []
     for k, pair in enumerate(pairs):
         share = partial(_report, progress, k, len(pairs), f"{CONTROLLERS[pair[0]]}, {SOURCES[pair[1]]}")
-        runs.append(rehearsal.run(*pair, Occasion(robot, "hits", seconds, seed, conditions), share))
+        runs.append(rehearsal.run(*pair, Occasion(robot, motion, seconds, seed, conditions), share))
     return ClosedLoopResult(
         robot,
         model,
@@ -136,34 +153,55 @@ def run_closed_loop(
         options.cutoff,
         options.mismatch,
         told,
+        unstable,
     )
 
 
 class _Rehearsal:
     """All that the runs have in common."""
 
-    def __init__(self, model: Robot, plan: Plan, head: Array, options: LoopOptions):
+    def __init__(self, nominal: Robot, model: Robot, plan: Plan, head: Array, options: LoopOptions):
         self.head = head
         self._model, self._plan, self._options = model, plan, options
         self._reference = model_reference(model, plan.times, plan.q, plan.v, plan.a)
-        self._laws: dict[str, ControlLaw] = {}
-        for name in options.controllers:
-            feedback = name == "state_feedback"
-            self._laws[name] = (
-                StateFeedback(model, self._reference, TICK) if feedback else ProportionalControl(model, plan)
-            )
+        still = np.zeros_like(plan.q)
+        self._motors = model_reference(nominal, plan.times, plan.q, still, still).x[:, nominal.layout.motor_q]
+        self._feedback: StateFeedback | None = None
+
+    def law(self, name: str) -> ControlLaw:
+        """A controller that has not seen anything yet."""
+        if name == "p":
+            return ProportionalControl(self._model, self._plan)
+        if name == "state_feedback":
+            self._feedback = self._feedback or StateFeedback(self._model, self._reference, TICK)
+            return self._feedback
+        return FlexibleJointControl(self._model, self._plan, RECIPES[name])
+
+    def growing(self, name: str) -> list[str]:
+        """A sentence if the gains of a controller make the model's loop unstable."""
+        law = self.law(name)
+        if not isinstance(law, FlexibleJointControl):
+            return []
+        rate, frequency = growth(self._model, self._reference.x[0], law.gain, TICK)
+        if rate <= 0.0:
+            return []
+        return [
+            f"{CONTROLLERS[name]}: its gains make the model unstable at home: a swing of {frequency:.1f} Hz grows by "
+            f"{100 * np.expm1(min(rate, 50.0)):.3g} % a second; lower them or use another controller"
+        ]
 
     def run(self, controller: str, source: str, occasion: Occasion, report: Callable[[float], None]) -> LoopRun:
         """One controller with one source on an occasion that nothing has moved yet."""
         model, plan = self._model, self._plan
         knows = self._source(source, occasion)
-        loop = Loop(OnlineSensors(occasion.sensors()), knows, self._laws[controller], model, len(plan.times))
+        loop = Loop(OnlineSensors(occasion.sensors()), knows, self.law(controller), model, len(plan.times))
         with _garbage_left_alone():
             trajectory = occasion.run(loop, report)
         states, _ = occasion.states(trajectory)
         head = _head(occasion.engine, occasion.truth, occasion.at_ticks(trajectory.q))
         known = model.layout.by_joint(loop.estimates)
-        errors = tracking(plan, self.head, states, head, known, loop.commands, full_command(model))
+        off = joint_angles(model, states[:, 2 * model.n : 3 * model.n] - self._motors)
+        errors = tracking(plan, self.head, off, states, head, known, loop.commands, full_command(model))
         recording = occasion.recording(trajectory, loop.commands)
         account = knows.account() if isinstance(knows, EstimatedState) else None
         return LoopRun(controller, source, states, known, loop.commands, head, errors, recording, account)

@@ -8,7 +8,7 @@ from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.terminal.text_table import text_table
 
 HEAD = [
-    *("controller", "source", "link mrad", "rad/s", "head mm", "at hit mm", "at hit m/s"),
+    *("controller", "source", "E_rms rad", "link mrad", "rad/s", "head mm", "at hit mm", "at hit m/s"),
     *("overshoot mrad", "settled s", "effort", "chatter", "saturated"),
 ]
 KNOWN_HEAD = ["controller", "source", "q_link mrad", "v_link rad/s", "q_motor mrad", "v_motor rad/s"]
@@ -41,7 +41,7 @@ def _tracking(run: LoopRun) -> list[str]:
     settled = "never" if t.settling is None else f"{t.settling:.2f}"
     return [
         *(CONTROLLERS[run.controller], SOURCES[run.source]),
-        *(significant(1e3 * t.link_position_rms), significant(t.link_velocity_rms)),
+        *(significant(t.e_rms), significant(1e3 * t.link_position_rms), significant(t.link_velocity_rms)),
         *(significant(1e3 * t.head_position), significant(1e3 * t.hit_position), significant(t.hit_velocity)),
         *(significant(1e3 * t.overshoot), settled),
         *(f"{t.effort:.3f}", f"{t.chatter:.4f}", percent(t.saturated)),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from jointscope.tools.writing.whole_file import check_outputs, write_json
 
 EXAMPLE = """example:
   jointscope closed-loop doggy --seed 3 --friction smooth --report loop.html
+  jointscope closed-loop biorob --sources true,encoders
   jointscope closed-loop doggy --model found.yaml --seed 3 --effect bearing_flexibility@joint1 --friction smooth
 
 ROBOT is the simulated truth; controllers and estimator know the model only. The same seed is the same robot as in
@@ -29,7 +31,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "closed-loop",
         help="ball hitting in the simulator, tracking errors with and without the estimator",
-        description="Lets the paper's P-controller and a state feedback hit balls in MuJoCo, each fed by the true "
+        description="Lets the P-controller of Doggy's paper and a state feedback hit balls in MuJoCo, or the six "
+        "controllers of the BioRob make far moves, each fed by the true "
         "state, by the fixed-lag estimator and by differentiated encoders.",
         epilog=f"{EXAMPLE}\n\n{effect_list()}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -45,9 +48,13 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, hits and noise; default 0")
     parser.add_argument(
         "--controllers",
-        default=",".join(CONTROLLERS),
         metavar="LIST",
-        help=f"of {', '.join(CONTROLLERS)}, separated by commas; default both",
+        help=f"of {', '.join(CONTROLLERS)}, separated by commas; default: those made for the robot, else the first two",
+    )
+    parser.add_argument(
+        "--motion",
+        choices=["hits", "moves"],
+        help="hits of balls, or far moves of all joints; default moves for the BioRob, else hits",
     )
     parser.add_argument(
         "--sources",
@@ -93,10 +100,15 @@ def run(args: argparse.Namespace) -> int:
     robot = load_robot(args.robot)
     model = None if args.model is None else load_robot(args.model)
     options = LoopOptions(
-        _names(args.controllers), _names(args.sources), lag=args.lag, cutoff=args.cutoff, mismatch=args.mismatch
+        None if args.controllers is None else _names(args.controllers),
+        _names(args.sources),
+        lag=args.lag,
+        cutoff=args.cutoff,
+        mismatch=args.mismatch,
+        motion=args.motion,
     )
     with progress_bar() as progress:
-        result = run_closed_loop(robot, model, args.seconds, args.seed, conditions_of(args), options, progress)
+        result = run_closed_loop(robot, model, args.seconds, args.seed, conditions_of(args), options, progress, _warn)
         if bag is not None and truth_file is not None:
             write_bag(bag, result.recorded.recording, robot)
             write_json(truth_file, result.truth)
@@ -106,6 +118,10 @@ def run(args: argparse.Namespace) -> int:
         print(f"\n{bag} holds the run of {result.recorded.label}")
     files.tell(bag, truth_file)
     return 0
+
+
+def _warn(line: str) -> None:
+    print(f"jointscope: {line}", file=sys.stderr)
 
 
 def _names(text: str) -> tuple[str, ...]:

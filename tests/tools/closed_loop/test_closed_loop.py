@@ -225,7 +225,11 @@ def test_differentiated_encoders_are_a_low_pass_of_differences(truth, plan):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"controllers": ("pid",)}, "unknown controller 'pid'; expected p, state_feedback"),
+        (
+            {"controllers": ("pid",)},
+            "unknown controller 'pid'; expected p, state_feedback, pd_link, pd_link_gravity, "
+            "pd_both, pd_both_friction, pd_motor_friction, inverse_dynamics",
+        ),
         ({"sources": ()}, "no source is named; expected some of true, estimator, encoders"),
         ({"lag": 0.0}, "lag: expected 0.001 to 10, got 0"),
         ({"cutoff": float("nan")}, "cutoff: expected 0.1 to 500, got nan"),

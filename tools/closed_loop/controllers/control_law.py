@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The contract of a law of control, and the two laws by name."""
+"""The contract of a law of control."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class ControlLaw(Protocol):
-    """Without memory, so that all state sources can share it."""
+    """Made anew for each run where it has a memory."""
 
     def command(self, tick: int, x: Array) -> Array:
         """The command of a tick.

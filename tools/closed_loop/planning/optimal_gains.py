@@ -41,7 +41,7 @@ class OptimalGains:
         self._stride = max(1, round(EVERY / step))
         self._columns = np.concatenate([robot.layout.positions, robot.layout.velocities])
         poses = reference.x[:: self._stride]
-        A, B = _linearised(robot, poses, self._columns)
+        A, B = linearised(robot, poses, self._columns)
         found: dict[bytes, Array] = {}
         self._gains = np.zeros((len(poses), robot.n, robot.layout.size))
         for k, x in enumerate(poses):
@@ -55,7 +55,7 @@ class OptimalGains:
         return self._gains[min(round(tick / self._stride), len(self._gains) - 1)]
 
 
-def _linearised(robot: Robot, x: Array, columns: NDArray[np.intp]) -> tuple[Array, Array]:
+def linearised(robot: Robot, x: Array, columns: NDArray[np.intp]) -> tuple[Array, Array]:
     """dx/dt = A x + B u for positions and velocities about states of shape (k, d): (k, c, c) and (k, c, n_joints)."""
     model, half = ElasticJoints(robot), len(columns) // 2
     parameters, no_command = parameter_values(model, robot), np.zeros((len(x), robot.n))

@@ -38,6 +38,7 @@ class Tracking:
 
     Attributes:
         link_position, link_velocity: root mean squares over time, shape (n_joints,) [rad], [rad/s].
+        motor_position: root mean squares of the motors' errors, as joint angles, shape (n_joints,) [rad].
         head_position, head_velocity: root mean squares of the sizes of the head's errors [m], [m/s].
         hits: in the order of the plan.
         effort: root mean square of the command as a share of the full one.
@@ -49,6 +50,7 @@ class Tracking:
 
     link_position: Array
     link_velocity: Array
+    motor_position: Array
     head_position: float
     head_velocity: float
     hits: tuple[HitError, ...]
@@ -61,6 +63,11 @@ class Tracking:
     def link_position_rms(self) -> float:
         """Over all joints [rad]."""
         return _rms(self.link_position)
+
+    @property
+    def e_rms(self) -> float:
+        """Sum over links and motors of their root mean squares, eq. (58) of Ho and Kisner, with 1/N [rad]."""
+        return float(np.sum(self.link_position) + np.sum(self.motor_position))
 
     @property
     def link_velocity_rms(self) -> float:
@@ -90,13 +97,22 @@ class Tracking:
 
 
 def tracking(
-    plan: Plan, planned_head: Array, states: Array, head: Array, estimates: Array, commands: Array, full: Array
+    plan: Plan,
+    planned_head: Array,
+    motor_error: Array,
+    states: Array,
+    head: Array,
+    estimates: Array,
+    commands: Array,
+    full: Array,
 ) -> Tracking:
     """Measures a run.
 
     Args:
         plan: what the links should have done.
         planned_head: where the head should have been, shape (m, 3) [m].
+        motor_error: of the motors' angles against those that hold the plan's postures, as joint angles,
+            shape (m, n_joints) [rad].
         states: true (q_link, v_link, q_motor, v_motor), shape (m, 4 n_joints).
         head: where the head was, shape (m, 3) [m].
         estimates: the same as `states`, as the controller knew them.
@@ -114,6 +130,7 @@ def tracking(
     return Tracking(
         np.sqrt(np.mean((q - plan.q) ** 2, axis=0)),
         np.sqrt(np.mean((v - plan.v) ** 2, axis=0)),
+        np.sqrt(np.mean(motor_error**2, axis=0)),
         _rms(sizes[0]),
         _rms(sizes[1]),
         tuple(_hit_error(plan, hit, planned_head, q, head, *sizes) for hit in plan.hits),

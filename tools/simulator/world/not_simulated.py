@@ -9,7 +9,5 @@ from __future__ import annotations
 NOT_SIMULATED = {
     "coriolis": "every simulation contains the Coriolis terms; calibrate with 'coriolis: false' in the robot file",
     "joint_elasticity": "a joint is simulated as its robot file has it; calibrate with a file that declares it rigid",
-    "weight_dependent_friction": "the engine has the whole torque through a gear, not its part at rest; simulate "
-    "load_dependent_friction in slow motion",
     "integration_error": "the engine integrates exactly; calibrate with 'integrator: euler' in the robot file",
 }
