@@ -116,7 +116,7 @@ class TorqueJudge:
         if score <= 0.0:
             text = "the base parameters imitate it, or the data want the impossible sign"
             return TorqueJudgement(hypothesis, net, 0.0, sizes, sigmas, 0.0, 0.0, 0, 0, 1.0, 0.0, text)
-        left, own = self._left_out(C), self._own(C)
+        left, own = self._left_out(C), self._own(C @ sizes[np.isfinite(sigmas)])
         before, after, ratios = 0.0, 0.0, []
         for j, (r0, r1) in enumerate(zip(self._split(self.left), self._split(left), strict=True)):
             if not own[j]:
@@ -223,8 +223,14 @@ class TorqueJudge:
     def _split(self, values: Array) -> list[Array]:
         return np.split(values, np.cumsum([len(rows.times) for rows in self.rows])[:-1])
 
-    def _own(self, C: Array) -> list[bool]:
-        return [bool(np.any(part)) for part in self._split(C)]
+    def _own(self, torque: Array) -> list[bool]:
+        """Equations in which a candidate does what is worth telling; the one where it does most, if it does so nowhere.
+
+        A wrong torque constant is a matter of one joint, a wrong mass may be one of few: the others neither need its
+        help nor feel its harm.
+        """
+        acts = np.array([_rms(part) for part in self._split(torque)]) / self.drive
+        return [bool(does) for does in acts >= min(ABSOLUTE, float(np.max(acts)))]
 
     def _common(self, left: Array) -> float:
         def weighed(parts: list[Array]) -> float:

@@ -14,15 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS
-from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.priors import DynamicsPrior
+from jointscope.graphs.judging.torque_steps import TorqueSteps
 from jointscope.graphs.problem.standstill import near, slowest_speed
-from jointscope.graphs.scoring.columns.column import Column, SensorPart
+from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.score_columns import columns_of
-from jointscope.graphs.scoring.score_system import Segment, rows_of
+from jointscope.graphs.scoring.score_system import Segment
 
 Array = NDArray[np.float64]
 
@@ -78,7 +77,7 @@ class TorqueEquations:
     """All equations of all segments.
 
     Attributes:
-        segments: linearised pieces of the recordings.
+        steps: of each piece of the recordings.
         windows: by segment, by equation.
         rows: one entry for each joint.
         signals: of each segment, with accelerations of the motion and the commands that these ask for, not those that
@@ -86,7 +85,7 @@ class TorqueEquations:
         expected, sigma: change of the base parameters that their prior expects, and its standard deviation, shape (p,).
     """
 
-    segments: Sequence[Segment]
+    steps: Sequence[TorqueSteps]
     windows: list[list[Window]]
     rows: list[TorqueRows]
     signals: list[ScoreSignals]
@@ -103,19 +102,23 @@ class TorqueEquations:
         """
         robot = segments[0].problem.robot
         windows = [[_window(s, j, band) for j in range(robot.n)] for s in segments]
-        driven = [_steps(s, [Column(in_steps=by) for by in np.moveaxis(s.signals.response, 2, 0)]) for s in segments]
+        steps = [TorqueSteps.of(s) for s in segments]
+        gains = [
+            part.columns([Column(in_steps=by) for by in np.moveaxis(part.segment.signals.response, 2, 0)])
+            for part in steps
+        ]
         found, start = [], np.cumsum([0.0, *(float(np.ptp(s.signals.ticks)) + 10.0 for s in segments)])
         for j, joint in enumerate(robot.joints):
             parts = []
             for i, s in enumerate(segments):
                 window, x, layout = windows[i][j], s.signals.x, s.signals.model.layout
-                row, (missing, base, by_command) = int(layout.joint_link[j]), driven[i]
-                drive = by_command[:, row, j] * s.signals.u[:, j]
+                row = int(layout.joint_link[j])
+                drive = gains[i][:, row, j] * s.signals.u[:, j]
                 parts.append(
                     (
                         start[i] + s.signals.ticks[window.kept] - s.signals.ticks[0],
-                        window.averaged(missing[:, row]),
-                        window.averaged(base[:, row]),
+                        window.averaged(steps[i].missing[:, row]),
+                        window.averaged(steps[i].base[:, row]),
                         window.averaged(drive),
                         x[window.kept, layout.joint_q[j]],
                         x[window.kept, layout.joint_v[j]],
@@ -126,59 +129,24 @@ class TorqueEquations:
             found.append(TorqueRows(joint, times, missing, base, drive, q, v, slowest))
         prior = DynamicsPrior.of(robot)
         expected = -prior.residual((), segments[0].calibration)[0]
-        signals = [_asked_for(s, missing, gains) for s, (missing, _, gains) in zip(segments, driven, strict=True)]
-        return TorqueEquations(segments, windows, found, signals, expected, prior.sigma)
+        signals = [_asked_for(part.segment, part.missing, by) for part, by in zip(steps, gains, strict=True)]
+        return TorqueEquations(steps, windows, found, signals, expected, prior.sigma)
 
     def columns(self, hypothesis: EffectHypothesis) -> list[Array] | None:
         """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for numerics."""
         by_segment = []
-        for s, signals in zip(self.segments, self.signals, strict=True):
+        for steps, signals in zip(self.steps, self.signals, strict=True):
             columns = columns_of(hypothesis, signals)
             if not columns or any(c.better_integrator for c in columns):
                 return None
-            by_segment.append(_steps(s, columns)[2])
-        layout = self.segments[0].signals.model.layout
+            by_segment.append(steps.columns(columns))
+        layout = self.steps[0].segment.signals.model.layout
         return [
             np.concatenate(
                 [w[j].averaged(c[:, int(layout.joint_link[j])]) for w, c in zip(self.windows, by_segment, strict=True)]
             )
             for j in range(len(self.rows))
         ]
-
-
-def _steps(segment: Segment, columns: Sequence[Column]) -> tuple[Array, Array, Array]:
-    """Missing torque, shape (m, r), and what base parameters and columns add, shape (m, r, p) and (m, r, k)."""
-    robot, r = segment.problem.robot, len(segment.signals.model.layout.velocities)
-    # rows weigh the links alone; what a rigid joint moves is its motor, too
-    alone = robot.free_inertias()[None, :].copy()
-    for j, joint in enumerate(robot.joints):
-        if joint not in robot.tree.massless:
-            alone[0, int(segment.signals.model.layout.joint_link[j])] += segment.signals.inertia[j]
-    missing, base, by_size = [], [], []
-    dynamics = [f for f, _, _ in segment.linearized if isinstance(f, DynamicsFactor)]
-    torques, moved = [replace(c, reading=None) for c in columns], _moved(segment, columns)
-    # the first rows come from the dynamics, in the order of their pieces
-    for factor, part in zip(dynamics, rows_of(segment, torques), strict=False):
-        scale = np.broadcast_to(factor.sigmas, part.residual.shape)[:, :r] * alone / factor.steps.h[:, None]
-        change = part.by_size + sum(J @ moved[part.ticks + i] for i, J in enumerate(part.by_state))
-        missing.append(part.residual[:, :r] * scale)
-        base.append(-part.by_block[DYNAMICS][:, :r] * scale[:, :, None])
-        by_size.append(-change[:, :r] * scale[:, :, None])
-    return np.concatenate(missing), np.concatenate(base), np.concatenate(by_size)
-
-
-def _moved(segment: Segment, columns: Sequence[Column]) -> Array:
-    """How far errors of readings move the states, which follow fine encoders, shape (m + 1, d, k)."""
-    s, encoder = segment.signals, segment.problem.robot.motor_encoder
-    q, v = s.model.layout.joint_q, s.model.layout.joint_v
-    part = SensorPart(encoder.name, np.arange(len(q)), s.ticks, s.x[:, q], s.x[:, v])
-    found = np.zeros((*s.x.shape, len(columns)))
-    for i, column in enumerate(columns):
-        if column.reading is not None:
-            error = column.reading(part)
-            found[:, q, i] = -error
-            found[:, v, i] = -np.gradient(error, s.ticks, axis=0, edge_order=2)
-    return found
 
 
 def _asked_for(segment: Segment, missing: Array, gains: Array) -> ScoreSignals:

@@ -78,3 +78,53 @@ def test_what_is_missing_is_the_size_times_the_column(arm, label, sizes, seen, r
         left = np.sqrt(np.mean((rows.missing - column) ** 2))
         assert left < 0.1 * size + 2.0 * floor + 2e-3, (rows.joint, size, left, floor)
     assert max(np.sqrt(np.mean(rows.missing**2)) for rows in found.rows) > 0.05
+
+
+def rms(values):
+    return np.sqrt(np.mean(values**2))
+
+
+def test_what_one_drive_lacks_stands_in_the_equation_of_its_joint_alone(arm):
+    found = equations(arm, ["torque_constant_error@shoulder:share=0.2"])
+    without = equations(arm, [])
+    assert rms(found.rows[0].missing) > 0.1 * rms(found.rows[0].drive)
+    # the links couple the joints: as an acceleration this would be seen at the elbow, too
+    assert rms(found.rows[1].missing) < 1.5 * rms(without.rows[1].missing) + 1e-3 * rms(found.rows[1].drive)
+
+
+SLIDE = """<robot name="slide"><link name="base"/>
+<link name="carriage"><inertial><mass value="40"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="axis" type="prismatic"><parent link="base"/><child link="carriage"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1000" velocity="1"/></joint></robot>"""
+
+
+def test_a_heavier_link_of_a_slide_is_a_heavier_rotor_although_a_force_is_missing(tmp_path):
+    (tmp_path / "slide.urdf").write_text(SLIDE)
+    (tmp_path / "slide.yaml").write_text(
+        """
+format: 1
+name: slide
+urdf: slide.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [axis]
+model: {rigid_joints: [axis]}
+command: {topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: N m}
+sensors:
+  enc: {kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: m, sigma: 1.0e-6}
+parameters:
+  axis.inertia: {value: 40.0, unit: kg}
+  axis.coulomb_torque: {value: 10.0, unit: N}
+noise: {link_velocity: [0.3], motor_velocity: [0.3]}
+"""
+    )
+    slide = load_robot(tmp_path / "slide.yaml")
+    made = simulate(slide, "moves", 5.0, 4, effects=["torque_offset@axis:torque=20"], friction="smooth")
+    problem = BagProblem.of(slide, made.recording)
+    x = np.column_stack([np.interp(problem.timeline.ticks, made.state_times, c) for c in made.states[:, :2].T])
+    found = TorqueEquations.of([Segment.of(problem, x, Calibration.of(slide))], BAND)
+    (mass,) = (h for h in hypotheses_of(slide) if h.label == "link_mass@axis")
+    column = found.columns(mass)[0][:, 0]
+    rotor = found.rows[0].base[:, Calibration.of(slide).names.index("axis.inertia")] / 40.0
+    assert rms(found.rows[0].missing) == pytest.approx(20.0, rel=0.05)
+    assert rms(column - rotor) < 1e-3 * rms(column)
