@@ -58,7 +58,11 @@ class TorqueSteps:
             missing.append((turn[-1] @ part.residual[:, : alone.shape[1], None])[:, :, 0])
             base.append(-turn[-1] @ part.by_block[DYNAMICS][:, : alone.shape[1]])
         found = TorqueSteps(segment, inertia, np.concatenate(turn), np.concatenate(missing), np.concatenate(base))
-        defect = np.linalg.solve(inertia[:-1], found.missing[:, :, None])
+        # columns of candidates take the acceleration from ticks on either side, so this does, too: what differs between
+        # the two is no heavier link
+        seen, v = s.rate[:, s.model.layout.v_link], s.x[:, s.model.layout.v_link]
+        blurred = 0.5 * (seen[1:] + seen[:-1]) - np.diff(v, axis=0) / np.diff(s.ticks)[:, None]
+        defect = np.linalg.solve(inertia[:-1], found.missing[:, :, None]) + blurred[:, :, None]
         for i, slope in _slopes(segment, inertia).items():
             found.base[:, :, i] -= (slope[:-1] @ defect)[:, :, 0]
         return found

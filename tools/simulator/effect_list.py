@@ -19,6 +19,7 @@ EXAMPLES = {
     "imu": "imu1",
     "robot": "robot",
     "upright robot": "robot (upright)",
+    "weighed elastic joint": "joint1 (elastic, under gravity)",
 }
 WIDTH = 100
 

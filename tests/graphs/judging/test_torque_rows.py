@@ -127,4 +127,4 @@ noise: {link_velocity: [0.3], motor_velocity: [0.3]}
     column = found.columns(mass)[0][:, 0]
     rotor = found.rows[0].base[:, Calibration.of(slide).names.index("axis.inertia")] / 40.0
     assert rms(found.rows[0].missing) == pytest.approx(20.0, rel=0.05)
-    assert rms(column - rotor) < 1e-3 * rms(column)
+    assert rms(column - rotor) < 1e-5 * rms(column)

@@ -17,7 +17,7 @@ class WeightDependentFriction(RotorFriction):
     """`coefficient` |s| + `quadratic` s^2 more friction; s: what the engine finds for the arm at rest."""
 
     id = "weight_dependent_friction"
-    acts_on = ("elastic joint",)
+    acts_on = ("weighed elastic joint",)
     defaults: ClassVar[Mapping[str, float]] = {"coefficient": 0.1, "quadratic": 0.0}  # [1], [1/(N m)]
     never_negative = ("coefficient", "quadratic")
 

@@ -50,7 +50,8 @@ class SimulatedEffect:
     Attributes:
         parameters: all values by name.
         id: name of the effect, that of its file.
-        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "robot" and "upright robot".
+        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "robot", "upright robot"
+            and "weighed elastic joint".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
         never_negative: parameters that must not be negative.
@@ -185,10 +186,11 @@ class SimulatedEffect:
 
 
 def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
-    """Names of the owners of a kind; an upright robot is one that feels gravity along -z of its base."""
+    """Names of the owners of a kind; an upright robot feels gravity along -z of its base, a weighed joint any."""
     if kind == "imu":
         return tuple(gyro.name for gyro in robot.gyros)
     elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
     upright = ("robot",) if robot.tree.gravity[2] < 0.0 and not robot.tree.gravity[:2].any() else ()
     joints = {"joint": robot.joints, "elastic joint": elastic, "last joint": robot.joints[-1:]}
+    joints["weighed elastic joint"] = elastic if robot.tree.gravity.any() else ()
     return {**joints, "robot": ("robot",), "upright robot": upright}[kind]
