@@ -36,21 +36,22 @@ def stopping():
     return Recording("stop.mcap", "", 0, {"command": command, "encoder": encoder})
 
 
-def joint(sigma=SIGMA, sharpness=200.0, parameters=(), motors=()):
+def joint(sigma=SIGMA, sharpness=200.0, parameters=(), motors=(), fixed=()):
     """What of a robot counts."""
     encoder = SimpleNamespace(name="encoder", sigmas=np.array([sigma]))
     return SimpleNamespace(
         joints=("j",),
         motor_encoder=encoder,
         layout=SimpleNamespace(motors=motors),
-        parameters=dict.fromkeys(parameters),
+        parameters={name: SimpleNamespace(fixed=name in fixed) for name in parameters},
         sharpness_of=lambda name: sharpness,
         has_effect=lambda effect, owner: False,
     )
 
 
-def test_a_standstill_and_a_reversal_are_left_out_and_nothing_else(stopping):
-    found = leaving_standstill_out(joint(), stopping).sticking["j"]
+@pytest.mark.parametrize("held", [(), ("j.friction_sharpness",)])
+def test_a_standstill_and_a_reversal_are_left_out_and_nothing_else(stopping, held):
+    found = leaving_standstill_out(joint(parameters=held, fixed=held), stopping).sticking["j"]
     np.testing.assert_allclose(found, [(1.0, 1.5), (2.5, 2.5)], atol=0.025)
 
 
