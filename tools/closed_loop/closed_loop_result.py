@@ -87,6 +87,11 @@ class ClosedLoopResult:
         return next((r for r in self.runs if (r.controller, r.source) == (controller, source)), None)
 
     @property
+    def hits_balls(self) -> bool:
+        """Whether the controllers are those of a head that hits a ball; others follow a plan as a whole."""
+        return any(run.controller in ("p", "state_feedback") for run in self.runs)
+
+    @property
     def recorded(self) -> LoopRun:
         """The run that a bag is made of: state feedback with the estimator where there was one, else the last."""
         return self.run("state_feedback", "estimator") or self.runs[-1]

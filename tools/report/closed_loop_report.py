@@ -36,4 +36,8 @@ def closed_loop_report(result: ClosedLoopResult) -> str:
     ]
     truth = result.truth
     subtitle = f"simulated truth, seed {truth['seed']}, {truth['seconds']:g} s · {result.robot.description}"
-    return page(f"Closed loop: {result.robot.name} hits balls", subtitle, sections)
+    return page(
+        f"Closed loop: {result.robot.name} {'hits balls' if result.hits_balls else 'follows a plan'}",
+        subtitle,
+        sections,
+    )

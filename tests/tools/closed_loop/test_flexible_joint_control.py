@@ -17,6 +17,7 @@ from jointscope.tools.closed_loop.controllers.friction_automaton import (
 )
 from jointscope.tools.closed_loop.planning.moves_plan import moves_plan
 from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
+from jointscope.tools.report import closed_loop_report
 from jointscope.tools.simulator.truth import true_robot
 from jointscope.tools.simulator.world.engine import TICK, Engine
 
@@ -100,6 +101,9 @@ def test_the_controllers_stand_in_the_order_of_the_paper():
         options=LoopOptions(sources=("true",)),
         say=said.append,
     )
+    page = closed_loop_report(result)
+    assert "Best: inverse dynamics, friction, true state" in page and "follows a plan" in page
+    assert "unstable at home" in page and "PD in motor, gravity, friction" in page
     e = {run.controller: run.tracking.e_rms for run in result.runs}
     assert min(e["pd_link"], e["pd_link_gravity"]) > max(e["pd_both"], e["pd_motor_friction"])
     assert min(e["pd_both"], e["pd_motor_friction"]) > e["pd_both_friction"] > e["inverse_dynamics"]

@@ -13,11 +13,18 @@ from jointscope.tools.report.page.page import Section
 from jointscope.tools.report.sections.closed_loop.loop_colours import COLOURS
 
 NEAR = 1.5  # times the error with the true state
+FIGURES = 3  # of the best controllers that are shown
 MODEL_LIMITS = 0.7  # of the error with encoders: if the true state does not help more than this, the model is wrong
 
 
 def loop_answer(result: ClosedLoopResult) -> Section:
     """The box at the top."""
+    if not result.hits_balls:
+        runs = sorted(result.runs, key=lambda run: run.tracking.e_rms)[:FIGURES]
+        figures = [(_followed(run), f"{run.label}, E_rms") for run in runs]
+        return answer_box(
+            "answer", "How closely is the plan followed?", loop_judgement(result), figures, _findings(result)
+        )
     controller = "state_feedback" if result.run("state_feedback", result.runs[0].source) else result.runs[0].controller
     runs = [run for run in result.runs if run.controller == controller]
     figures = [(_big(run), f"{SOURCES[run.source]}, off at the hit") for run in runs]
@@ -30,9 +37,23 @@ def loop_judgement(result: ClosedLoopResult) -> Answer:
         found = result.run(controller, "estimator")
         if found is not None:
             return _judge(found, result.run(controller, "true"), result.run(controller, "encoders"))
+    if not result.hits_balls:
+        return _best_follower(result)
     best = min(result.runs, key=lambda run: run.tracking.hit_position)
     headline = f"Best: {best.label}, {_millimetres(best)} off at the hits."
     return Answer("info", headline, "The estimator was not among the sources.")
+
+
+def _best_follower(result: ClosedLoopResult) -> Answer:
+    """The controller with the smallest error over the whole plan, beside the next of the same source."""
+    best = min(result.runs, key=lambda run: run.tracking.e_rms)
+    others = [run for run in result.runs if run.source == best.source and run is not best]
+    headline = f"Best: {best.label}, E_rms {significant(best.tracking.e_rms)} rad over links and motors."
+    if not others:
+        return Answer("info", headline, "No other controller was run with the same source.")
+    following = min(others, key=lambda run: run.tracking.e_rms)
+    share = 100.0 * (1.0 - best.tracking.e_rms / following.tracking.e_rms)
+    return Answer("info", headline, f"{share:.0f} % less than the next, {following.label}.")
 
 
 def _judge(found: LoopRun, true: LoopRun | None, encoders: LoopRun | None) -> Answer:
@@ -78,6 +99,7 @@ def _findings(result: ClosedLoopResult) -> list[str]:
         f"{truth['friction']} friction, hidden effects: {effects or 'none'}",
         f"Controllers and estimator know {result.model_told}",
     ]
+    told += [f"{sentence[0].upper()}{sentence[1:]}" for sentence in result.unstable]
     p = result.run("p", "encoders")
     if p is not None and result.run("state_feedback", "encoders") is not None:
         told.append(
@@ -94,6 +116,11 @@ def _findings(result: ClosedLoopResult) -> list[str]:
 
 def _millimetres(run: LoopRun) -> str:
     return f"{significant(1e3 * run.tracking.hit_position, 2)} mm"
+
+
+def _followed(run: LoopRun) -> str:
+    number = escape(significant(run.tracking.e_rms))
+    return f'<i class="coloured {COLOURS[run.source]}" style="font-style:normal">{number}</i> <small>rad</small>'
 
 
 def _big(run: LoopRun) -> str:

@@ -17,9 +17,9 @@ def source_keys(runs: Iterable[LoopRun]) -> list[Key]:
 
 
 def by_controller(result: ClosedLoopResult) -> list[tuple[str, list[LoopRun]]]:
-    """Title and runs of every controller, state feedback first."""
+    """Title and runs of every controller, the one that knows most first."""
     names = [name for name in reversed(CONTROLLERS) if any(run.controller == name for run in result.runs)]
-    titles = {"p": "P-controller", "state_feedback": "State feedback"}
+    titles = {name: f"{told[0].upper()}{told[1:]}" for name, told in CONTROLLERS.items()} | {"p": "P-controller"}
     return [(titles[name], [run for run in result.runs if run.controller == name]) for name in names]
 
 

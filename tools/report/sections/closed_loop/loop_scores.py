@@ -19,6 +19,7 @@ def _milli(value: float) -> str:
 
 
 COLUMNS: tuple[Column, ...] = (
+    ("E_rms [rad]", lambda t: t.e_rms, significant),
     ("link [mrad]", lambda t: t.link_position_rms, _milli),
     ("link [rad/s]", lambda t: t.link_velocity_rms, significant),
     ("hit [mm]", lambda t: t.hit_position, _milli),
@@ -41,9 +42,10 @@ def loop_scores(result: ClosedLoopResult) -> Section:
         ]
     head = ["controller", "state from", *(name for name, _, _ in COLUMNS)]
     lead = (
-        "Link: root mean square of true − planned over the whole run. Hit: the same for the head at the hits. Over: "
-        "the largest way of a joint past its home after the planned arrival; settled: median time from then until the "
-        "head stays within 2 % of its stroke. Effort and chatter: root mean square of the command and of its change "
+        "E_rms: sum of the root mean squares of true − planned of all links and motors over the whole run. Link: root "
+        "mean square of those of the links. Hit: the same for the head at the hits, or turning points. Over: "
+        "the largest way of a joint past its home after the planned arrival; settled: median time from then until the head "
+        "stays within 2 % of its stroke. Effort and chatter: root mean square of the command and of its change "
         "per tick, as shares of the full command; saturated: share of the time at the limit. Bold: best without the "
         "true state."
     )
