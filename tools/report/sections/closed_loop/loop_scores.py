@@ -44,8 +44,8 @@ def loop_scores(result: ClosedLoopResult) -> Section:
     lead = (
         "E_rms: sum of the root mean squares of true − planned of all links and motors over the whole run. Link: root "
         "mean square of those of the links. Hit: the same for the head at the hits, or turning points. Over: "
-        "the largest way of a joint past its home after the planned arrival; settled: median time from then until the head "
-        "stays within 2 % of its stroke. Effort and chatter: root mean square of the command and of its change "
+        "the largest way of a joint past its home after the planned arrival; settled: median time from then until the "
+        "head stays within 2 % of its stroke. Effort and chatter: root mean square of the command and of its change "
         "per tick, as shares of the full command; saturated: share of the time at the limit. Bold: best without the "
         "true state."
     )
