@@ -8,19 +8,16 @@ out. The held-out recording is scored once per step and never chooses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from dataclasses import replace
+from typing import Any
 
-from jointscope.graphs.calibration.base_model import BaseModel, with_full_gyros
 from jointscope.graphs.calibration.failures_with_notices import names_notices
-from jointscope.graphs.comparison.compare import compare_model
-from jointscope.graphs.comparison.comparison_result import ModelComparison
-from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, diagnose, unexplained
+from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
+from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.verdicts import MATTERS, SURE
-from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -31,71 +28,6 @@ from jointscope.robots.recordings.recording import Recording
 
 MAX_STEPS = 8
 Save = Callable[[int, DiscoveryStep], str]
-
-
-class Errors(Protocol):
-    """How large the error of a model is on its training recordings."""
-
-    @property
-    def error(self) -> float:
-        """Root mean square [sensor sigma]."""
-
-
-class Kind(Protocol):
-    """What a search does with a model; how, depends on the kind of recordings."""
-
-    @property
-    def must_explain(self) -> float:
-        """Share of the squared training error that an effect must take away in the end."""
-
-    def calibrated(self, robot: Robot, start: Any = None) -> Any:
-        """A model, which has its robot, calibrated with the training recordings; near another one if one is given."""
-
-    def errors(self, model: Any) -> Errors:
-        """Errors of a model on the training recordings."""
-
-    def compared(self, label: str, robot: Robot) -> ModelComparison:
-        """A model against the held-out recording, else against the first training recording."""
-
-    def diagnosed(self, model: Any, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
-        """What a model lacks."""
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Recordings of motion (`Kind`); attributes as the arguments of `discover`."""
-
-    recordings: tuple[Recording, ...]
-    holdout: Recording | None
-    missing_torque: bool
-    side_by_side: SideBySide | None
-    must_explain: float = MATTERS
-
-    def calibrated(self, robot: Robot, start: BaseModel | None = None) -> BaseModel:
-        """All components of every gyro are predicted."""
-        return BaseModel.of(robot if start is not None else with_full_gyros(robot), self.recordings, start)
-
-    def errors(self, model: BaseModel) -> ValidationError:
-        """On the pieces where a diagnosis validates."""
-        return judged_error(model, model.robot, model.calibrations, fit_and_judge(model)[1])
-
-    def compared(self, label: str, robot: Robot) -> ModelComparison:
-        """Predictions from causal states."""
-        return compare_model(label, robot, self.holdout or self.recordings[0])
-
-    def diagnosed(self, model: BaseModel, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
-        """The catalogue, scored and refitted."""
-        return diagnose(
-            model.robot,
-            self.recordings,
-            self.holdout,
-            base=model,
-            comparison=comparison,
-            validation=errors,
-            missing_torque=self.missing_torque,
-            side_by_side=self.side_by_side,
-            progress=report,
-        )
 
 
 @in_solver_context

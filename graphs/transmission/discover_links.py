@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
-from jointscope.graphs.discovery.discover import Errors, Save, search
+from jointscope.graphs.discovery.discover import Save, search
 from jointscope.graphs.discovery.discovery_result import Discovery, SavedStep
+from jointscope.graphs.discovery.search_kind import Errors
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.transmission.compare_links import compare_links_model

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jointscope.graphs.discovery import discover as search
+from jointscope.graphs.discovery import search_kind as search
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.discover import discover
 from jointscope.graphs.discovery.discovery_result import SavedStep
