@@ -8,7 +8,7 @@ out. The held-out recording is scored once per step and never chooses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from jointscope.graphs.calibration.failures_with_notices import names_notices
@@ -27,6 +27,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
 MAX_STEPS = 8
+NO_LESS = "leaves the missing torque of every joint as it was"
 Save = Callable[[int, DiscoveryStep], str]
 
 
@@ -80,12 +81,23 @@ def search(
     return _Search(kind, held_out, save, progress or (lambda text, share: None), max_steps).run(robot, resume)
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """An effect that came in: its label, the model before, what that lacked, and its step."""
+
+    label: str
+    base: Any
+    diagnosis: Diagnosis
+    step: DiscoveryStep
+
+
 class _Search:
     """One discovery."""
 
     def __init__(self, kind: Kind, held_out: bool, save: Save | None, report: Progress, max_steps: int):
         self.kind, self.held_out, self.save, self.report = kind, held_out, save, report
         self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
+        self.taken_back = dict[str, str]()
         self.last_errors: Errors | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
@@ -102,23 +114,30 @@ class _Search:
         return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.held_out)
 
     def _loop(self, base: Any) -> tuple[str, Diagnosis | None]:
-        added = sum(step.added is not None for step in self.steps)
-        refused: dict[str, str] = {}
+        added = sum(step.added is not None for step in self.steps) - len(self.taken_back)
+        refused = dict(self.taken_back)
+        trial: _Trial | None = None
         while True:
             share = added / self.max_steps
             diagnosis = self.kind.diagnosed(base, self.steps[-1].comparison, self.last_errors, self._part(share))
             self._attach(diagnosis)
+            if trial is not None and _torque_fell(trial.diagnosis, diagnosis):
+                refused = dict(self.taken_back)
+            elif trial is not None:
+                refused[trial.label] = self._take_back(trial)
+                base, diagnosis, added = trial.base, trial.diagnosis, added - 1
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
             if not chosen:
-                return _why(diagnosis), diagnosis
+                return _did_not_hold(refused) if refused and not diagnosis.adequate else _why(diagnosis), diagnosis
             if added >= self.max_steps:
                 return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
-            grown = next((g for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), None)
+            label, grown = next(
+                ((c.label, g) for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), ("", None)
+            )
             if grown is None:
-                why = "; ".join(f"{label} {reason}" for label, reason in refused.items())
-                return f"what helped on validation blocks did not hold when calibrated with all data: {why}", diagnosis
+                return _did_not_hold(refused), diagnosis
+            trial = _Trial(label, base, diagnosis, self.steps[-2])
             base = self._without_idle(grown)
-            refused.clear()
             added += 1
 
     def _try(self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: dict[str, str]) -> Any:
@@ -155,6 +174,18 @@ class _Search:
                 base = smaller
         return base
 
+    def _take_back(self, trial: _Trial) -> str:
+        """The model before an effect came in, as one more step; says why, and the effect is not tried again."""
+        step, why = trial.step, NO_LESS
+        self.taken_back[trial.label] = why
+        paragraph = f"{trial.label} {why}, and was taken out."
+        step = replace(step, added=None, removed=trial.label, paragraph=paragraph, robot_file="")
+        if self.save is not None:
+            step = replace(step, robot_file=self.save(len(self.steps), step))
+        self.steps.append(step)
+        self.last_errors = None
+        return why
+
     def _add_step(self, added: str | None, removed: str | None, base: Any, paragraph: str, errors: Errors) -> None:
         comparison = self.kind.compared(f"step {len(self.steps)}", base.robot)
         step = DiscoveryStep(
@@ -174,6 +205,8 @@ class _Search:
         self.last_errors = errors
 
     def _restore(self, saved: SavedStep) -> None:
+        if saved.removed is not None and self.steps and self.steps[-1].added == saved.removed:
+            self.taken_back[saved.removed] = NO_LESS  # what fell back to null had come in earlier
         comparison = self.kind.compared(f"step {len(self.steps)}", saved.robot)
         self.steps.append(
             DiscoveryStep(
@@ -199,6 +232,17 @@ class _Search:
         return lambda text, share: self.report(text, min(start + width * share, 1.0))
 
 
+def _torque_fell(before: Diagnosis, after: Diagnosis) -> bool:
+    """Whether an effect, once calibrated with all data, takes from some joint's missing torque what effects must.
+
+    True where models are not judged by torques: there the training error has decided.
+    """
+    missing, left = before.missing_torque_percent, after.missing_torque_percent
+    if missing is None or left is None:
+        return True
+    return any(left[j] ** 2 < (1.0 - MATTERS) * value**2 for j, value in missing.items() if j in left)
+
+
 def _is_idle(robot: Robot, here: EffectAt) -> bool:
     """Whether every size of an effect is free and compatible with its null value."""
     sizes = [p for p in here.effect.parameters_at(robot, here.owner) if not p.is_shape]
@@ -207,6 +251,11 @@ def _is_idle(robot: Robot, here: EffectAt) -> bool:
         not v.fixed and v.sigma is not None and abs(v.value - p.null) < SURE * v.sigma
         for p, v in zip(sizes, values, strict=True)
     )
+
+
+def _did_not_hold(refused: dict[str, str]) -> str:
+    why = "; ".join(f"{label} {reason}" for label, reason in refused.items())
+    return f"what helped on validation blocks did not hold when calibrated with all data: {why}"
 
 
 def _why(diagnosis: Diagnosis) -> str:

@@ -21,8 +21,8 @@ FIRST, SECOND = "motor_viscous@joint2", "torque_offset@joint1"
 class MadeUp:
     """Calibrations, diagnoses and errors without computing: the error halves with each effect that is really there."""
 
-    def __init__(self, patch, hidden, idle=()):
-        self.hidden, self.idle, self.calibrated, self.diagnosed = hidden, idle, [], []
+    def __init__(self, patch, hidden, idle=(), torque=False):
+        self.hidden, self.idle, self.calibrated, self.diagnosed, self.torque = hidden, idle, [], [], torque
         patch.setattr(search, "BaseModel", SimpleNamespace(of=self.calibrate))
         patch.setattr(search, "diagnose", self.diagnose)
         patch.setattr(search, "compare_model", lambda label, robot, recording: self.compare(robot))
@@ -64,13 +64,13 @@ class MadeUp:
             adequate=not candidates,
             unexplained_share=0.25,
             robot=robot,
-            missing_torque_percent=None,
+            missing_torque_percent={"joint1": 5.0, "joint2": self.error(robot)} if self.torque else None,
         )
 
 
 @pytest.fixture
 def made_up(monkeypatch):
-    return lambda hidden, idle=(): MadeUp(monkeypatch, hidden, idle)
+    return lambda hidden, **how: MadeUp(monkeypatch, hidden, **how)
 
 
 def run(doggy, **options):
@@ -101,6 +101,17 @@ def test_what_does_not_lower_the_error_with_all_data_is_refused_and_the_reason_i
     assert not found.adequate
 
 
+def test_what_leaves_the_missing_torque_as_it_was_is_taken_out_again(doggy, made_up):
+    computed = made_up([SECOND], torque=True)
+    found, saved = run(doggy)
+    assert saved == [(0, "base model"), (1, f"+ {FIRST}"), (2, f"- {FIRST}"), (3, f"+ {SECOND}")]
+    assert found.steps[2].paragraph == f"{FIRST} leaves the missing torque of every joint as it was, and was taken out."
+    assert [here.label for here in found.steps[-1].robot.effects] == [SECOND]
+    assert computed.calibrated == [[], [FIRST], [SECOND]]
+    assert computed.diagnosed == [[], [FIRST], [SECOND]]
+    assert f"{FIRST} leaves the missing torque" in found.stop_reason and not found.adequate
+
+
 def test_an_effect_that_falls_back_to_null_is_taken_out(doggy, made_up):
     computed = made_up([FIRST, SECOND], idle=[FIRST])
     computed.error = lambda robot: {(): 8.0, (FIRST,): 4.0}.get(tuple(computed.labels(robot)), 2.0)
@@ -127,6 +138,16 @@ def test_a_resumed_discovery_goes_on_without_doing_the_first_steps_again(doggy, 
     assert computed.diagnosed == [[FIRST], [FIRST, SECOND]]
     assert [step.robot_file for step in found.steps] == ["step0.yaml", "step1.yaml", "step2.yaml"]
     assert [step.train_error for step in found.steps] == [8.0, 4.0, 2.0]
+
+
+def test_a_resumed_discovery_does_not_try_again_what_was_taken_out(doggy, made_up):
+    computed = made_up([SECOND], torque=True)
+    base = SavedStep(None, None, doggy, "step0.yaml", 8.0, 8.0, 1.0, "The base model.")
+    tried = SavedStep(FIRST, None, add_effect(doggy, FIRST), "step1.yaml", 8.0, 8.0, 1.0)
+    back = SavedStep(None, FIRST, doggy, "step2.yaml", 8.0, 8.0, 1.0)
+    _, saved = run(doggy, resume=[base, tried, back])
+    assert saved == [(3, f"+ {SECOND}")]
+    assert computed.diagnosed == [[], [SECOND]]
 
 
 def test_progress_never_goes_beyond_the_whole(doggy, made_up):
