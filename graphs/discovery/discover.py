@@ -27,6 +27,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
 MAX_STEPS = 8
+HELD = " Its sizes are held as blocks left out have them: calibrated, they ran away."
 NO_LESS = "leaves the missing torque of every joint as it was"
 Save = Callable[[int, DiscoveryStep], str]
 
@@ -83,12 +84,13 @@ def search(
 
 @dataclass(frozen=True)
 class _Trial:
-    """An effect that came in: its label, the model before, what that lacked, and its step."""
+    """An effect that came in, the model before, what that lacked, its step, and whether the sizes were held."""
 
-    label: str
+    candidate: Candidate
     base: Any
     diagnosis: Diagnosis
     step: DiscoveryStep
+    held: bool = False
 
 
 class _Search:
@@ -124,27 +126,36 @@ class _Search:
             if trial is not None and _torque_fell(trial.diagnosis, diagnosis):
                 refused = dict(self.taken_back)
             elif trial is not None:
-                refused[trial.label] = self._take_back(trial)
+                refused[trial.candidate.label] = self._take_back(trial)
                 base, diagnosis, added = trial.base, trial.diagnosis, added - 1
+                grown = None if trial.held else self._try(base, trial.candidate, diagnosis, refused, held=True)
+                if grown is not None:
+                    trial, base, added = replace(trial, held=True), grown, added + 1
+                    continue
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
             if not chosen:
                 return _did_not_hold(refused) if refused and not diagnosis.adequate else _why(diagnosis), diagnosis
             if added >= self.max_steps:
                 return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
-            label, grown = next(
-                ((c.label, g) for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None), ("", None)
-            )
-            if grown is None:
+            tries = ((c, g) for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None)
+            candidate, grown = next(tries, (None, None))
+            if candidate is None:
                 return _did_not_hold(refused), diagnosis
-            trial = _Trial(label, base, diagnosis, self.steps[-2])
+            trial = _Trial(candidate, base, diagnosis, self.steps[-2])
             base = self._without_idle(grown)
             added += 1
 
-    def _try(self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: dict[str, str]) -> Any:
-        """The model with a candidate, calibrated with all training recordings; None, and why, if that is no better."""
+    def _try(
+        self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: dict[str, str], held: bool = False
+    ) -> Any:
+        """The model with a candidate, calibrated with all training recordings; None, and why, if that is no better.
+
+        With `held` its sizes stay as they were judged.
+        """
         self.report(f"adding {candidate.label}", len(self.steps) / (self.max_steps + 1))
         try:
-            grown = self.kind.calibrated(diagnosis.refits[candidate.label], base)
+            refit = diagnosis.refits[candidate.label]
+            grown = self.kind.calibrated(_holding(refit, candidate) if held else refit, base)
             errors = self.kind.errors(grown)
         except JointscopeError as err:
             refused[candidate.label] = f"cannot be calibrated ({err})"
@@ -155,7 +166,8 @@ class _Search:
         if not (helps or diagnosis.missing_torque_percent is not None):
             refused[candidate.label] = f"leaves the training error at {errors.error:.3g} sigma ({before:.3g} before)"
             return None
-        self._add_step(candidate.label, None, grown, _added(candidate, grown.robot, before, errors.error), errors)
+        paragraph = _added(candidate, grown.robot, before, errors.error)
+        self._add_step(candidate.label, None, grown, f"{paragraph}{HELD if held else ''}", errors)
         return grown
 
     def _without_idle(self, base: Any) -> Any:
@@ -176,10 +188,10 @@ class _Search:
 
     def _take_back(self, trial: _Trial) -> str:
         """The model before an effect came in, as one more step; says why, and the effect is not tried again."""
-        step, why = trial.step, NO_LESS
-        self.taken_back[trial.label] = why
-        paragraph = f"{trial.label} {why}, and was taken out."
-        step = replace(step, added=None, removed=trial.label, paragraph=paragraph, robot_file="")
+        step, label, why = trial.step, trial.candidate.label, NO_LESS
+        self.taken_back[label] = why
+        paragraph = f"{label} {why}, and was taken out."
+        step = replace(step, added=None, removed=label, paragraph=paragraph, robot_file="")
         if self.save is not None:
             step = replace(step, robot_file=self.save(len(self.steps), step))
         self.steps.append(step)
@@ -232,6 +244,16 @@ class _Search:
         return lambda text, share: self.report(text, min(start + width * share, 1.0))
 
 
+def _holding(robot: Robot, candidate: Candidate) -> Robot:
+    """The robot with all numbers of a candidate fixed as they were judged, with the sigmas found there."""
+    start, parameters = f"{candidate.owner}.{candidate.effect}.", dict(robot.parameters)
+    for name, p in robot.parameters.items():
+        if name.startswith(start):
+            judged = candidate.parameters.get(name.removeprefix(start))
+            parameters[name] = replace(p, fixed=True, sigma=judged.sigma if judged is not None else None)
+    return replace(robot, parameters=parameters)
+
+
 def _torque_fell(before: Diagnosis, after: Diagnosis) -> bool:
     """Whether an effect, once calibrated with all data, takes from some joint's missing torque what effects must.
 
@@ -272,5 +294,5 @@ def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> s
     own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
     values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
     what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
-    why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0]}."
+    why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0].removeprefix('it ')}."
     return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"

@@ -21,8 +21,9 @@ FIRST, SECOND = "motor_viscous@joint2", "torque_offset@joint1"
 class MadeUp:
     """Calibrations, diagnoses and errors without computing: the error halves with each effect that is really there."""
 
-    def __init__(self, patch, hidden, idle=(), torque=False):
+    def __init__(self, patch, hidden, idle=(), torque=False, runs_away=()):
         self.hidden, self.idle, self.calibrated, self.diagnosed, self.torque = hidden, idle, [], [], torque
+        self.runs_away = runs_away
         patch.setattr(search, "BaseModel", SimpleNamespace(of=self.calibrate))
         patch.setattr(search, "diagnose", self.diagnose)
         patch.setattr(search, "compare_model", lambda label, robot, recording: self.compare(robot))
@@ -33,7 +34,8 @@ class MadeUp:
         return [here.label for here in robot.effects]
 
     def error(self, robot):
-        return 8.0 * 0.5 ** len(set(self.labels(robot)) & set(self.hidden))
+        fixed = {f"{n.split('.')[1]}@{p.owner}" for n, p in robot.parameters.items() if p.fixed and n.count(".") == 2}
+        return 8.0 * 0.5 ** len((set(self.labels(robot)) & set(self.hidden)) | (fixed & set(self.runs_away)))
 
     def compare(self, robot):
         return SimpleNamespace(judged_error=self.error(robot), judged_floor=1.0)
@@ -104,12 +106,21 @@ def test_what_does_not_lower_the_error_with_all_data_is_refused_and_the_reason_i
 def test_what_leaves_the_missing_torque_as_it_was_is_taken_out_again(doggy, made_up):
     computed = made_up([SECOND], torque=True)
     found, saved = run(doggy)
-    assert saved == [(0, "base model"), (1, f"+ {FIRST}"), (2, f"- {FIRST}"), (3, f"+ {SECOND}")]
+    tried = [f"+ {FIRST}", f"- {FIRST}"]
+    assert [label for _, label in saved] == ["base model", *tried, *tried, f"+ {SECOND}"]
     assert found.steps[2].paragraph == f"{FIRST} leaves the missing torque of every joint as it was, and was taken out."
     assert [here.label for here in found.steps[-1].robot.effects] == [SECOND]
-    assert computed.calibrated == [[], [FIRST], [SECOND]]
-    assert computed.diagnosed == [[], [FIRST], [SECOND]]
+    assert computed.diagnosed == [[], [FIRST], [FIRST], [SECOND]]
     assert f"{FIRST} leaves the missing torque" in found.stop_reason and not found.adequate
+
+
+def test_sizes_that_run_away_in_the_calibration_are_held_as_they_were_judged(doggy, made_up):
+    made_up([SECOND], torque=True, runs_away=[FIRST])
+    found, saved = run(doggy, max_steps=1)
+    assert [label for _, label in saved] == ["base model", f"+ {FIRST}", f"- {FIRST}", f"+ {FIRST}"]
+    assert "Its sizes are held" in found.steps[-1].paragraph
+    p = found.steps[-1].robot.parameters["joint2.motor_viscous.coefficient"]
+    assert p.fixed
 
 
 def test_an_effect_that_falls_back_to_null_is_taken_out(doggy, made_up):
