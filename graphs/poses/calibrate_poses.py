@@ -23,6 +23,7 @@ from jointscope.graphs.poses.tracker_start import base_from_tracker, tracker_and
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_names
@@ -89,13 +90,16 @@ class PoseCalibration:
 
 
 @in_solver_context
-def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress | None = None) -> PoseCalibration:
+def calibrate_poses(
+    robot: Robot, sessions: Sequence[Poses], progress: Progress | None = None, others: Sequence[SetProblem] = ()
+) -> PoseCalibration:
     """Calibrates an arm from poses.
 
     Args:
         robot: with a section `poses`.
         sessions: poses with one place of the tracker each; contacts of several sessions have names of their own.
         progress: called with a text and the share done.
+        others: recordings of other kinds in the same graph, without blocks or states of their own.
 
     Raises:
         RobotError: the robot has no such section.
@@ -112,7 +116,8 @@ def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress 
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
         problems = [replace(problem, repeatability=scale) for problem in problems]
-        solution = solve(problems, _estimate(problems, known), max_iterations=MOST_ITERATIONS, progress=None)
+        everything = [*problems, *others]
+        solution = solve(everything, _estimate(everything, known), max_iterations=MOST_ITERATIONS, progress=None)
         iterations, known = iterations + len(solution.iterations), solution.estimate.calibrations
         report(f"pass {i + 1}, cost {solution.cost:.6g}", (i + 1) / PASSES)
         if not (solution.converged or solution.flat):
@@ -120,7 +125,7 @@ def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress 
                 f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
-        distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=True)]
+        distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
         worst = max(float(d.max()) for d in distances)
         if 0 < i < PASSES - 1 and worst > OUTLYING:
             problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
@@ -131,14 +136,16 @@ def calibrate_poses(robot: Robot, sessions: Sequence[Poses], progress: Progress 
                     "angles that had not settled, targets that were lost, and names and units of columns"
                 )
             continue
-        covariance = posteriors(problems, solution)[1]
-        ratio = _chi2(problems, known[0], covariance, distances)
+        covariance = posteriors(everything, solution)[1]
+        pairs = zip(others, known[len(problems) :], strict=True)
+        elsewhere = [other.linearize(np.zeros((0, 1)), c).C for other, c in pairs]
+        ratio = _chi2(problems, known[0], covariance, distances, elsewhere)
         wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
         if abs(np.log(wanted / scale)) < AGREES:
             break
         scale = float(wanted)
     seconds = time.perf_counter() - began
-    return _result(robot, problems, known, covariance, before, scale, ratio, out, iterations, seconds)
+    return _result(robot, problems, known[: len(problems)], covariance, before, scale, ratio, out, iterations, seconds)
 
 
 def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:
@@ -167,7 +174,7 @@ def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet
     return robot, [problem.of_robot(robot) for problem in placed]
 
 
-def _estimate(problems: Sequence[PoseSet], known: Sequence[Calibration]) -> Estimate:
+def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> Estimate:
     """Where to go on: at values that were found before, perhaps with other poses, or at the start values."""
     starts = [problem.start(Calibration.of(problem.robot)) for problem in problems]
     found = [start for _, start in starts]
@@ -184,11 +191,18 @@ def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
     return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(problem.covariances(point), r[:, :, None])[:, :, 0]))
 
 
-def _chi2(problems: Sequence[PoseSet], first: Calibration, covariance: Array, distances: Sequence[Array]) -> float:
-    """Squared distances per degree of freedom that the fit has left."""
+def _chi2(
+    problems: Sequence[PoseSet],
+    first: Calibration,
+    covariance: Array,
+    distances: Sequence[Array],
+    elsewhere: Sequence[Array],
+) -> float:
+    """Squared distances per degree of freedom that the fit has left; `elsewhere` is information of other kinds."""
     rows, index = sum(problem.measured for problem in problems), first.columns[DYNAMICS]
     prior = np.array([problems[0].robot.parameters[name].coordinate_sigma for name in first.names])
     used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
+    used -= sum(float(np.sum(information * covariance[index, index])) for information in elsewhere)
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
 
 

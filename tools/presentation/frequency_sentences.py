@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
 from jointscope.tools.presentation.numbers import significant, with_sigma
 
 
@@ -41,3 +42,22 @@ def value_rows(result: FrequencyCalibration) -> list[list[str]]:
         note = "not identifiable" if name in result.silent else ""
         rows.append([name, significant(start, 4), value, sigma, p.unit, note])
     return rows
+
+
+def kinds_sentences(result: KindsCalibration) -> list[str]:
+    """Agreement first, then the sums of squares."""
+    found, (alone, joint) = result.agreement, result.pose_squares
+    how = "contradict each other" if found.doubtful else "agree"
+    test = f"chi-square {significant(found.chi2, 3)} for {found.dof} directions that both tell, p = "
+    lines = [f"poses and frequency responses {how}: {test}{significant(found.p_value, 2)}"]
+    if found.doubtful:
+        lines.append(
+            "stiffness under weight is not that of the vibration, or one kind is of another arm: calibrate each alone "
+            "and compare the values"
+        )
+    rows = sum(problem.measured for problem in result.alone.problems)
+    lines.append(
+        f"sum of squares of the poses: {significant(alone, 3)} alone, {significant(joint, 3)} with the responses, of "
+        f"{rows} coordinates; the responses pay {significant(result.frequency_squares, 3)}"
+    )
+    return lines

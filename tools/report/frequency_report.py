@@ -39,10 +39,15 @@ def frequency_report(result: FrequencyCalibration, checked: AcceptedBy = NO_LIMI
         Section("verdict", "What was found", f"<ul>{verdict}</ul>", f"{len(result.problems)} poses."),
         *acceptance(checked),
         _values(result),
-        *(_pose(result, problem, k) for k, problem in enumerate(result.problems)),
-        *(_balance(problem, k) for k, problem in enumerate(result.problems)),
+        *response_sections(result),
     ]
     return page(f"{result.robot.name}: drives and bearings from frequency responses", paths, sections)
+
+
+def response_sections(result: FrequencyCalibration) -> list[Section]:
+    """Measured and model, and what torques are left, pose by pose."""
+    responses = [_pose(result, problem, k) for k, problem in enumerate(result.problems)]
+    return responses + [_balance(problem, k) for k, problem in enumerate(result.problems)]
 
 
 def _values(result: FrequencyCalibration) -> Section:

@@ -35,12 +35,17 @@ def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None, ch
         checked: limits that the user has declared, as they came out.
     """
     paths = ", ".join(problem.poses.path for problem in result.problems)
-    makers = (_verdict, _waterfall, _histogram, _against, _values, _silent)
-    sections = [make(result) for make in makers]
+    sections = pose_sections(result)
     if found is not None:
         sections.insert(1, _steps(found))
     sections[1:1] = acceptance(checked)
     return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
+
+
+def pose_sections(result: PoseCalibration) -> list[Section]:
+    """What a page says of poses; the verdict comes first."""
+    makers = (_verdict, _waterfall, _histogram, _against, _values, _silent)
+    return [make(result) for make in makers]
 
 
 def _steps(found: PoseDiscovery) -> Section:

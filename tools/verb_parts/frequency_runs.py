@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`calibrate` with --frequency: shaken poses in; robot file, report and JSON out."""
+"""`calibrate` with --frequency, alone or with --poses: shaken poses in; robot file, report and JSON out."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from typing import Any
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.signals import Excitation, Signals
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
+from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
 from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
 
 
@@ -39,25 +41,81 @@ def run_frequency_calibration(
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
-    from jointscope.tools.bags.read_shaken import read_shaken
     from jointscope.tools.report.frequency_report import frequency_report
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
 
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not frequency responses; use --report")
+    result = calibrate_frequency(robot, read_all_shaken(robot, paths, progress), progress)
+    content = result.to_json()
+    checked = check_models(limits, {robot.name: content})
+    page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
+    write_still(files, result.robot, frequency_origin(result, robot), page, content)
+    return frequency_calibration_text(result), checked
+
+
+def read_all_shaken(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[tuple[Signals, Excitation]]:
+    """The recordings of all poses in which the arm was shaken."""
+    from jointscope.tools.bags.read_shaken import read_shaken
+
     recordings = []
     for i, path in enumerate(paths):
         progress(f"reading {path.name}", i / len(paths))
         recordings.append(read_shaken(path, robot))
-    result = calibrate_frequency(robot, recordings, progress)
-    content = result.to_json()
-    checked = check_models(limits, {robot.name: content})
-    page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
-    write_still(files, result.robot, _origin(result, robot), page, content)
-    return frequency_calibration_text(result), checked
+    return recordings
 
 
-def _origin(result: Any, start: Robot) -> dict[str, Any]:
+def frequency_origin(result: Any, start: Robot) -> dict[str, Any]:
+    """Where a calibration from frequency responses comes from."""
     poses = [problem.pose for problem in result.problems]
     found = [{"path": p.path, "sha256": p.sha256, "lines": len(p.lines)} for p in poses]
     return made_from(start.path.name) | {"frequency": found}
+
+
+def run_kinds_calibration(
+    robot: Robot,
+    bags: Sequence[Path],
+    poses: Sequence[Path],
+    files: ResultFiles,
+    urdf: Path | None,
+    limits: Sequence[Limit],
+    progress: Progress,
+) -> tuple[str, AcceptedBy]:
+    """Calibrates, writes the files, and returns what the screen says, and which limits are kept.
+
+    Raises:
+        RobotError: a viewer recording was asked for, or the robot file lacks a section.
+        JointscopeError: recordings or poses cannot be used, or a file cannot be written; then none is.
+    """
+    from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
+    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.presentation.frequency_sentences import kinds_sentences
+    from jointscope.tools.report.kinds_report import kinds_report
+    from jointscope.tools.terminal.poses_text import pose_calibration_text
+    from jointscope.tools.terminal.responses_text import frequency_calibration_text
+
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion, not poses or frequency responses; use --report")
+    sessions = [read_poses(path, robot) for path in poses]
+    result = calibrate_kinds(robot, read_all_shaken(robot, bags, progress), sessions, progress)
+    both, (alone, joint) = result.frequency.to_json(), result.pose_squares
+    silent = set(result.frequency.silent)
+    content = both | pose_json(result.poses) | {
+        "iterations": result.frequency.iterations + result.poses.iterations,
+        "samples": both["samples"] + result.poses.count,
+        "wall_seconds": result.wall_seconds,
+        "undetermined": [*result.poses.determined.combinations, *({name: 1.0} for name in sorted(silent))],
+        "agreement": {
+            "chi2": result.agreement.chi2,
+            "dof": result.agreement.dof,
+            "p_value": result.agreement.p_value,
+            "squares": {"poses_alone": alone, "poses": joint, "frequency": result.frequency_squares},
+        },
+    }  # fmt: skip
+    checked = check_models(limits, {robot.name: content})
+    page, content = partial(kinds_report, result, checked), content | acceptance_json(checked)
+    made = pose_origin(result.poses, robot) | frequency_origin(result.frequency, robot)
+    write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
+    agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
+    texts = [pose_calibration_text(result.poses), frequency_calibration_text(result.frequency)]
+    return "\n\n".join([agree, *texts]), checked

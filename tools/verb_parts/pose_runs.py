@@ -68,10 +68,10 @@ def check_one_kind(
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
         )
-    if frequency and (bags or poses or rests):
+    if frequency and (bags or rests):
         raise RecordingError(
-            "frequency responses and other kinds in one estimate are not on the command line yet; give --frequency "
-            "alone, and the robot file that it writes as ROBOT with the others"
+            "frequency responses go with poses in one estimate, and not yet with motion or rests on the command line; "
+            "give --frequency with --poses or alone, and the robot file that it writes as ROBOT with the others"
         )
     if poses and rests:
         raise RecordingError(
@@ -116,14 +116,18 @@ def run_pose_calibration(
     result = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress)
     content = pose_json(result)
     checked = check_models(limits, {robot.name: content})
-    others = {}
-    if urdf is not None:
-        from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
-
-        others[urdf] = calibrated_urdf(result.robot)
     page, content = partial(poses_report, result, checked=checked), content | acceptance_json(checked)
-    write_still(files, result.robot, _origin(result, robot), page, content, others)
+    write_still(files, result.robot, pose_origin(result, robot), page, content, urdf_files(result.robot, urdf))
     return pose_calibration_text(result), checked
+
+
+def urdf_files(robot: Robot, urdf: Path | None) -> dict[Path, str]:
+    """The URDF with the geometry that poses told, by its path, where it is asked for."""
+    if urdf is None:
+        return {}
+    from jointscope.robots.geometry.calibrated_urdf import calibrated_urdf
+
+    return {urdf: calibrated_urdf(robot)}
 
 
 def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[str, dict[str, Any]]:
@@ -176,7 +180,7 @@ def run_pose_search(
         return pose_ranking_text(candidates, result.count)
     found = discover_poses(robot, sessions, [read_poses(path, robot) for path in holdout], progress)
     last = found.steps[-1].result
-    made, content = _origin(last, robot), _discovery(found, files.robot)
+    made, content = pose_origin(last, robot), _discovery(found, files.robot)
     write_still(files, found.robot, made, partial(poses_report, last, found), content)
     return pose_discovery_text(found)
 
@@ -249,6 +253,7 @@ def pose_json(result: Any) -> dict[str, Any]:
     }
 
 
-def _origin(result: Any, start: Robot) -> dict[str, Any]:
+def pose_origin(result: Any, start: Robot) -> dict[str, Any]:
+    """Where a calibration from poses comes from."""
     poses = [{"path": p.poses.path, "sha256": p.poses.sha256, "count": len(p.poses)} for p in result.problems]
     return made_from(start.path.name) | {"poses": poses}

@@ -13,7 +13,11 @@ from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
-from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, run_frequency_calibration
+from jointscope.tools.verb_parts.frequency_runs import (
+    add_frequency_option,
+    run_frequency_calibration,
+    run_kinds_calibration,
+)
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
@@ -24,6 +28,7 @@ EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
   jointscope calibrate tx90l --poses poses.csv -o arm.yaml --urdf arm.urdf --report arm.html
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 -o arm.yaml --report arm.html
+  jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 --poses poses -o arm.yaml --report arm.html
   jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
@@ -84,6 +89,12 @@ def run(args: argparse.Namespace) -> int:
 
     load_user_effects(args.effects)
     robot, limits = load_robot(args.robot), limits_of(args)
+    if args.poses and args.frequency:
+        with progress_bar() as progress:
+            text, checked = run_kinds_calibration(robot, args.frequency, args.poses, files, args.urdf, limits, progress)
+        print(text)
+        files.tell(args.urdf)
+        return print_acceptance(checked)
     if args.poses:
         with progress_bar() as progress:
             text, checked = run_pose_calibration(robot, args.poses, files, args.urdf, limits, progress)

@@ -44,7 +44,12 @@ def test_a_robot_that_does_not_say_what_is_shaken_is_told_where_to_look(bag, tmp
 
 def test_other_kinds_and_options_of_motion_are_refused(bag, tmp_path, capsys):
     out = ["-o", tmp_path / "o.yaml"]
-    assert "in one estimate are not on the command line" in refused(["tx90l", bag, OPTION, bag, *out], capsys)
+    assert "not yet with motion or rests" in refused(["tx90l", bag, OPTION, bag, *out], capsys)
+    both = ["tx90l", OPTION, bag, "--poses", bag, *out]
+    assert "not yet with motion or rests" in refused(["tx90l", bag, *both[1:]], capsys)
+    assert "not yet with motion or rests" in refused([*both, "--rests", bag], capsys)
+    assert "leave it out with --poses" in refused([*both, "--incremental"], capsys)
+    assert "--rrd shows motion" in refused([*both, "--rrd", tmp_path / "o.rrd"], capsys)
     assert "leave it out with --frequency" in refused(["tx90l", OPTION, bag, "--incremental", *out], capsys)
     assert "use --report" in refused(["tx90l", OPTION, bag, "--rrd", tmp_path / "o.rrd", *out], capsys)
     assert "--frequency BAG" in refused(["tx90l", *out], capsys)
@@ -96,3 +101,21 @@ def test_robot_file_report_and_json_are_written(tmp_path, capsys):
     assert set(content["frequency"]["entries"]) == {f"{i},{j}" for i in (1, 2, 3) for j in (1, 2, 3)}
     page = (tmp_path / "arm.html").read_text()
     assert "joint2 to joint1 [rad/s^2/(N m)]" in page and "What is left in" in page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")
+def test_poses_and_responses_in_one_estimate_write_what_both_kinds_write(tmp_path, capsys):
+    names = {"-o": "arm.yaml", "--urdf": "arm.urdf", "--report": "arm.html", "--json": "arm.json"}
+    options = [text for option, name in names.items() for text in (option, str(tmp_path / name))]
+    bags = [str(TX90L / "frequency" / f"frequency_{p}") for p in ("P1", "P3")]
+    poses = ["--poses", str(TX90L / "poses_calibration")]
+    assert main(["calibrate", "tx90l", OPTION, *bags, *poses, *options]) == 0
+    assert "poses and frequency responses agree" in capsys.readouterr().out
+    content = json.loads((tmp_path / "arm.json").read_text())
+    assert {"poses", "poses_before", "repeatability", "frequency", "frequency_before"} <= content.keys()
+    assert content["agreement"]["p_value"] > 0.01
+    page = (tmp_path / "arm.html").read_text()
+    assert "Do the kinds agree?" in page and "joint2 to joint1 [rad/s^2/(N m)]" in page and "How far off" in page
+    assert load_robot(tmp_path / "arm.yaml").parameters["joint1.stiffness"].sigma < 1000.0
+    assert (tmp_path / "arm.urdf").is_file()

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What frequency responses tell of the shared values, as one Gaussian factor that holds what is in doubt.
+
+With slopes g = J'r and information A = J'J of the whitened residuals at some values, the slope has not the covariance A
+that white residuals give it, but S: what bands of neighbouring lines have in common where that is more, and the slope
+that friction of the other size would add. The values that the responses alone prefer then have the information
+
+    M = A S^-1 A  <=  A
+
+A kind that is added this way never widens what others tell. A Gauss-Newton step finds these preferred values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+TOLD = 1e-9  # of the largest eigenvalue, in prior sigmas: directions with less information are not told
+
+
+@dataclass(frozen=True)
+class FrequencySummary:
+    """The factor (`SetProblem`); it has no states of its own.
+
+    Attributes:
+        robot: the model.
+        information: M, shape (p, p).
+        preferred: coordinates of the dynamic parameters that the responses alone prefer, shape (p,).
+        measured: number of measured values that it stands for.
+        owner: None, it is whole.
+    """
+
+    robot: Robot
+    information: Array
+    preferred: Array
+    measured: int
+    owner: int | None = None
+
+    kind: str = field(default="frequency", init=False)
+    priors: tuple[()] = field(default=(), init=False)
+
+    @staticmethod
+    def of(problems: Sequence[FrequencySet], calibration: Calibration) -> FrequencySummary:
+        """Summary of poses at their last stage.
+
+        Args:
+            problems: the poses.
+            calibration: values that were found, of blocks that they touch.
+        """
+        robot = problems[0].robot
+        unit = np.array([robot.parameters[name].coordinate_sigma for name in calibration.names])
+        systems = [problem.linearize(np.zeros((0, 1)), calibration) for problem in problems]
+        A = np.sum([system.C for system in systems], axis=0) * np.outer(unit, unit)
+        g = np.sum([system.g_p for system in systems], axis=0) * unit
+        size, V = np.linalg.eigh(A)
+        told = size > TOLD * size[-1]
+        root = V[:, told] / np.sqrt(size[told])  # A^-1/2 on what is told
+        bands = np.vstack([problem.slopes(calibration) for problem in problems]) * unit @ root
+        doubt = np.sum([problem.doubt(calibration) for problem in problems], axis=0) * unit @ root
+        common, U = np.linalg.eigh(bands.T @ bands)
+        S = (U * np.maximum(common, 1.0)) @ U.T + np.outer(doubt, doubt)
+        half = V[:, told] * np.sqrt(size[told])
+        M = half @ np.linalg.solve(S, half.T)
+        preferred = calibration.dynamics - unit * (root @ (root.T @ g))
+        return FrequencySummary(robot, M / np.outer(unit, unit), preferred, sum(p.measured for p in problems))
+
+    def of_robot(self, robot: Robot) -> FrequencySummary:
+        """The same responses of a robot with other values."""
+        return replace(self, robot=robot)
+
+    def start(self, common: Calibration) -> tuple[Array, Calibration]:
+        """No states."""
+        return np.zeros((0, 1)), common.only([DYNAMICS])
+
+    def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
+        """Normal equations of the shared values."""
+        system = NormalEquations.zeros(0, 1, calibration.size)
+        away = calibration.dynamics - self.preferred
+        system.C += self.information
+        system.g_p += self.information @ away
+        system.cost += 0.5 * float(away @ self.information @ away)
+        return system

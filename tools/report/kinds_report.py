@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a calibration from poses and frequency responses: whether they agree, then the sections of both."""
+
+from __future__ import annotations
+
+from html import escape
+
+from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
+from jointscope.tools.presentation.frequency_sentences import (
+    identifiable_sentence,
+    kinds_sentences,
+    matrix_sentence,
+    one_realisation,
+)
+from jointscope.tools.report.frequency_report import response_sections
+from jointscope.tools.report.page.acceptance import acceptance
+from jointscope.tools.report.page.page import Section, page
+from jointscope.tools.report.poses_report import pose_sections
+
+
+def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS) -> str:
+    """The whole page as text, without references to anything outside of itself.
+
+    Args:
+        result: the calibration.
+        checked: limits that the user has declared, as they came out.
+    """
+    responses = result.frequency
+    paths = [p.poses.path for p in result.poses.problems] + [p.pose.path for p in responses.problems]
+    said = [matrix_sentence(responses), identifiable_sentence(responses), *one_realisation(responses)]
+    headline, *more = kinds_sentences(result)
+    items = "".join(f"<li>{escape(item)}</li>" for item in [*more, *said])
+    verdict, *others = pose_sections(result.poses)
+    sections = [
+        Section("kinds", "Do the kinds agree?", f"<ul>{items}</ul>", headline),
+        verdict,
+        *acceptance(checked),
+        *others,
+        *response_sections(responses),
+    ]
+    return page(f"{result.robot.name}: poses and frequency responses", ", ".join(paths), sections)
