@@ -88,11 +88,11 @@ def calibrate_kinds(
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     poses = alone = calibrate_poses(robot, sessions, report)
     base = alone.problems[0].robot
-    problems = [first_stage(base, ShakenPose.of(*recording)) for recording in recordings]
+    first = [first_stage(base, ShakenPose.of(*recording)) for recording in recordings]
     iterations = stages = 0
     for _ in range(MOST_PASSES):
         before = poses
-        problems, solution, steps, more = settled_stages(problems, list(poses.problems), report)
+        problems, solution, steps, more = settled_stages(first, list(poses.problems), report)
         iterations, stages = iterations + steps, stages + more
         summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])
         poses = calibrate_poses(robot, sessions, report, [summary])

@@ -37,6 +37,18 @@ def test_verification_poses_are_predicted(joint):
     assert mm["p90_mm"] < 0.055 and mm["max_mm"] < 0.11
 
 
+def test_one_frequency_pose_leaves_the_tip_where_poses_have_it():
+    robot = load_robot("tx90l")
+    recordings = [read_shaken(TX90L / "frequency" / "frequency_P1", robot)]
+    found = calibrate_kinds(robot, recordings, [read_poses(TX90L / "poses_calibration", robot)])
+    _, (poses,) = placed(found.robot, [read_poses(TX90L / "poses_verification", robot)])
+    mm = tip_errors(poses).to_json()
+    assert mm["p90_mm"] < 0.055 and mm["max_mm"] < 0.11
+    for name, true in truth("frequency").items():
+        p = found.robot.parameters[name]
+        assert abs(p.value - true) < 3.0 * p.sigma, name
+
+
 def test_springs_and_dampers_are_right_within_their_sigmas(joint):
     for name, true in truth("frequency").items():
         p = joint.robot.parameters[name]
