@@ -24,7 +24,7 @@ def discovered(doggy):
     The search starts at the true values of all other parameters, so that calibrations are quick.
     """
     pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
-    from jointscope.graphs.discovery import discover
+    from jointscope.graphs.discovery import discover, search_kind
     from jointscope.tools.simulator import simulate
 
     effect = f"{HIDDEN}:coefficient={COEFFICIENT}"
@@ -38,7 +38,7 @@ def discovered(doggy):
         return f"step{number}.yaml"
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(discover, "diagnose", partial(discover.diagnose, leaders=1))
+        patch.setattr(search_kind, "diagnose", partial(search_kind.diagnose, leaders=1))
         result = discover.discover(near, [train], test, save=save)
     return SimpleNamespace(result=result, saved=saved, label=HIDDEN, coefficient=COEFFICIENT)
 
