@@ -22,6 +22,7 @@ from jointscope.graphs.calibration.motion_regimes import slowest_visible_speed
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.joint_states import JointStates
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.model.lasting_torques import equation_inertias
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -133,15 +134,12 @@ def _given(robot: Robot, recording: Recording) -> Array:
 
 def _impulses(robot: Robot, ticks: Array, x: Array, defects: Array) -> Array:
     """What the equation of each link lacks in each step, shape (m, n_link) [N m s]."""
-    moved, layout = robot.free_inertias(), robot.layout
-    for link, joint in zip(layout.joint_link, robot.joints, strict=True):
-        if joint not in layout.motors and joint not in robot.tree.massless:
-            moved[link] += robot.drive_parameter(joint, "inertia").value
+    layout = robot.layout
     lacking = defects[:, : layout.n_link]
     if robot.noise.n_lasting:  # most of it is in the torques that last
         w = x[:, layout.size - robot.noise.n_lasting :][:, : layout.n_link]
         lacking = lacking + 0.5 * (w[1:] + w[:-1]) * np.diff(ticks)[:, None]
-    return lacking * moved
+    return lacking * equation_inertias(robot)[: layout.n_link]
 
 
 def _means(ticks: Array, impulses: Array, edges: Array) -> Array:

@@ -27,7 +27,7 @@ from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
-from jointscope.robots.model.lasting_torques import memory_spreads
+from jointscope.robots.model.lasting_torques import equation_inertias, memory_spreads
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -159,10 +159,10 @@ def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | Non
         return None
     end, h, layout = timeline.ticks[1:], timeline.h, robot.layout
     free = np.repeat(FREE * ~recording.are_judged(end, h)[:, None], len(layout.velocities), axis=1)
-    for row, link, joint in zip(layout.motor_row, layout.joint_link, robot.joints, strict=True):
+    inertias = equation_inertias(robot)
+    for row, joint in zip(layout.motor_row, robot.joints, strict=True):
         if joint in recording.sticking:
-            moves = robot.free_inertias()[link] + robot.drive_parameter(joint, "inertia").value
-            held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / moves * np.sqrt(h)
+            held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / inertias[row] * np.sqrt(h)
             free[:, row] = np.maximum(free[:, row], np.where(recording.sticks(joint, end, h), held, 0.0))
     return free
 
