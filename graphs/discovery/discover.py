@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from jointscope.graphs.calibration.failures_with_notices import names_notices
@@ -99,7 +100,6 @@ class _Search:
     def __init__(self, kind: Kind, held_out: bool, save: Save | None, report: Progress, max_steps: int):
         self.kind, self.held_out, self.save, self.report = kind, held_out, save, report
         self.max_steps, self.steps = max_steps, list[DiscoveryStep]()
-        self.taken_back = dict[str, str]()
         self.last_errors: Errors | None = None  # of the last step; unknown after a resumed one
 
     def run(self, robot: Robot, resume: Sequence[SavedStep]) -> Discovery:
@@ -116,22 +116,24 @@ class _Search:
         return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.held_out)
 
     def _loop(self, base: Any) -> tuple[str, Diagnosis | None]:
-        added = sum(step.added is not None for step in self.steps) - len(self.taken_back)
-        refused = dict(self.taken_back)
+        refused: dict[str, str] = {}
         trial: _Trial | None = None
         while True:
+            added = sum(step.added is not None for step in self.steps) - len(self._taken_back())
             share = added / self.max_steps
             diagnosis = self.kind.diagnosed(base, self.steps[-1].comparison, self.last_errors, self._part(share))
             self._attach(diagnosis)
             if trial is not None and _torque_fell(trial.diagnosis, diagnosis):
-                refused = dict(self.taken_back)
+                refused = {}
             elif trial is not None:
-                refused[trial.candidate.label] = self._take_back(trial)
+                self._take_back(trial)
                 base, diagnosis, added = trial.base, trial.diagnosis, added - 1
                 grown = None if trial.held else self._try(base, trial.candidate, diagnosis, refused, held=True)
                 if grown is not None:
-                    trial, base, added = replace(trial, held=True), grown, added + 1
+                    trial, base = replace(trial, held=True), grown
                     continue
+            there = {here.label for here in base.robot.effects}
+            refused |= {label: NO_LESS for label in self._taken_back() if label not in there}
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
             if not chosen:
                 return _did_not_hold(refused) if refused and not diagnosis.adequate else _why(diagnosis), diagnosis
@@ -143,7 +145,6 @@ class _Search:
                 return _did_not_hold(refused), diagnosis
             trial = _Trial(candidate, base, diagnosis, self.steps[-2])
             base = self._without_idle(grown)
-            added += 1
 
     def _try(
         self, base: Any, candidate: Candidate, diagnosis: Diagnosis, refused: dict[str, str], held: bool = False
@@ -186,17 +187,20 @@ class _Search:
                 base = smaller
         return base
 
-    def _take_back(self, trial: _Trial) -> str:
-        """The model before an effect came in, as one more step; says why, and the effect is not tried again."""
-        step, label, why = trial.step, trial.candidate.label, NO_LESS
-        self.taken_back[label] = why
-        paragraph = f"{label} {why}, and was taken out."
-        step = replace(step, added=None, removed=label, paragraph=paragraph, robot_file="")
+    def _taken_back(self) -> list[str]:
+        """Effects that left right after they came in, which are not tried again; idle ones had come in earlier."""
+        pairs = pairwise(self.steps)
+        return [step.removed for before, step in pairs if step.removed is not None and step.removed == before.added]
+
+    def _take_back(self, trial: _Trial) -> None:
+        """The model before an effect came in, as one more step."""
+        label = trial.candidate.label
+        paragraph = f"{label} {NO_LESS}, and was taken out."
+        step = replace(trial.step, added=None, removed=label, paragraph=paragraph, robot_file="")
         if self.save is not None:
             step = replace(step, robot_file=self.save(len(self.steps), step))
         self.steps.append(step)
         self.last_errors = None
-        return why
 
     def _add_step(self, added: str | None, removed: str | None, base: Any, paragraph: str, errors: Errors) -> None:
         comparison = self.kind.compared(f"step {len(self.steps)}", base.robot)
@@ -217,8 +221,6 @@ class _Search:
         self.last_errors = errors
 
     def _restore(self, saved: SavedStep) -> None:
-        if saved.removed is not None and self.steps and self.steps[-1].added == saved.removed:
-            self.taken_back[saved.removed] = NO_LESS  # what fell back to null had come in earlier
         comparison = self.kind.compared(f"step {len(self.steps)}", saved.robot)
         self.steps.append(
             DiscoveryStep(

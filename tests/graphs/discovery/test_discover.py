@@ -123,6 +123,13 @@ def test_sizes_that_run_away_in_the_calibration_are_held_as_they_were_judged(dog
     assert p.fixed
 
 
+def test_an_effect_that_is_in_with_its_sizes_held_is_not_said_to_be_refused(doggy, made_up):
+    made_up([], torque=True, runs_away=[FIRST])
+    found, _ = run(doggy)
+    assert [here.label for here in found.steps[-1].robot.effects] == [FIRST]
+    assert f"{SECOND} leaves the missing torque" in found.stop_reason and FIRST not in found.stop_reason
+
+
 def test_an_effect_that_falls_back_to_null_is_taken_out(doggy, made_up):
     computed = made_up([FIRST, SECOND], idle=[FIRST])
     computed.error = lambda robot: {(): 8.0, (FIRST,): 4.0}.get(tuple(computed.labels(robot)), 2.0)
