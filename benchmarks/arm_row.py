@@ -18,7 +18,7 @@ ADVISED, MISLED, STUCK = "refused, advice works", "refused, advice fails", "refu
 OUTCOMES = (RIGHT, ADVISED, MISLED, STUCK, WRONG, BROKEN)
 VERDICT = re.compile(r"^(Yes|Usable|No)\b", re.MULTILINE)
 # what findings say of pushes and mistakes; the recordings of the benchmark have none
-ACCUSING = re.compile(r"push|collision|leave-out|swapped|mirrored|left.handed|exchanged|glitch", re.IGNORECASE)
+ACCUSING = re.compile(r"push|presses|collision|leave-out|swapped|mirrored|left.handed|exchanged|glitch", re.IGNORECASE)
 SUPPLY = re.compile(r"motor\.supply_voltage:\s*([-+.\deE]+)")
 PLACES = {
     "inertia": ("inertia",),

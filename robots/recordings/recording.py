@@ -18,6 +18,8 @@ from jointscope.robots.errors import RecordingError
 Array = NDArray[np.float64]
 
 GRID = 1000  # instants at which a recording is looked at
+LEFT_OUT = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase")
+"""Kinds of notices by which the reader took data away or changed their times: whoever believes a result has to know."""
 SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
 
 
@@ -73,7 +75,7 @@ class Notice:
     Attributes:
         stream: name of the stream.
         kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "clipping",
-            "out_of_order", "duplicate", "info", "jitter".
+            "end_stop", "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

@@ -20,6 +20,7 @@ from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.own_stamps import at_message_stamps
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.end_stops_left_out import with_end_stops_left_out
 from jointscope.tools.bags.fitting_messages import fitting_messages, left_out_notices
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.messages.columns import Columns
@@ -90,6 +91,7 @@ def read_recording(
     if seams:
         recording = recording.leaving_out([((a - start_ns) / 1e9, (b - start_ns) / 1e9) for a, b in seams])
     recording = with_silences_left_out(with_short_holes(recording), robot.motor_encoder.name)
+    recording = with_end_stops_left_out(recording, robot)
     return replace(recording, notices=by_importance(recording.notices))
 
 

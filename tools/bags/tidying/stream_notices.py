@@ -20,8 +20,8 @@ LONG_GAP = 3.5  # periods; shorter ones are a lost sample or two
 MISSING_SHARE = 0.02  # of the samples
 WORTH_SAYING = 0.2  # of the period: jitter that makes samples uneven
 IMPORTANCE = (
-    "unit", "axes", "clock", "foreign", "glitch", "gap", "dropped", "posture", "staircase", "clipping", "out_of_order",
-    "duplicate", "info", "jitter",
+    "unit", "axes", "clock", "foreign", "glitch", "end_stop", "gap", "dropped", "posture", "staircase", "clipping",
+    "out_of_order", "duplicate", "info", "jitter",
 )  # fmt: skip
 CLIPPED_RUN = 3  # equal extreme samples in a row
 LIMIT_SHARE = 0.2  # of the largest value of all channels: below it an extreme is no limit
