@@ -25,7 +25,7 @@ from jointscope.graphs.poses.tip_errors import contact_distances, tip_errors, wi
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
-from jointscope.tools.bags.read_poses import read_poses
+from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
 
 DATA = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "tx90l"

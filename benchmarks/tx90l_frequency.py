@@ -10,7 +10,7 @@ from typing import Any
 
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.bags.read_shaken import read_shaken
+from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
 WANTED = {"frequency": "1 %, 4 %", "frequency_soft_bearing": "1 %, 5 %"}  # errors of drives, of bearings
 

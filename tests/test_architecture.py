@@ -20,6 +20,7 @@ graphs.scoring graphs.calibration graphs.responses graphs.frequency graphs.rests
 graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
+tools.bags.at_poses
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text

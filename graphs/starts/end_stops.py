@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, convolve1d, label
+from scipy.ndimage import binary_dilation, convolve1d, find_objects, label
 
 from jointscope.graphs.starts.drive_regression import (
     DRY,
@@ -36,7 +36,7 @@ from jointscope.robots.recordings.recording import Recording
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-ZONES = (0.002, 0.005, 0.01, 0.02, 0.04)  # of the range that a joint used: how far a stop may give way
+END = 0.04  # of the range that a joint used: how far a stop may give way
 SET_APART = 0.08  # of the range at either end, which the regression is asked to do without
 STANDS_OUT = 5.0  # times the torque that is missing on the rest of the way
 ONE_SIGNED = 0.98  # of the squared torque
@@ -44,7 +44,8 @@ BEYOND_DRY = 2.0  # times the dry friction: a joint that turns over may lack as 
 OF_DRIVE = 0.1  # of the rms torque of the drive
 TOUCHES = 3.0  # times what is missing elsewhere, from which a visit of the end is a contact
 SEVERAL = 2  # visits that end at the same place,
-LONG = 0.2  # [s] or one that lasts
+LONG = 0.05  # [s] or one that lasts
+SAMPLES = 4.0  # of the encoder, too: one wild sample is no contact
 FEWEST_CELLS = 200  # on the rest of the way
 
 
@@ -110,19 +111,17 @@ def _stops_of(joint: str, cells: MotionCells, j: int, signals: Array, equation: 
     drive = plain[GAIN] * float(np.sqrt(np.mean(signals[:, 0] ** 2)))
     least = max(BEYOND_DRY * abs(plain.get(DRY, 0.0)), OF_DRIVE * abs(drive))
     q = cells.q[:, j]
-    for side in (1.0, -1.0):
-        depth = side * (np.max(side * q) * side - q) / max(float(np.ptp(q)), 1e-300)
-        candidates = []
-        for zone in ZONES:
-            at_end = depth < zone
-            elsewhere = cells.known[:, j] & ~binary_dilation(at_end, around)
-            usual = float(np.sqrt(np.mean(missing[elsewhere] ** 2))) if np.sum(elsewhere) > FEWEST_CELLS else np.inf
-            contact = _contacts(at_end, side * missing, usual)
-            clear = _clearness(contact, at_end, side * missing, usual, least, cells.h)
-            candidates.append((clear, contact))
-        # a zone that is too narrow leaves some of the contact outside, where it counts as usual
-        clear, contact = max(candidates, key=lambda candidate: candidate[0])
-        if clear > STANDS_OUT:
+    reach = END * max(float(np.ptp(q)), 1e-300)
+    ends = {1.0: q > np.max(q) - reach, -1.0: q < np.min(q) + reach}
+    elsewhere = cells.known[:, j] & ~binary_dilation(ends[1.0] | ends[-1.0], around)
+    if np.sum(elsewhere) < FEWEST_CELLS:
+        return
+    usual = float(np.sqrt(np.mean(missing[elsewhere] ** 2)))
+    for side, at_end in ends.items():
+        contact = _contacts(at_end, side * missing > TOUCHES * usual)
+        lasts = np.sum(contact) * cells.h > max(LONG, SAMPLES * cells.period)
+        often = label(contact)[1] >= SEVERAL
+        if (often or lasts) and _is_pressed(side * missing[at_end], usual, least):
             at = float(np.average(q[contact], weights=np.abs(missing[contact])))
             pressed = float(np.max(side * missing[contact]))
             yield EndStop(joint, at, pressed, _stretches(binary_dilation(contact, around), cells))
@@ -136,27 +135,23 @@ def _missing_torque(signals: Array, values: Mapping[str, float], width: float, h
     return np.asarray(convolve1d(signals @ np.array(weights), window / np.sum(window), mode="nearest"))
 
 
-def _contacts(at_end: Flags, pressing: Array, usual: float) -> Flags:
-    """Visits of the end in which something is pressed, whole, shape (m,)."""
-    visits, count = label(at_end)
-    pressed = np.unique(visits[at_end & (pressing > TOUCHES * usual)]) if count else np.zeros(0, int)
-    return np.asarray(at_end & np.isin(visits, pressed))
+def _contacts(at_end: Flags, pressed: Flags) -> Flags:
+    """In each visit of the end all from the first to the last cell in which something is pressed, shape (m,)."""
+    contact = np.zeros_like(at_end)
+    for (visit,) in find_objects(label(at_end)[0]):
+        cells = np.flatnonzero(pressed[visit])
+        if len(cells):
+            contact[visit.start + cells[0] : visit.start + cells[-1] + 1] = True
+    return contact
 
 
-def _clearness(contact: Flags, at_end: Flags, pressing: Array, usual: float, least: float, h: float) -> float:
-    """How far what is pressed at an end stands out from what is usual; zero for what is no stop."""
-    count = label(contact)[1]
-    if not count or (count < SEVERAL and np.sum(contact) * h < LONG):
-        return 0.0
-    there = pressing[at_end]
-    outward, square = float(np.sum(there[there > 0.0] ** 2)), float(np.sum(there**2))
-    if outward < ONE_SIGNED * square or np.max(there) < least:
-        return 0.0
-    return float(np.sqrt(square / len(there)) / max(usual, 1e-300))
+def _is_pressed(pressing: Array, usual: float, least: float) -> bool:
+    """Whether what is pressed at an end is one-signed, large, and unusual."""
+    outward, square = float(np.sum(pressing[pressing > 0.0] ** 2)), float(np.sum(pressing**2))
+    one_signed = outward > ONE_SIGNED * square and np.max(pressing) > least
+    return bool(one_signed and square > len(pressing) * (STANDS_OUT * usual) ** 2)
 
 
 def _stretches(flags: Flags, cells: MotionCells) -> tuple[tuple[float, float], ...]:
     change = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))).reshape(-1, 2)
-    return tuple(
-        (float(cells.times[a] - 0.5 * cells.h), float(cells.times[b - 1] + 0.5 * cells.h)) for a, b in change
-    )
+    return tuple((float(cells.times[a] - 0.5 * cells.h), float(cells.times[b - 1] + 0.5 * cells.h)) for a, b in change)

@@ -20,6 +20,27 @@ LINK = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child lin
 <link name="of_{name}"><inertial><origin xyz="0.02 0.01 -0.18"/><mass value="{mass}"/>
  <inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
 
+YAML = """
+format: 1
+name: arm
+urdf: arm.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [JOINTS]
+model: {rigid_joints: [JOINTS]}
+command: {topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: N m}
+sensors:
+  encoder: {kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: rad,
+            sigma: 1.0e-5}
+noise: {link_velocity: [NOISE], motor_velocity: [NOISE]}
+effects: [EFFECTS]
+parameters:
+"""
+VALUES = """
+  jN.inertia: {value: 0.4, unit: kg m2}
+  jN.coulomb_torque: {value: 1.0, unit: N m}
+  jN.motor_viscous.coefficient: {value: 1.0, unit: N m s/rad, prior: 0.0, prior_sigma: 50.0, positive: false}
+"""
+
 
 @dataclass(frozen=True)
 class Arm:
@@ -72,6 +93,7 @@ def moved(
     seed: int = 1,
     sticks: bool = False,
     push: tuple[float, float, int, float] | None = None,
+    stop: tuple[int, float, float] | None = None,
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -85,6 +107,7 @@ def moved(
         seed: of motion, jitter and noise.
         sticks: whether dry friction truly holds a joint that stands; else it turns over within a few mrad/s.
         push: from and to [s], joint, torque [N m] of a hand.
+        stop: joint, and from where to where it can move from its middle [rad].
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
     text = arm.urdf.format(options='<mujoco><compiler balanceinertia="false"/></mujoco>')
@@ -96,9 +119,12 @@ def moved(
     if sticks:  # stiff enough that nothing is seen to creep
         model.dof_frictionloss[:], dry = arm.dry, np.zeros(n)
         model.dof_solref[:], model.dof_solimp[:] = (0.002, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
-    data = mujoco.MjData(model)
     middle, size = rng.uniform(-0.8, 0.8, n), np.where([a.isupper() for a in arm.axes], 0.06, 0.35)
     speeds, phases = rng.uniform(1.5, 9.0, (4, n)), rng.uniform(0.0, 6.0, (4, n))
+    if stop is not None:
+        model.jnt_limited[stop[0]], model.jnt_range[stop[0]] = True, middle[stop[0]] + np.array(stop[1:])
+        model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    data = mujoco.MjData(model)
     data.qpos[:] = middle
     due = np.unique(np.rint(_stamps(rng, seconds, command_rate) / STEP).astype(int))
     sampled = _stamps(rng, seconds, encoder_rate)
@@ -136,6 +162,17 @@ def written(arm: Arm, folder: Path) -> Path:
     """The URDF as a file."""
     (folder / "arm.urdf").write_text(arm.urdf.format(options=""), encoding="utf-8")
     return folder / "arm.urdf"
+
+
+def robot_file(arm: Arm, folder: Path) -> Path:
+    """A robot file of rigid joints beside its URDF; its start values are not the arm's."""
+    written(arm, folder)
+    joints = ", ".join(arm.joints)
+    text = YAML.replace("JOINTS", joints).replace("NOISE", ", ".join(["0.3"] * len(arm.joints)))
+    text = text.replace("EFFECTS", ", ".join(f'"motor_viscous@{joint}"' for joint in arm.joints))
+    text += "".join(VALUES.replace("jN", joint) for joint in arm.joints)
+    (folder / "arm.yaml").write_text(text, encoding="utf-8")
+    return folder / "arm.yaml"
 
 
 def _stamps(rng: np.random.Generator, seconds: float, rate: float) -> np.ndarray:

@@ -56,7 +56,7 @@ def run_frequency_calibration(
 
 def read_all_shaken(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[tuple[Signals, Excitation]]:
     """The recordings of all poses in which the arm was shaken."""
-    from jointscope.tools.bags.read_shaken import read_shaken
+    from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
     recordings = []
     for i, path in enumerate(paths):
@@ -88,7 +88,7 @@ def run_kinds_calibration(
         JointscopeError: recordings or poses cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
-    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.presentation.frequency_sentences import kinds_sentences
     from jointscope.tools.report.kinds_report import kinds_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text

@@ -107,7 +107,7 @@ def run_pose_calibration(
         JointscopeError: the poses cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.poses.calibrate_poses import calibrate_poses
-    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.report.poses_report import poses_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text
 
@@ -134,7 +134,7 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
     """Errors of some models on poses, for the screen and for JSON."""
     from jointscope.graphs.poses.calibrate_poses import placed
     from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary
-    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.poses_text import pose_errors_text
 
     by_label: dict[str, dict[str, TipErrors]] = {}
@@ -163,7 +163,7 @@ def run_pose_search(
     """
     from jointscope.graphs.poses.calibrate_poses import calibrate_poses
     from jointscope.graphs.poses.discover_poses import discover_poses, pose_candidates
-    from jointscope.tools.bags.read_poses import read_poses
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.report.poses_report import poses_report
     from jointscope.tools.terminal.pose_discovery_text import pose_discovery_text, pose_ranking_text
 

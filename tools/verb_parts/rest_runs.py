@@ -32,7 +32,7 @@ def add_rests_option(parser: argparse.ArgumentParser) -> None:
 
 def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> list[Rests]:
     """The rests of some recordings."""
-    from jointscope.tools.bags.read_rests import read_rests
+    from jointscope.tools.bags.at_poses.read_rests import read_rests
 
     found = []
     for i, path in enumerate(paths):

@@ -88,7 +88,7 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
     Raises:
         SimulationError: an option of recordings of motion, or another file than a table.
     """
-    from jointscope.tools.bags.pose_table import pose_table
+    from jointscope.tools.bags.at_poses.pose_table import pose_table
     from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
     from jointscope.tools.verb_parts.simulation_options import assignments
 

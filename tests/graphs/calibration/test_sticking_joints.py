@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_arm import Arm, moved, written
+from simulated_arm import Arm, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -18,36 +18,13 @@ from jointscope.tools.presentation.judgement import judge
 pytestmark = pytest.mark.slow
 
 ARM = Arm("yxy", dry=(4.0, 1.5, 0.5))
-YAML = """
-format: 1
-name: arm
-urdf: arm.urdf
-gravity: [0.0, 0.0, -9.81]
-joints: [j0, j1, j2]
-model: {rigid_joints: [j0, j1, j2]}
-command: {topic: /cmd, type: sensor_msgs/msg/JointState, field: effort, unit: N m}
-sensors:
-  encoder: {kind: motor_encoder, topic: /js, type: sensor_msgs/msg/JointState, field: position, unit: rad,
-            sigma: 1.0e-5}
-noise: {link_velocity: [0.3, 0.3, 0.3], motor_velocity: [0.3, 0.3, 0.3]}
-effects: ["motor_viscous@j0", "motor_viscous@j1", "motor_viscous@j2"]
-parameters:
-"""
-VALUES = """
-  jN.inertia: {value: 0.4, unit: kg m2}
-  jN.coulomb_torque: {value: 1.0, unit: N m}
-  jN.motor_viscous.coefficient: {value: 1.0, unit: N m s/rad, prior: 0.0, prior_sigma: 50.0, positive: false}
-"""
 LATE = 2e-3  # [s]
 PUSH = (4.0, 4.25, 1, 4.0)
 
 
 @pytest.fixture
 def robot(tmp_path):
-    written(ARM, tmp_path)
-    text = YAML + "".join(VALUES.replace("jN", joint) for joint in ARM.joints)
-    (tmp_path / "arm.yaml").write_text(text, encoding="utf-8")
-    return load_robot(tmp_path / "arm.yaml")
+    return load_robot(robot_file(ARM, tmp_path))
 
 
 def recorded(late=0.0, **how):

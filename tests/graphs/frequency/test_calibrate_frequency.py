@@ -9,7 +9,7 @@ from shaken_arm import TX90L, truth
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.read_shaken import read_shaken
+from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
 pytestmark = [
     pytest.mark.slow,

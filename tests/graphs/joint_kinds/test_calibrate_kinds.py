@@ -15,8 +15,8 @@ from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.read_poses import read_poses
-from jointscope.tools.bags.read_shaken import read_shaken
+from jointscope.tools.bags.at_poses.read_poses import read_poses
+from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
 pytestmark = [
     pytest.mark.slow,

@@ -15,7 +15,7 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import contact_distances, tip_errors
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.poses import Poses
-from jointscope.tools.bags.read_poses import read_poses
+from jointscope.tools.bags.at_poses.read_poses import read_poses
 
 DH = ((0, 0.333, 0), (0, 0, -90), (0, 0.316, 90), (0.0825, 0, 90), (-0.0825, 0.384, -90), (0, 0, 90), (0.088, 0, 90))
 

@@ -10,7 +10,7 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.read_rests import check_loads
+from jointscope.tools.bags.at_poses.read_rests import check_loads
 
 ROBOT = load_robot("biorob")
 NOTHING = np.zeros((1, 3))

@@ -11,7 +11,7 @@ from measured_poses import PANDA, TX90L
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.read_poses import read_poses
+from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.command_line import main
 
 needs_poses = pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")

@@ -13,8 +13,8 @@ from jointscope.robots.files.pose_section import no_poses
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.robots.recordings.recording import Notice
-from jointscope.tools.bags.pose_table import poses_from_table
-from jointscope.tools.bags.poses_from_bag import poses_from_bag
+from jointscope.tools.bags.at_poses.pose_table import poses_from_table
+from jointscope.tools.bags.at_poses.poses_from_bag import poses_from_bag
 
 ROUND = {"deg": (1.0, 0.1, 0.01), "rad": (0.1, 0.01, 0.001)}  # that not all readings of encoders are multiples of
 FEWEST = 4  # poses that chance does not make round
