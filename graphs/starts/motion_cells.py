@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 CELLS_PER_SAMPLE = 4  # of the encoders; the command changes between their samples
+FEWEST_SAMPLES = 10  # a curve through fewer says nothing of accelerations
 SHORTEST_CELL = 1.5e-3  # [s] motion is smooth within it
 SHORTEST_SPAN = 0.1  # [s] hardly anything moves in less
 MOST_CELLS = 40_000
@@ -78,8 +79,10 @@ def motion_cells(
         left_out: stretches of time in which something else acted [s].
 
     Raises:
-        RecordingError: the two do not overlap, or hardly.
+        RecordingError: the two do not overlap, or hardly, or there are hardly any positions.
     """
+    if len(encoder) < FEWEST_SAMPLES:
+        raise RecordingError(f"there are {len(encoder)} positions; expected at least {FEWEST_SAMPLES}")
     period = float(np.median(np.diff(encoder.times)))
     t0 = float(max(encoder.times[0], command.times[0]))
     t1 = float(min(encoder.times[-1], command.times[-1] + (period if held else 0.0)))

@@ -57,6 +57,14 @@ def test_the_torque_of_a_unit_is_found_with_everything_else(tmp_path, streams):
         assert np.sign(equation.direction().value) == np.sign(constants[j])
 
 
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_a_handful_of_positions_is_refused_in_words(streams, count):
+    encoder, command = streams
+    few = replace(encoder, times=encoder.times[:count], values=encoder.values[:count])
+    with pytest.raises(RecordingError, match=f"there are {count} positions; expected at least 10"):
+        motion_cells(few, command, np.full(3, NOISE))
+
+
 @pytest.mark.parametrize("seed", [2, 3])
 def test_sigmas_hold_for_coarse_encoders(tmp_path, seed):
     step = 2.0 * np.pi / 4096
