@@ -12,7 +12,7 @@ from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.plausible_torques import plausible_torques
 from jointscope.tools.presentation.torque_constants import suspicious_constants
-from jointscope.tools.presentation.whiteness import LAGS, autocorrelation, strength
+from jointscope.tools.presentation.whiteness import LAGS, channel_memory, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
@@ -80,15 +80,6 @@ def is_mounting_or_bias(parameter: ParameterEstimate) -> bool:
     return any(part in parameter.name for part in (".R_imu_body", ".bias", ".lever_"))
 
 
-def channel_whiteness(fit: BagFit) -> dict[str, float]:
-    """Largest autocorrelation of each channel's residual over short lags."""
-    return {
-        channel: float(np.max(np.abs(autocorrelation((s.measured - s.predicted)[:, i])), initial=0.0))
-        for s in fit.residuals.values()
-        for i, channel in enumerate(s.channels)
-    }
-
-
 def _noise_as_stated(result: CalibrationResult) -> Check:
     name = "Residuals as large as the sensor noise"
     if not result.channels:
@@ -116,7 +107,7 @@ def _noise_as_stated(result: CalibrationResult) -> Check:
 def _white(result: CalibrationResult) -> Check:
     found: dict[str, float] = {}
     for bag in result.bags:
-        for channel, value in channel_whiteness(bag).items():
+        for channel, value in channel_memory(bag, result.robot).items():
             found[channel] = max(found.get(channel, 0.0), value)
     if not found:
         return Check("info", "Residuals without memory", "There are no residuals to check.")

@@ -6,6 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.calibration.calibration_result import BagFit
+from jointscope.robots.model.robot import Robot
+
 Array = NDArray[np.float64]
 
 LAGS = 100  # samples; 0.1 s at 1 kHz, longer than any elastic mode of interest takes to turn
@@ -33,6 +36,25 @@ def autocorrelation(residual: Array, lags: int = LAGS) -> Array:
     spectrum = np.fft.rfft(r, size)
     products = np.fft.irfft(np.abs(spectrum) ** 2, size)
     return products[1 : lags + 1] / power
+
+
+def channel_memory(fit: BagFit, robot: Robot) -> dict[str, float]:
+    """Largest autocorrelation of each channel's residual over short lags, beside what its states make.
+
+    States follow the noise of a sensor that is slow for the motion. What is left is sigma^2 (1 - S) with a smoother S
+    that is symmetric and has no elements above its diagonal's, so an autocorrelation down to -s / (1 - s), with s on
+    the diagonal, is made by the smoother and says nothing of the model.
+    """
+    found: dict[str, float] = {}
+    for name, series in fit.residuals.items():
+        sigmas = np.asarray(robot.sensors[name].sigmas)
+        for i, channel in enumerate(series.channels):
+            rho = autocorrelation((series.measured - series.predicted)[:, i])
+            left = float(np.nanmean((series.sigma[:, i] / sigmas[i]) ** 2))  # 1 - s
+            by_smoother = max(1.0 - left, 0.0) / max(left, 1e-12)
+            beyond = np.where(rho < 0.0, np.maximum(-rho - by_smoother, 0.0), rho)
+            found[channel] = float(np.max(beyond, initial=0.0))
+    return found
 
 
 def strength(times: Array, residual: Array, window: float = WINDOW) -> tuple[Array, Array]:
