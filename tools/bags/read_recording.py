@@ -36,6 +36,7 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.silences import with_silences_left_out
+from jointscope.tools.bags.tidying.lone_samples import without_lone_samples
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
 from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, said_once, timing_notices
@@ -81,6 +82,8 @@ def read_recording(
     for need in needed:
         samples[need.name], found = _cleaned(need, samples[need.name], robot.command_held)
         notices += found
+    samples, found = without_lone_samples(samples)
+    notices += found
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
     for stream in streams.values():
@@ -88,7 +91,7 @@ def read_recording(
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
     recording = Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal, posture=posture)
-    if seams:
+    if seams := [(a, b) for a, b in seams if b > start_ns]:
         recording = recording.leaving_out([((a - start_ns) / 1e9, (b - start_ns) / 1e9) for a, b in seams])
     recording = with_silences_left_out(with_short_holes(recording), robot.motor_encoder.name)
     recording = with_end_stops_left_out(recording, robot)

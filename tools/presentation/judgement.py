@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ParameterEstimate
+from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.plausible_torques import plausible_torques
