@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS, LINK_MASS, PAYLOAD, TOOL
-from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.robots.urdf.motion_axis import motion_axis
 
 Array = NDArray[np.float64]
 ALONG_X = 0.9  # cosine from which an axis is along x, so that y takes its place as the direction across
@@ -90,7 +90,7 @@ class ArmChain:
         self.gravity_vector = tree.gravity
         self._origins = [np.array(model.jointPlacements[j].translation) for j in chain]
         self._turns = [np.array(model.jointPlacements[j].rotation) for j in chain]
-        self._axes = [across(joint_motion_axis(model, j)[3:]) for j in chain]
+        self._axes = [across(motion_axis(model.joints[j])[3:]) for j in chain]
         self._lever = np.array(frame.placement.act(at))
         self._tool_turn = np.array(frame.placement.rotation)
         self._masses = np.array([model.inertias[j].mass for j in chain])

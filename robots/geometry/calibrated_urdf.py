@@ -18,7 +18,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, TRACKER
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.robots.urdf.motion_axis import motion_axis
 from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def move_joints(root: ET.Element, robot: Robot) -> None:
     model = robot.tree.model
     for j in range(1, model.njoints):
         name = model.names[j]
-        along, x, y = across(joint_motion_axis(model, j)[3:])
+        along, x, y = across(motion_axis(model.joints[j])[3:])
         turn = np.eye(3)
         for part, axis in (("mis_y", y), ("mis_x", x), ("offset", along)):
             turn = turn @ turned(axis, np.array(errors.get(f"{name}.{part}", 0.0)))

@@ -21,7 +21,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, LENGTHS, STIFFNESS, TILT_DAMPING
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.robots.urdf.motion_axis import motion_axis
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -148,7 +148,7 @@ class FlexibleArm:
         host: dict[int, tuple[int, pin.SE3]] = {0: (0, pin.SE3.Identity())}
         for j in range(1, old.njoints):
             name, (parent, T) = old.names[j], host[old.parents[j]]
-            along, x, y = across(joint_motion_axis(old, j)[3:])
+            along, x, y = across(motion_axis(old.joints[j])[3:])
             placed = T * _with_errors(old.jointPlacements[j], name, values, (along, x, y))
             if name in self.joints:
                 parent = new.addJoint(parent, pin.JointModelRevoluteUnaligned(along), placed, name)

@@ -19,6 +19,7 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.turned_gravity import turned_gravity
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.urdf.motion_axis import motion_axis
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
@@ -228,14 +229,7 @@ def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:
 
 def joint_axis(model: pin.Model, joint: int) -> Array:
     """Axis of a revolute joint in its own frame, shape (3,); zero for a prismatic one."""
-    return joint_motion_axis(model, joint)[3:]
-
-
-def joint_motion_axis(model: pin.Model, joint: int) -> Array:
-    """What a joint does at unit velocity, in its own frame: linear, then angular, shape (6,)."""
-    jacobian = pin.computeJointJacobian(model, model.createData(), pin.neutral(model), joint)
-    # a single column comes back as a vector
-    return np.array(jacobian.reshape(6, model.nv)[:, model.joints[joint].idx_v])
+    return motion_axis(model.joints[joint])[3:]
 
 
 def bearing_names(joint: str) -> tuple[str, str]:

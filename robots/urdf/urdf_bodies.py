@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.urdf.mimic_joints import Follower, followers_of
+from jointscope.robots.urdf.motion_axis import motion_axis
 from jointscope.robots.urdf.urdf_parser import parse_urdf
 from jointscope.robots.urdf.urdf_text import UrdfText
 
@@ -148,7 +149,7 @@ class UrdfBodies:
 
     def has_axis(self, joint: str) -> bool:
         """Whether the axis of a joint has a direction."""
-        return bool(np.linalg.norm(self._motion_axis(self._joint(joint))) > 0.5)
+        return bool(np.linalg.norm(motion_axis(self._joint(joint))) > 0.5)
 
     def _joint(self, name: str) -> pin.JointModel:
         return self.model.joints[self.model.getJointId(name)]
@@ -183,9 +184,4 @@ class UrdfBodies:
         """A continuous joint as one with a single coordinate."""
         if joint.shortname() != ROUND_SLANTED:
             return ROUND[joint.shortname()]()
-        return pin.JointModelRevoluteUnaligned(self._motion_axis(joint)[3:])
-
-    def _motion_axis(self, joint: pin.JointModel) -> np.ndarray:
-        """What a joint with one axis does at unit velocity, in its own frame: linear, then angular, shape (6,)."""
-        jacobian = pin.computeJointJacobian(self.model, self.model.createData(), pin.neutral(self.model), joint.id)
-        return np.array(jacobian.reshape(6, self.model.nv)[:, joint.idx_v])
+        return pin.JointModelRevoluteUnaligned(motion_axis(joint)[3:])

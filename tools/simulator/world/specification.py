@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.model.structured_tree import joint_motion_axis
+from jointscope.robots.urdf.motion_axis import motion_axis
 from jointscope.tools.simulator.world.inertia import full_inertia
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 
@@ -153,7 +153,7 @@ def _tie_followers(mujoco: Any, spec: Any, robot: Robot) -> None:
 
 def joint_axis(model: pin.Model, j: int) -> tuple[Array, bool]:
     """Axis of a joint in its own frame, and whether it turns: what pinocchio made of the URDF's <axis>."""
-    column = joint_motion_axis(model, j)
+    column = motion_axis(model.joints[j])
     turns = bool(np.any(column[3:]))
     return (column[3:] if turns else column[:3]), turns
 
