@@ -11,6 +11,7 @@ from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 
+PART = 10  # samples for every lag at the least: autocorrelations over most of a recording are mostly chance
 LAGS = 100  # samples; 0.1 s at 1 kHz, longer than any elastic mode of interest takes to turn
 WINDOW = 0.25  # [s]
 
@@ -49,7 +50,7 @@ def channel_memory(fit: BagFit, robot: Robot) -> dict[str, float]:
     for name, series in fit.residuals.items():
         sigmas = np.asarray(robot.sensors[name].sigmas)
         for i, channel in enumerate(series.channels):
-            rho = autocorrelation((series.measured - series.predicted)[:, i])
+            rho = autocorrelation((series.measured - series.predicted)[:, i], min(LAGS, len(series.times) // PART))
             left = float(np.nanmean((series.sigma[:, i] / sigmas[i]) ** 2))  # 1 - s
             by_smoother = max(1.0 - left, 0.0) / max(left, 1e-12)
             beyond = np.where(rho < 0.0, np.maximum(-rho - by_smoother, 0.0), rho)

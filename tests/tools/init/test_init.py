@@ -22,6 +22,7 @@ from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.init.robot_guess import guess_robot
 from jointscope.tools.init.streams.other_joints import Typed
 from jointscope.tools.init.streams.sensor_noise import guess_noise
+from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.verbs import init
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
@@ -323,3 +324,23 @@ def test_a_unit_that_is_said_is_taken(doggy, bag, tmp_path):
     run(doggy.tree.urdf, bag, "-o", tmp_path / "own.yaml", "--unit", "V")
     assert load_robot(tmp_path / "own.yaml").command.unit == "V"
     assert "as you said" in (tmp_path / "own.yaml").read_text()
+
+
+@needs_cases
+@pytest.mark.slow
+def test_a_chain_of_24_joints_of_which_two_move_is_right_in_three_commands(tmp_path):
+    robot, _, truth = case("arm_many_joints", tmp_path)
+    assert robot.joints == ("j1", "j2") and len(robot.tree.locked) == 22
+    bag = CASES / "arm_many_joints.mcap"
+    result = calibrate(robot, [read_recording(bag, robot)])
+    table = {p.name: p for p in result.parameters}
+    for law, theirs in (
+        ("inertia", "inertia"),
+        ("coulomb_torque", "coulomb"),
+        ("motor_viscous.coefficient", "viscous"),
+    ):
+        for joint, value in zip(robot.joints, truth[theirs], strict=True):
+            found = table[f"{joint}.{law}"]
+            assert abs(found.value - value) < 3.5 * found.sigma, (joint, law)
+            assert found.sigma < 0.1 * value
+    assert judge(result).level in ("good", "warn")
