@@ -26,7 +26,7 @@ from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.verbs import init
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
-CASES = REAL.parents[2] / "cases"
+CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
 needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")
 needs_real = pytest.mark.skipif(not REAL.is_dir(), reason="shared/data/real is not beside the project")
 STEP = 2e-4  # [rad] of the encoders
