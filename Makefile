@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | story | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
+# make demo | story | docs | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
 # Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
+.PHONY: demo docs story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -45,6 +45,11 @@ types: $(VENV)/dev
 	rm -rf $(TYPES) && mkdir -p $(TYPES)/jointscope
 	ln -s $(addprefix $(CURDIR)/,robots factors graphs tools tools/facade/__init__.py tools/facade/py.typed) $(TYPES)/jointscope/
 	cd $(TYPES) && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p jointscope
+
+# Pages with pictures and search in build/site; fails where a link leads nowhere. Nothing in them asks the internet.
+docs: $(VENV)/dev $(VENV)/code
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet docs build/site
+	@echo "Open build/site/index.html"
 
 bench: $(VENV)/bench $(VENV)/code
 	$(BIN)/python benchmarks/bench.py

@@ -121,7 +121,7 @@ class CalibrationGraph:
     def without_states(self, values: gtsam.Values | None = None) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
         """What the recordings say about the shared blocks alone: a small linear graph about some values, and these.
 
-        The states are eliminated; what is left are `gtsam.LinearContainerFactor`s, to which other factors may be added.
+        The states are eliminated; what is left is a graph of `gtsam.LinearContainerFactor`; others may be added.
 
         Raises:
             SolveError: as `optimize` says.
