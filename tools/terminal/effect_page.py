@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.groups import GROUPS, group_of
@@ -15,11 +15,18 @@ What a model may lack, part by part. `diagnose` and `discover` try all of them a
 `jointscope add ROBOT ID@OWNER -o OUT.yaml` puts one into a model; [an effect of your own](your_own_effect.md) takes one
 file. At its null values an effect is exactly absent.
 
-`jointscope effects --page docs/catalogue.md` writes this page from the cards that `jointscope effects ID` prints."""
+`jointscope effects --page docs/catalogue.md` writes this page from the cards that `jointscope effects ID` prints, and
+draws the laws."""
 
 
-def effect_page(effects: Iterable[Effect]) -> str:
-    """The page: a list by part of the robot, then every card."""
+def effect_page(effects: Iterable[Effect], drawn: Container[str] = (), folder: str = "") -> str:
+    """The page: a list by part of the robot, then every card.
+
+    Args:
+        effects: in any order.
+        drawn: ids of those that have a picture ID.svg.
+        folder: of the pictures, from the page on.
+    """
     groups: dict[str, list[Effect]] = {group: [] for group in GROUPS}
     for effect in effects:
         groups[group_of(effect)].append(effect)
@@ -27,11 +34,15 @@ def effect_page(effects: Iterable[Effect]) -> str:
     for group, members in groups.items():
         rows = (f"\n| [{e.id}](#{e.id}) | {', '.join(e.owners)} | {_cell(e.card.title)} |" for e in members)
         table = "| effect | acts on | what it is |\n| --- | --- | --- |" + "".join(rows)
-        parts += [f"## {group[:1].upper()}{group[1:]}", table, *map(_card, members)]
+        parts += [
+            f"## {group[:1].upper()}{group[1:]}",
+            table,
+            *(_card(e, folder if e.id in drawn else "") for e in members),
+        ]
     return "\n\n".join(parts) + "\n"
 
 
-def _card(effect: Effect) -> str:
+def _card(effect: Effect, pictures: str) -> str:
     card = effect.card
     rows = {
         "acts on": ", ".join(effect.owners),
@@ -41,6 +52,8 @@ def _card(effect: Effect) -> str:
         "note": "a defect of the computation, not physics" if card.numerics else "",
     }
     parts = [f"### {effect.id}", f"**{card.title}.** {card.explanation}", f"```\n{card.law}\n```"]
+    if pictures:
+        parts.append(f"![{effect.id}: its torque, drawn]({pictures}/{effect.id}.svg)")
     parts.append("| | |\n| --- | --- |" + "".join(f"\n| {k} | {_cell(v)} |" for k, v in rows.items() if v))
     if effect.parameters:
         lines = (

@@ -4,12 +4,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
+if TYPE_CHECKING:
+    from jointscope.robots.effect_kinds.effect import Effect
+
+PICTURES = "pictures/effects"
+"""Folder of the drawings, beside the page of the catalogue."""
 EXAMPLE = """examples:
   jointscope effects
   jointscope effects bearing_flexibility
@@ -30,7 +36,12 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("id", metavar="ID", nargs="?", help="an effect")
     add_effects_option(parser)
-    parser.add_argument("--page", type=Path, metavar="F.md", help="write the whole catalogue as a page of markdown")
+    parser.add_argument(
+        "--page",
+        type=Path,
+        metavar="F.md",
+        help=f"write the whole catalogue as a page of markdown, with drawings of the laws in {PICTURES} beside it",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
 
@@ -49,11 +60,23 @@ def run(args: argparse.Namespace) -> int:
         effect = find_effect(args.id)
         content, text = effect_json(effect), card_text(effect)
     if args.page is not None:
-        from jointscope.tools.terminal.effect_page import effect_page
-
-        with whole_file(args.page) as page:
-            page.write_text(effect_page(catalogue().values()), encoding="utf-8")
+        _write_page(args.page, tuple(catalogue().values()))
     if args.json is not None:
         write_json(args.json, content)
     print(text)
     return 0
+
+
+def _write_page(path: Path, effects: Sequence[Effect]) -> None:
+    """The page, and beside it the folder of its pictures."""
+    from jointscope.tools.report.law_picture import law_picture
+    from jointscope.tools.terminal.effect_page import effect_page
+
+    pictures = {effect.id: svg for effect in effects if (svg := law_picture(effect)) is not None}
+    folder = path.parent / PICTURES
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, svg in pictures.items():
+        with whole_file(folder / f"{name}.svg") as file:
+            file.write_text(svg, encoding="utf-8")
+    with whole_file(path) as page:
+        page.write_text(effect_page(effects, pictures, PICTURES), encoding="utf-8")

@@ -89,6 +89,10 @@ def test_the_page_of_the_catalogue_is_current(capsys, in_own_folder):
     page = (in_own_folder / "catalogue.md").read_text(encoding="utf-8")
     kept = (Path(__file__).parents[3] / "docs" / "catalogue.md").read_text(encoding="utf-8")
     assert page == kept, "write it anew: jointscope effects --page docs/catalogue.md"
+    drawn = {path.name: path.read_text(encoding="utf-8") for path in (in_own_folder / "pictures" / "effects").iterdir()}
+    there = (Path(__file__).parents[3] / "docs" / "pictures" / "effects").iterdir()
+    assert {path.name: path.read_text(encoding="utf-8") for path in there} == drawn
+    assert {f"pictures/effects/{name}" for name in drawn} == set(re.findall(r"\]\((pictures/[^)]+)\)", page))
 
 
 def test_the_page_has_every_effect_with_its_law_and_links_that_lead_somewhere(capsys, in_own_folder):
