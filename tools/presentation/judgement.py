@@ -176,6 +176,18 @@ def _held(result: CalibrationResult) -> Check:
     dynamic = [p for p in noted if not is_mounting_or_bias(p)]
     if not noted:
         return Check("good", name, "No parameter leans on its prior or lies on a bound.")
+    known = result.robot.parameters
+    guessed = [p for p in dynamic if is_held(p) and p.name in known and known[p.name].null is None]
+    guessed = [p for p in guessed if p.sigma > UNDETERMINED * abs(p.value)]
+    if guessed:
+        joints = ", ".join(dict.fromkeys(p.name.rsplit(".", 1)[0] for p in guessed))
+        text = (
+            f"The recordings tell nothing of {', '.join(p.name for p in guessed[:4])}"
+            f"{f' and {len(guessed) - 4} more' if len(guessed) > 4 else ''}: what stands there is a guess of the robot "
+            f"file, and so is its sigma. Hold one value of {joints} that you know with `fixed: true`, or leave the "
+            "joint out of the robot"
+        )
+        return Check("bad", name, f"{text}.")
     text = "; ".join(f"{p.name}: {p.note or 'held by its prior'}" for p in (dynamic or noted)[:3])
     more = f" and {len(dynamic or noted) - 3} more" if len(dynamic or noted) > 3 else ""
     return Check("warn" if dynamic else "info", name, f"{text}{more}.")

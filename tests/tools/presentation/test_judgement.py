@@ -14,6 +14,7 @@ from jointscope.graphs.calibration.findings import findings
 from jointscope.tools.presentation.judgement import Judgement, judge
 
 NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
+HELD = "Values from data, not from priors"
 CHANNEL = "joint1.motor_position"
 
 
@@ -53,6 +54,58 @@ def test_a_memory_in_the_residuals_is_bad_unless_they_are_far_below_the_noise(go
     assert level(judge(good), MEMORY) == "good"
     assert level(judge(coloured(good)), MEMORY) == "bad"
     assert level(judge(with_chi2(coloured(good), 0.1)), MEMORY) == "warn"
+
+
+def with_parameter(result, name, **changes):
+    parameters = tuple(dataclasses.replace(p, **changes) if p.name == name else p for p in result.parameters)
+    return dataclasses.replace(result, parameters=parameters)
+
+
+def test_a_guess_of_which_the_recordings_tell_nothing_is_no_result(good):
+    value = next(p.value for p in good.parameters if p.name == "joint2.stiffness")
+    guess = with_parameter(good, "joint2.stiffness", sigma=0.9 * value, prior_sigma=value)
+    judgement = judge(guess)
+    (check,) = (check for check in judgement.checks if check.name == HELD)
+    assert check.level == "bad" and "joint2.stiffness" in check.text and "`fixed: true`" in check.text
+    assert judgement.level == "bad"
+    # a prior that is narrow beside its value is knowledge
+    assert (
+        level(judge(with_parameter(good, "joint2.stiffness", sigma=0.09 * value, prior_sigma=0.1 * value)), HELD)
+        == "warn"
+    )
+
+
+def following(result, left):
+    """Residuals of which states that follow the noise have left a share: neighbours are unlike."""
+    bag = result.bags[0]
+    series = bag.residuals["motor_encoder"]
+    noise = np.random.default_rng(3).standard_normal(len(series.times) + 1)
+    predicted, sigma = series.predicted.copy(), series.sigma.copy()
+    predicted[:, 0] = series.measured[:, 0] - 1e-5 * (noise[1:] - noise[:-1])
+    sigma[:, 0] = np.sqrt(left) * result.robot.motor_encoder.sigmas[0]
+    residuals = {**bag.residuals, "motor_encoder": dataclasses.replace(series, predicted=predicted, sigma=sigma)}
+    return dataclasses.replace(result, bags=(dataclasses.replace(bag, residuals=residuals),))
+
+
+def test_neighbours_that_are_unlike_because_states_follow_the_noise_are_no_memory(good):
+    assert level(judge(following(good, 0.6)), MEMORY) == "good"  # an autocorrelation of -0.5 is within -0.4 / 0.6
+    assert level(judge(following(good, 0.99)), MEMORY) == "warn"
+
+
+def test_few_samples_are_asked_for_few_lags(good):
+    """White noise of 150 samples: of a hundred autocorrelations one would be large by chance."""
+    bag = good.bags[0]
+    series = bag.residuals["motor_encoder"]
+    white = np.random.default_rng(1).standard_normal((150, series.measured.shape[1])) * series.sigma[:150]
+    short = dataclasses.replace(
+        series,
+        times=series.times[:150],
+        measured=series.measured[:150],
+        predicted=series.measured[:150] - white,
+        sigma=series.sigma[:150],
+    )
+    result = dataclasses.replace(good, bags=(dataclasses.replace(bag, residuals={"motor_encoder": short}),))
+    assert level(judge(result), MEMORY) == "good"
 
 
 def test_a_short_last_step_is_a_remark(good):
