@@ -12,7 +12,7 @@ from jointscope.tools.bags.clocks.durations import counted, duration
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.long_holes import LONGEST
 
-FEW, SHARE = 3, 0.005  # samples, or share of their stream, that may be left out
+FEW, SHARE = 3, 0.02  # samples, or share of their stream, that may be left out
 
 
 def without_lone_samples(samples: Mapping[str, TimedSamples]) -> tuple[dict[str, TimedSamples], list[Notice]]:

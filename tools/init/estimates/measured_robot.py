@@ -16,6 +16,7 @@ from jointscope.robots.units import si_factor
 from jointscope.robots.urdf.urdf_bodies import UrdfBodies
 from jointscope.robots.urdf.usable_joints import moving_joints
 from jointscope.tools.init.estimates.position_units import UnitGuess, position_units
+from jointscope.tools.init.estimates.units_by_torques import unit_by_torques
 from jointscope.tools.init.streams.command_order import order_by_motion
 from jointscope.tools.init.streams.encoder_noise import encoder_noise
 from jointscope.tools.init.streams.named_signal import Chosen, Wish
@@ -79,6 +80,10 @@ def measured_robot(typed: Typed, signals: list[Signal]) -> MeasuredRobot:
     links = None if roles.link_encoder is None else role_stream(roles.link_encoder, roles.joints)
     gyros = [signal.stream(("x", "y", "z")) for signal in roles.imus]
     units = position_units(tree, links or encoder, gyros)
+    if masses and not gyros and (roles.command.signal.names or roles.command.signal.joints):
+        held_command = roles.command.signal.topic != roles.motor_encoder.signal.topic
+        command = role_stream(roles.command, roles.joints)
+        units = unit_by_torques(tree, links or encoder, command, units, held=held_command)
     held = _in_si(held, bodies, tree, units)
     tree = tree.locked_at({h.joint: h.position for h in held})
     encoder = replace(encoder, values=encoder.values * units.factor)
