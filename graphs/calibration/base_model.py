@@ -14,6 +14,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.problem.standstill import holding_sharpness
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.recordings.recording import Recording
@@ -69,8 +70,9 @@ class BaseModel:
         torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
         full = without_lasting(full)  # what is missing must not hide in torques that last
+        full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near, standstill=True, memory=False)
+        result = calibrate(full, recordings, near=near, standstill=not _has_springs(full), memory=False)
         return BaseModel(
             result.robot,
             tuple(recordings),
@@ -110,6 +112,11 @@ class BaseModel:
                 fit.append(Span(bag, t0, t0 + FIT_SHARE * length))
                 validation.append(Span(bag, t0 + FIT_SHARE * length, t0 + length))
         return fit, validation
+
+
+def _has_springs(robot: Robot) -> bool:
+    """Whether a joint has a spring that was added, behind which its link swings while friction holds its motor."""
+    return any(here.effect.id == "joint_elasticity" for here in robot.effects)
 
 
 def with_full_gyros(robot: Robot) -> Robot:

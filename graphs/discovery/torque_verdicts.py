@@ -17,6 +17,7 @@ from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
+from jointscope.graphs.judging.elastic_reaction import is_spring, spring_start
 from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
 from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
 from jointscope.graphs.judging.torque_rows import TorqueEquations
@@ -27,7 +28,7 @@ from jointscope.robots.units import of_slide
 
 BANDS = (30.0, 15.0, 8.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
-FINE = 30.0  # [sensor sigma] error from which the model, not the sensor, limits the prediction
+FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -57,7 +58,7 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: Model
     judge = _judge(base, comparison)
     if judge is None:
         return None
-    hypotheses = hypotheses_on_motion(base.robot, judge.rows)
+    hypotheses = hypotheses_on_motion(base.robot, judge.equations)
     judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
     found = {j.hypothesis.label: j for j in judged if j is not None}
     accepted = sorted((j for j in found.values() if not j.refused), key=lambda j: -j.common)
@@ -130,12 +131,16 @@ def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
 
 def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot: Robot) -> Candidate:
     here = j.hypothesis.here
-    start = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
+    known = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
     sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
     parameters = {
         p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
     }
-    if parameters:
+    if is_spring(j.hypothesis):
+        start = spring_start(robot, j.hypothesis)
+        units = {p.name: robot.unit_at(here.owner, p.unit) for p in here.effect.parameters_at(robot, here.owner)}
+        parameters = {name: EffectEstimate(v, float("nan"), units[name]) for name, v in start.items()}
+    elif parameters:
         shapes = {p.name: p.unit for p in here.effect.parameters_at(robot, here.owner) if p.is_shape}
         for name, value in j.hypothesis.shapes.items():
             parameters[name] = EffectEstimate(
@@ -159,11 +164,13 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
         stands_in = j.share > SHARE and not j.refused.startswith("there")
         verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
     return replace(
-        start, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
+        known, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
     )
 
 
 def _with(robot: Robot, j: TorqueJudgement) -> Robot:
+    if is_spring(j.hypothesis):
+        return add_effect(robot, j.hypothesis.label, spring_start(robot, j.hypothesis))
     start = {p.name: float(v) for p, v in zip(j.hypothesis.sizes, j.sizes, strict=True)}
     return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
 
