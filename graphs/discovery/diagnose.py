@@ -114,15 +114,22 @@ def diagnose(
     clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
+    trials = SpringTrials(base, (fit, spans), before, holdout)
+    spring, elastic = trials.borne_out(torques, scored)
+    if torques is not None and spring is not None and not elastic:
+        torques = torque_verdicts(base, scored, comparison, barred=(spring.label,))
+    clock.stage("springs")
     percent: Mapping[str, float] = {}
     if torques is None:
         candidates, refits = _by_predictions(base, scored, before, (fit, spans), holdout, leaders, report, pool)
     else:
         candidates, refits, percent = torques.candidates, torques.refits, torques.percent
+    if spring is not None and elastic:
+        candidates = [spring, *(c for c in candidates if c.label != spring.label)]
     clock.stage("refits")
     report("springs", 0.9)
-    trials = SpringTrials(base, (fit, spans), before, holdout)
-    candidates, elastic = trials.beside(candidates, scored, refits, percent)
+    if spring is None:
+        candidates, elastic = trials.beside(candidates, scored, refits, percent)
     refits = {**refits, **elastic}
     clock.stage("springs")
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)

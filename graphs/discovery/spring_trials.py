@@ -15,9 +15,11 @@ import numpy as np
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.discovery.diagnosis_result import Candidate
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
+from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts
 from jointscope.graphs.discovery.verdicts import judge, yielding
+from jointscope.graphs.refits.refit import Refit
 from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
-from jointscope.graphs.refits.validation import ValidationError
+from jointscope.graphs.refits.validation import ValidationError, judged_error, reported_heldout_error
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect
@@ -45,6 +47,31 @@ class SpringTrials:
     spans: tuple[Sequence[Span], Sequence[Span]]
     before: ValidationError
     holdout: Recording | None
+
+    def borne_out(
+        self, torques: TorqueVerdicts | None, scored: ScoredCandidates
+    ) -> tuple[Candidate | None, dict[str, Robot]]:
+        """The spring that explains most of the missing torque, calibrated, and the robot with it.
+
+        What a rigid model lacks told of it on blocks left out; here its model must predict better, too.
+
+        Returns:
+            The candidate, None where another one comes first; the robot by its label, none where it is no better.
+        """
+        first = None if torques is None else torques.candidates[0]
+        if torques is None or first is None or first.effect != SPRING or first.verdict != "missing":
+            return None, {}
+        start = {name: estimate.value for name, estimate in first.parameters.items()}
+        fitted = self._calibrated(first, start)
+        if fitted is None:
+            return first, {}
+        seconds = judged_seconds(self.base, self.spans[1])
+        judged = next(judge(c, self.before, fitted, seconds) for c in scored.candidates if c.label == first.label)
+        if judged.verdict != "missing":
+            return first, {}
+        found = replace(judged, score=first.score, dof=first.dof, share=first.share)
+        found = replace(found, reasons=(*first.reasons, *judged.reasons), look_alikes=first.look_alikes)
+        return found, {first.label: fitted.refit.robot}
 
     def beside(
         self,
@@ -93,6 +120,21 @@ class SpringTrials:
         far = missing or {joint: self.before.channels[name] for joint, name in channels}
         can = catalogue()[SPRING].owners_of(robot)
         return sorted((joint for joint in can if far[joint] > FAR), key=lambda joint: -far[joint])[:MOST_TRIED]
+
+    def _calibrated(self, spring: Candidate, start: dict[str, float]) -> ValidatedRefit | None:
+        """The model with a spring from its start values, calibrated with everything, as the rigid one was.
+
+        Whether it is there was asked of blocks left out before; None where it cannot be calibrated.
+        """
+        try:
+            elastic = BaseModel.of(add_effect(self.base.result.start, spring.label, start), self.base.recordings)
+            errors = judged_error(elastic, elastic.robot, elastic.calibrations, self.spans[1])
+        except (JointscopeError, np.linalg.LinAlgError):
+            return None
+        own = {name: elastic.robot.parameters[f"{spring.owner}.{SPRING}.{name}"].sigma for name in start}
+        sigmas = {name: float("nan") if sigma is None else sigma for name, sigma in own.items()}
+        refit = Refit(elastic.robot, spring.label, elastic.calibrations, sigmas, converged=True)
+        return ValidatedRefit(refit, errors, reported_heldout_error(elastic.robot, self.holdout))
 
     def _fitted(self, joint: str) -> ValidatedRefit | None:
         """The model with a spring; None where it cannot be calibrated.

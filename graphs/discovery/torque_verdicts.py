@@ -7,7 +7,7 @@ judged so; others by their predictions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -29,6 +29,7 @@ from jointscope.robots.units import of_slide
 BANDS = (30.0, 15.0, 8.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
+UNHELD = "a calibration with it does not bear it out"
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -53,14 +54,24 @@ class TorqueVerdicts:
     sentence: str
 
 
-def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison) -> TorqueVerdicts | None:
-    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short."""
+def torque_verdicts(
+    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, barred: Collection[str] = ()
+) -> TorqueVerdicts | None:
+    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short.
+
+    Args:
+        base: the model.
+        scored: the catalogue.
+        comparison: of the model with a recording.
+        barred: ID@OWNER of candidates that did not hold elsewhere.
+    """
     judge = _judge(base, comparison)
     if judge is None:
         return None
     hypotheses = hypotheses_on_motion(base.robot, judge.equations)
     judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
     found = {j.hypothesis.label: j for j in judged if j is not None}
+    found |= {label: replace(found[label], refused=UNHELD) for label in barred if label in found}
     accepted = sorted((j for j in found.values() if not j.refused), key=lambda j: -j.common)
     equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
     fewest = min((j.dof for j in equal), default=0)
@@ -170,7 +181,7 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
 
 def _with(robot: Robot, j: TorqueJudgement) -> Robot:
     if is_spring(j.hypothesis):
-        return add_effect(robot, j.hypothesis.label, spring_start(robot, j.hypothesis))
+        return add_effect(robot, j.hypothesis.label, dict(spring_start(robot, j.hypothesis)))
     start = {p.name: float(v) for p, v in zip(j.hypothesis.sizes, j.sizes, strict=True)}
     return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
 

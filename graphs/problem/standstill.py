@@ -45,8 +45,8 @@ def near(mask: Mask, steps: int) -> Mask:
 def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     """The recording with the stretches in which each rigid joint is too slow for the size of its friction to be known.
 
-    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest, unless
-    its motor is all that is seen of it: then that noise is all that there is, and the spring is found from its rest.
+    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest; one
+    that got its spring as an effect has it, too, but its link may be seen by nothing else than what its motor does.
 
     A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion. So does one
     whose encoder does not show them.

@@ -24,7 +24,8 @@ def swinging_links(problem: BagProblem, calibration: Calibration, q_motor: Array
     Args:
         problem: recording and model.
         calibration: with springs and dampers.
-        q_motor, v_motor: motion of the motors, shape (m + 1, n) each.
+        q_motor: angles of the motors, shape (m + 1, n).
+        v_motor: their velocities, shape (m + 1, n).
     """
     robot, ticks = problem.robot, problem.timeline.ticks
     if robot.gyros or robot.link_encoder is not None or robot.transmission is not None or not robot.layout.motors:
