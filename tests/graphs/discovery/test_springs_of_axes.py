@@ -53,7 +53,7 @@ def test_a_spring_is_named_first_with_its_size_and_none_where_none_is(axis):
 
 
 def test_links_that_no_sensor_sees_feel_no_random_torque_of_their_own(axis):
-    case, robot, _ = axis
+    _, robot, _ = axis
     assert not len(robot.noise.unseen)
     assert add_effect(robot, LABEL).noise.unseen.tolist() == [0]
 
