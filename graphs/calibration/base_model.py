@@ -72,7 +72,7 @@ class BaseModel:
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near, standstill=not _has_springs(full), memory=False)
+        result = calibrate(full, recordings, near=near, standstill=not _judged_by_torques(full), memory=False)
         return BaseModel(
             result.robot,
             tuple(recordings),
@@ -114,9 +114,13 @@ class BaseModel:
         return fit, validation
 
 
-def _has_springs(robot: Robot) -> bool:
-    """Whether a joint has a spring that was added, behind which its link swings while friction holds its motor."""
-    return any(here.effect.id == "joint_elasticity" for here in robot.effects)
+def _judged_by_torques(robot: Robot) -> bool:
+    """Whether one encoder of rigid joints, or of motors behind which links swing unseen, is all that there is.
+
+    What is missing is then asked of the torque while they move: friction at rest would only hide it.
+    """
+    alone = len(robot.sensors) == 1 and robot.transmission is None
+    return alone and (not robot.layout.motors or len(robot.noise.unseen) > 0)
 
 
 def with_full_gyros(robot: Robot) -> Robot:

@@ -48,15 +48,16 @@ def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest; one
     that got its spring as an effect has it, too, but its link may be seen by nothing else than what its motor does.
 
-    A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion. So does one
-    whose encoder does not show them.
+    A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion unless its
+    friction is held as a sign. So does one whose encoder does not show them.
     """
     encoder, found = robot.motor_encoder, {}
     stream = recording.streams[encoder.name]
     for j, joint in enumerate(robot.joints):
         own = robot.parameters.get(f"{joint}.{SHARPNESS}")
         asked = own is not None and not own.fixed
-        told = asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
+        sign = own is not None and own.fixed
+        told = asked or (not sign and any(robot.has_effect(id, joint) for id in SLOW_EFFECTS))
         rounded = SATURATED / robot.sharpness_of(joint)
         if told or (joint in robot.layout.motors and not robot.has_effect("joint_elasticity", joint)):
             continue
