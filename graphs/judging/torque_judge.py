@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.judging.free_curves import hats, over_speed, stacked
 from jointscope.graphs.judging.row_blocks import blocks_of
+from jointscope.graphs.judging.shape_search import Fitted, between_shapes
 from jointscope.graphs.judging.torque_noise import Yardstick, independent, saturated, yardstick_of
 from jointscope.graphs.judging.torque_rows import TorqueEquations
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
@@ -27,8 +28,6 @@ NET, SHARE, COMMON = 12.0, 0.05, 0.02  # significance; share of the own equation
 HELPED, HELPED_BY_COMMAND = 0.8, 0.9  # of the blocks
 HARM, CEILING = 1.5, 0.5
 ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
-ROUNDS, SEARCH, WORTH = 3, 12, 1.0  # passes and evaluations of the search for shapes; score that is worth another one
-SAME = 1e-3  # relative difference of shapes that decides nothing
 GAUGE = 1e-4  # of a column's square outside the base columns
 DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
 
@@ -68,17 +67,6 @@ class TorqueJudgement:
         return int(np.sum(np.isfinite(self.sigmas)))
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """A hypothesis with its columns, shape (m, k), score, sizes and sigmas, shape (k,)."""
-
-    hypothesis: EffectHypothesis
-    columns: Array
-    score: float
-    sizes: Array
-    sigmas: Array
-
-
 class TorqueJudge:
     """Judges hypotheses on the rows of all equations."""
 
@@ -109,7 +97,7 @@ class TorqueJudge:
 
     def judge(self, hypotheses: Sequence[EffectHypothesis]) -> TorqueJudgement | None:
         """The best of hypotheses that differ in their shapes alone; None for what does not act through torques."""
-        found: list[_Fitted] = []
+        found: list[Fitted] = []
         for hypothesis in hypotheses:
             fitted = self._fit(hypothesis)
             if fitted is None:
@@ -117,47 +105,18 @@ class TorqueJudge:
             found.append(fitted)
         best = max(found, key=lambda fitted: fitted.score)
         if best.score > 0.0:
-            best = self._between(best, hypotheses)
+            best = between_shapes(self._fit, best, hypotheses)
         C = best.columns[:, np.isfinite(best.sigmas)]
         net = best.score - C.shape[1] * np.log(self.samples) - 2.0 * np.log(len(hypotheses))
         return self._judged(best.hypothesis, best.score, float(net), best.sizes, best.sigmas, C)
 
-    def _fit(self, hypothesis: EffectHypothesis) -> _Fitted | None:
+    def _fit(self, hypothesis: EffectHypothesis) -> Fitted | None:
         """Score and sizes of one hypothesis; None for what does not act through torques."""
         columns = self.equations.columns(hypothesis)
         if columns is None:
             return None
         C = np.vstack(columns)
-        return _Fitted(hypothesis, C, *self._score(C, hypothesis))
-
-    def _between(self, best: _Fitted, hypotheses: Sequence[EffectHypothesis]) -> _Fitted:
-        """The best shapes between those of the grid, one after the other, until the score hardly rises."""
-        from scipy.optimize import minimize_scalar
-
-        grids = {name: sorted({h.shapes[name] for h in hypotheses}) for name in best.hypothesis.shapes}
-        for _ in range(ROUNDS):
-            before = best.score
-            for name, grid in grids.items():
-                at = best.hypothesis.shapes[name]
-                below = max((g for g in grid if g < at * (1.0 - SAME)), default=at)
-                above = min((g for g in grid if g > at * (1.0 + SAME)), default=at)
-                if not 0.0 < below < above:
-                    continue
-                tried: list[_Fitted] = []
-
-                def loss(log: float, name: str = name, best: _Fitted = best, tried: list[_Fitted] = tried) -> float:
-                    shapes = {**best.hypothesis.shapes, name: float(np.exp(log))}
-                    fitted = self._fit(replace(best.hypothesis, shapes=shapes))
-                    assert fitted is not None
-                    tried.append(fitted)
-                    return -fitted.score
-
-                bounds = (np.log(below), np.log(above))
-                minimize_scalar(loss, bounds=bounds, method="bounded", options={"maxiter": SEARCH, "xatol": SAME})
-                best = max([best, *tried], key=lambda fitted: fitted.score)
-            if best.score < before + WORTH:
-                break
-        return best
+        return Fitted(hypothesis, C, *self._score(C, hypothesis))
 
     def _judged(
         self, hypothesis: EffectHypothesis, score: float, net: float, sizes: Array, sigmas: Array, C: Array
