@@ -30,6 +30,9 @@ BANDS = (30.0, 15.0, 8.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
 UNHELD = "a calibration with it does not bear it out"
+TIED = 0.01  # of a score: less says nothing
+# a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
+SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -92,11 +95,22 @@ def torque_verdicts(
     shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
     scores = {label: j.score for label, j in found.items()}
     candidates.sort(key=lambda c: (order[c.verdict], -shares.get(c.label, -2.0), -scores.get(c.label, 0.0)))
-    candidates.sort(key=lambda c: -scores[c.label] if c.verdict == "missing" else 0.0)
+    best = max((scores[c.label] for c in candidates if c.verdict == "missing"), default=0.0)
+    candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
     candidates.sort(key=lambda c: order[c.verdict])
     return TorqueVerdicts(
         candidates, refits, missing, percent, judge.unexplained, _sentence(base.robot, judge, missing, percent)
     )
+
+
+def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[float, ...]:
+    """Where missing ones stand; between those that the motion does not tell apart no rounding decides."""
+    if candidate.verdict != "missing":
+        return (0.0,)
+    if score < best - max(TIED * best, 1.0):
+        return (1.0, -score)
+    known = candidate.effect in SIMPLEST
+    return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
 
 
 def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
