@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.judging.elastic_reaction import is_spring
 from jointscope.graphs.judging.free_curves import hats, over_speed, stacked
 from jointscope.graphs.judging.row_blocks import blocks_of
 from jointscope.graphs.judging.shape_search import Fitted, between_shapes
@@ -201,8 +202,8 @@ class TorqueJudge:
         sizes, sigmas = np.zeros(k), np.full(k, np.inf)
         sizes[told], sigmas[told] = covariance @ s, np.sqrt(np.diag(covariance))
         possible = all(size >= 0.0 for size, p in zip(sizes, hypothesis.sizes, strict=True) if p.sign == "+")
-        # no effect is larger than the drive that overcomes it
-        acts = [_rms(part @ sizes) for part in self._split(C)]
+        # no effect is larger than the drive that overcomes it; a load near its resonance carries itself
+        acts = [0.0 if is_spring(hypothesis) else _rms(part @ sizes) for part in self._split(C)]
         if not possible or not told or np.any(np.array(acts) > self.drive):
             return none
         return float(s @ sizes[told]), sizes, sigmas
