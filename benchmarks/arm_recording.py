@@ -55,7 +55,7 @@ def record(case: ArmCase, folder: Path) -> None:
         made = Path(unfinished) / folder.name
         made.mkdir()
         shutil.copyfile(source, made / "robot.urdf")
-        _write(made / "train.mcap", topics)
+        write_topics(made / "train.mcap", topics)
         (made / "truth.json").write_text(json.dumps(_truth(recorded, len(topics[0].names)), indent=1), encoding="utf-8")
         made.rename(folder)
 
@@ -207,7 +207,7 @@ def _truth(r: Recorded, published: int) -> dict[str, Any]:
     }
 
 
-def _write(path: Path, topics: list[Topic]) -> None:
+def write_topics(path: Path, topics: list[Topic]) -> None:
     """A bare .mcap; messages are received a little after they were stamped."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore

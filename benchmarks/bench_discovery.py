@@ -23,11 +23,10 @@ from pathlib import Path
 from discovery import section
 from discovery_case import run_case
 from discovery_row import Row
-from hidden_effects import Case, cases, tenth
+from hidden_effects import AnyCase, cases, tenth
 from kept_rows import keep, known_rows
 from measured_page import environment, write_section
 from patience import say
-from setting_arms import SettingCase
 
 import jointscope.graphs
 
@@ -59,7 +58,7 @@ def main() -> None:
         write_section(told)
 
 
-def measure(missing: list[Case | SettingCase], jobs: int) -> Iterator[Row]:
+def measure(missing: list[AnyCase], jobs: int) -> Iterator[Row]:
     """Rows as they come; each process has one core, where the linear algebra of several would fight for all."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     began = time.perf_counter()
@@ -85,7 +84,7 @@ def code() -> str:
     """Changes with the package and with the table, so that no stale row is used."""
     package = Path(jointscope.graphs.__file__).parents[1]
     files = [p for room in ("robots", "factors", "graphs", "tools/simulator") for p in (package / room).rglob("*.py")]
-    files += [Path(__file__).with_name(name) for name in ("hidden_effects.py", "setting_arms.py")]
+    files += [Path(__file__).with_name(name) for name in ("hidden_effects.py", "setting_arms.py", "spring_axes.py")]
     content = b"".join(path.read_bytes() for path in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]
 

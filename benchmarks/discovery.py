@@ -13,6 +13,7 @@ from tables import Section, Table
 FIRST = 0.95  # of the recordings whose effect matters
 PAIRS_FOUND = 0.8
 NAMED = 10.0 / 12.0
+SPRINGS = 0.9
 HALF = 0.5  # of the squared error above the floor
 LARGEST_Z = 3.0
 DIAGNOSE, SCORE = 60.0, 10.0  # [s] on 20 s of recording
@@ -27,6 +28,7 @@ TITLES = {
     "hard": "Short (6 s), disturbed (0.3 N m for 20 ms) and jittery (0.2 ms, 2 % lost) recordings",
     "mistake": "A setting is wrong",
     "setting": "A setting of an arm of a maker is wrong, or none: rigid, fine encoders, torques with a memory, ripple",
+    "spring": "A spring of 6 to 40 Hz behind a slide or joint that is declared rigid, or none, from what `init` writes",
 }
 HEAD = (
     "hidden",
@@ -48,8 +50,9 @@ def section(rows: Sequence[Row]) -> Section:
     found = Section(
         "Discovery",
         f"{len(rows)} simulated Doggys, friction smooth, {TRAIN:g} s of calibration motion to learn from and {TEST:g} "
-        "s of other moves held out, each with a seed of its own. Errors are those of predictions 0.1 s ahead on the "
-        "held-out recording in sensor sigmas; rank is that of the truth in the first diagnosis.",
+        "s of other moves held out, each with a seed of its own; arms of makers and single axes have their own. Errors "
+        "are those of predictions 0.1 s ahead on the held-out recording in sensor sigmas; rank is that of the truth in "
+        "the first diagnosis.",
     )
     _promise_ranks(found, rows)
     _promise_honesty(found, rows)
@@ -111,6 +114,13 @@ def _promise_honesty(found: Section, rows: Sequence[Row]) -> None:
     _count(found, "arms with a wrong setting: named first", NAMED, named)
     nothing = [not row.physics and not row.error for row in arms if not row.truth]
     _count(found, "arms with nothing wrong: nothing accepted", 1.0, nothing)
+    axes = [row for row in rows if row.kind == "spring"]
+    named = [row.first in row.truth for row in axes if row.truth]
+    _count(found, "axes with an undeclared spring: named first", SPRINGS, named)
+    sized = [bool(row.z) and max(map(abs, row.z.values())) <= LARGEST_Z for row in axes if row.truth]
+    _count(found, "axes with an undeclared spring: in the model, within 3 sigma", SPRINGS, sized)
+    rigid = [not row.physics and not row.error for row in axes if not row.truth]
+    _count(found, "axes without one: nothing accepted", 1.0, rigid)
     _count(found, "wrong setting: never called friction or Coriolis", 1.0, [not row.blamed for row in mistakes])
     elsewhere = [not row.adequate or row.named for row in mistakes]
     _count(found, "wrong setting: not called adequate unless it was named", 1.0, elsewhere)
@@ -129,7 +139,9 @@ def _promise_times(found: Section, rows: Sequence[Row]) -> None:
 
     The median counts: other work on the machine lengthens single ones. Time a quiet machine with `--jobs 1`.
     """
-    stages = [row.stages for row in rows if row.stages and row.kind != "setting" and "short" not in row.name]
+    stages = [
+        row.stages for row in rows if row.stages and row.kind not in ("setting", "spring") and "short" not in row.name
+    ]
     if not stages:
         return
     whole = [sum(s for name, s in stage.items() if CALIBRATION_STAGE not in name) for stage in stages]

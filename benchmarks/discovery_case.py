@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 import time
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from discovery_row import Row
-from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, Case
+from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, AnyCase, Case
 from setting_arms import TEST as ARM_TEST
 from setting_arms import TRAIN as ARM_TRAIN
 from setting_arms import SettingCase, arm_model, record_arm, true_sizes
+from spring_axes import SpringAxis, record_axis
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
@@ -27,6 +30,8 @@ from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.command_line import main
 from jointscope.tools.simulator import Disturbance, simulate
 
 FAR = 3.0  # times the values of the robot file
@@ -48,10 +53,12 @@ class Recordings:
     parameters: dict[str, Any]
 
 
-def run_case(case: Case | SettingCase) -> Row:
+def run_case(case: AnyCase) -> Row:
     """One row of the table; an error of the project becomes part of the row."""
     if isinstance(case, SettingCase):
         model, recordings = _arm(case)
+    elif isinstance(case, SpringAxis):
+        model, recordings = _axis(case)
     else:
         model, recordings = _model(case), _simulate(case)
     began = time.perf_counter()
@@ -84,6 +91,20 @@ def _arm(case: SettingCase) -> tuple[Robot, Recordings]:
     return robot, Recordings(*made, true_sizes(case, robot))
 
 
+def _axis(axis: SpringAxis) -> tuple[Robot, Recordings]:
+    """The axis as `init` makes it out, and what it did."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, seconds = Path(name), (ARM_TRAIN, ARM_TEST)
+        bags = [record_axis(axis, folder, duration, i) for i, duration in enumerate(seconds)]
+        path = folder / "axis.yaml"
+        with redirect_stdout(io.StringIO()):
+            main(["init", str(folder / "axis.urdf"), str(bags[0]), "--unit", "Nm", "-o", str(path)])
+        robot = load_robot(path)
+        made = [read_recording(bag, robot) for bag in bags]
+    true = {"axis.joint_elasticity.compliance": axis.compliance} if axis.frequency else {}
+    return robot, Recordings(*made, true)
+
+
 def _model(case: Case) -> Robot:
     """The ready robot without what the case leaves out, from start values that are far off where it says so."""
     robot = load_robot("doggy")
@@ -102,7 +123,7 @@ def _model(case: Case) -> Robot:
         return load_robot(str(path))
 
 
-def _row(case: Case | SettingCase, recordings: Recordings, found: Discovery, seconds: float) -> Row:
+def _row(case: AnyCase, recordings: Recordings, found: Discovery, seconds: float) -> Row:
     diagnosis = found.steps[0].diagnosis
     labels = [candidate.label for candidate in diagnosis.candidates] if diagnosis else []
     accepted = _accepted(found)
@@ -160,11 +181,9 @@ def _alike(diagnosis: Diagnosis, truth: tuple[str, ...]) -> bool:
     return any(c.label in first.look_alikes or first.label in c.look_alikes for c in true_ones)
 
 
-def _true_error(
-    case: Case | SettingCase, recordings: Recordings, found: Discovery, accepted: tuple[str, ...]
-) -> float | None:
+def _true_error(case: AnyCase, recordings: Recordings, found: Discovery, accepted: tuple[str, ...]) -> float | None:
     """Held-out error of the true structure, calibrated with the same recording; None where there is no such model."""
-    if isinstance(case, SettingCase) or case.kind in ("outside", "mistake"):
+    if not isinstance(case, Case) or case.kind in ("outside", "mistake"):
         return None
     if set(accepted) == set(case.truth):
         return _or_none(found.steps[-1].heldout_error)
@@ -177,7 +196,7 @@ def _true_error(
         return None
 
 
-def _deviations(case: Case | SettingCase, recordings: Recordings, robot: Robot) -> dict[str, float]:
+def _deviations(case: AnyCase, recordings: Recordings, robot: Robot) -> dict[str, float]:
     """(estimate - truth) / sigma of the parameters of true effects in the last model."""
     found = {}
     for label in case.truth:

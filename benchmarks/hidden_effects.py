@@ -2,18 +2,19 @@
 """Everything that is hidden in a simulated recording: what, where, how large, and under which circumstances.
 
 Every effect of the catalogue in two sizes and, where it has a choice, at two owners; recordings without any; pairs;
-effects outside the catalogue; short, disturbed and jittery recordings; plain mistakes; settings of arms of makers.
-Seeds are fixed by the place in the table, so each recording is another robot on another occasion. Only append to a
-list: what is inserted moves the seeds of all that follow.
+effects outside the catalogue; short, disturbed and jittery recordings; plain mistakes; settings of arms of makers; axes
+with a spring that nobody declared. Seeds are fixed by the place in the table, so each recording is another robot on
+another occasion. Only append to a list: what is inserted moves the seeds of all that follow.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 from setting_arms import SettingCase, setting_cases
+from spring_axes import SpringAxis, spring_axes
 
 EFFECTS = (
     ("motor_viscous@joint1:coefficient=2", "motor_viscous@joint3:coefficient=5"),
@@ -110,8 +111,8 @@ MISTAKES = (
 CLEAN = 20
 TRAIN, TEST = 20.0, 8.0  # [s]
 DOGGYS = ("effect", "clean", "pair", "outside", "hard", "mistake")
-KINDS = (*DOGGYS, "setting")
-FIRST_SEED = dict(zip(KINDS, range(2000, 9000, 1000), strict=True))
+KINDS = (*DOGGYS, "setting", "spring")
+FIRST_SEED = dict(zip(KINDS, range(2000, 10000, 1000), strict=True))
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,10 @@ class Case:
         return (*(text.split(":")[0] for text in self.hidden), *self.left_out)
 
 
-def cases() -> list[Case | SettingCase]:
+AnyCase: TypeAlias = Case | SettingCase | SpringAxis
+
+
+def cases() -> list[AnyCase]:
     """The whole table."""
     hidden: dict[str, list[tuple[tuple[str, ...], tuple[str, ...], str]]] = {
         "effect": [((text,), (), "") for sizes in EFFECTS for text in sizes]
@@ -162,12 +166,12 @@ def cases() -> list[Case | SettingCase]:
         for kind in DOGGYS
         for i, (texts, left_out, how) in enumerate(hidden[kind])
     ]
-    return [*doggys, *setting_cases(FIRST_SEED["setting"])]
+    return [*doggys, *setting_cases(FIRST_SEED["setting"]), *spring_axes(FIRST_SEED["spring"])]
 
 
-def tenth(every: list[Case | SettingCase]) -> list[Case | SettingCase]:
+def tenth(every: list[AnyCase]) -> list[AnyCase]:
     """About one in ten of every kind, spread over the table."""
-    found: list[Case | SettingCase] = []
+    found: list[AnyCase] = []
     for kind in KINDS:
         of_kind = [case for case in every if case.kind == kind]
         count = -(-len(of_kind) // 10)

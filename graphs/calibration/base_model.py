@@ -14,6 +14,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
+from jointscope.graphs.problem.standstill import holding_sharpness
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.recordings.recording import Recording
@@ -69,8 +70,9 @@ class BaseModel:
         torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
         full = without_lasting(full)  # what is missing must not hide in torques that last
+        full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near, standstill=True, memory=False)
+        result = calibrate(full, recordings, near=near, standstill=not _judged_by_torques(full), memory=False)
         return BaseModel(
             result.robot,
             tuple(recordings),
@@ -110,6 +112,15 @@ class BaseModel:
                 fit.append(Span(bag, t0, t0 + FIT_SHARE * length))
                 validation.append(Span(bag, t0 + FIT_SHARE * length, t0 + length))
         return fit, validation
+
+
+def _judged_by_torques(robot: Robot) -> bool:
+    """Whether one encoder of rigid joints, or of motors behind which links swing unseen, is all that there is.
+
+    What is missing is then asked of the torque while they move: friction at rest would only hide it.
+    """
+    alone = len(robot.sensors) == 1 and robot.transmission is None
+    return alone and (not robot.layout.motors or len(robot.noise.unseen) > 0)
 
 
 def with_full_gyros(robot: Robot) -> Robot:

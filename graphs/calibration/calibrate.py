@@ -115,7 +115,7 @@ def _calibrated(
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
     told = list(recordings)
-    if near is None and not biases_only and not standstill:
+    if not biases_only and not standstill:
         told = [leaving_standstill_out(seen, recording) for recording in recordings]
     problems = [BagProblem.of(replace(seen, noise=noise), recording) for recording in told]
     if solver is solve_samples:

@@ -110,10 +110,11 @@ def diagnose(
     comparison = comparison or compare_model("base", base.robot, holdout or base.recordings[0])
     failure = analyse_failure(comparison, holdout or base.recordings[0])
     clock.stage("comparison")
-    torques = torque_verdicts(base, scored, comparison)
-    clock.stage("missing torque")
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
+    trials = SpringTrials(base, (fit, spans), before, holdout)
+    torques, elastic = _by_torques(base, scored, comparison, trials)
+    clock.stage("missing torque")
     percent: Mapping[str, float] = {}
     if torques is None:
         candidates, refits = _by_predictions(base, scored, before, (fit, spans), holdout, leaders, report, pool)
@@ -121,8 +122,8 @@ def diagnose(
         candidates, refits, percent = torques.candidates, torques.refits, torques.percent
     clock.stage("refits")
     report("springs", 0.9)
-    trials = SpringTrials(base, (fit, spans), before, holdout)
-    candidates, elastic = trials.beside(candidates, scored, refits, percent)
+    if not elastic:
+        candidates, elastic = trials.beside(candidates, scored, refits, percent)
     refits = {**refits, **elastic}
     clock.stage("springs")
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
@@ -156,6 +157,19 @@ def diagnose(
         missing_torque_percent=None if torques is None else torques.percent,
     )
     return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
+
+
+def _by_torques(
+    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, trials: SpringTrials
+) -> tuple[TorqueVerdicts | None, dict[str, Robot]]:
+    """Verdicts by the missing torque, if it tells any, and the robot with the spring that comes first, if one does."""
+    torques = torque_verdicts(base, scored, comparison)
+    spring, elastic = trials.borne_out(torques, scored)
+    if torques is None or spring is None:
+        return torques, {}
+    if not elastic:
+        return torque_verdicts(base, scored, comparison, barred=(spring.label,)), {}
+    return replace(torques, candidates=[spring, *(c for c in torques.candidates if c.label != spring.label)]), elastic
 
 
 def _unexplained(

@@ -15,9 +15,11 @@ import numpy as np
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.discovery.diagnosis_result import Candidate
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
-from jointscope.graphs.discovery.verdicts import judge, yielding
+from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts
+from jointscope.graphs.discovery.verdicts import SURE, judge, yielding
+from jointscope.graphs.refits.refit import Refit
 from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
-from jointscope.graphs.refits.validation import ValidationError
+from jointscope.graphs.refits.validation import ValidationError, judged_error, reported_heldout_error
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect
@@ -27,6 +29,7 @@ from jointscope.robots.recordings.recording import Recording
 SPRING = "joint_elasticity"
 FAR = 10.0  # [%] of the drive's torque that is missing, [sigma] of the prediction, from which a joint is tried
 MOST_TRIED = 2  # joints, those first of which most is missing
+ALIKE = 1.5  # ratio of two compliances of the same spring, by missing torque and calibrated
 CLEAR = 0.5  # share of the squared error that a spring must explain to stand before torques
 
 
@@ -45,6 +48,34 @@ class SpringTrials:
     spans: tuple[Sequence[Span], Sequence[Span]]
     before: ValidationError
     holdout: Recording | None
+
+    def borne_out(
+        self, torques: TorqueVerdicts | None, scored: ScoredCandidates
+    ) -> tuple[Candidate | None, dict[str, Robot]]:
+        """The spring that explains most of the missing torque, calibrated, and the robot with it.
+
+        What a rigid model lacks told of it on blocks left out; calibrated from its start values it must come out as the
+        same spring. Predictions a tenth of a second ahead do not decide: a torque that changes its sign within them
+        leaves less there than what random torques add up to.
+
+        Returns:
+            The candidate, None where another one comes first; the robot by its label, none where it is no better.
+        """
+        first = None if torques is None else torques.candidates[0]
+        if torques is None or first is None or first.effect != SPRING or first.verdict != "missing":
+            return None, {}
+        start = {name: estimate.value for name, estimate in first.parameters.items()}
+        fitted = self._calibrated(first, start)
+        if fitted is None:
+            return first, {}
+        seconds = judged_seconds(self.base, self.spans[1])
+        judged = next(judge(c, self.before, fitted, seconds) for c in scored.candidates if c.label == first.label)
+        spring = judged.parameters["compliance"]
+        if not spring.value > SURE * spring.sigma or abs(np.log(spring.value / start["compliance"])) > np.log(ALIKE):
+            return first, {}
+        found = replace(judged, verdict="missing", score=first.score, dof=first.dof, share=first.share)
+        found = replace(found, reasons=(*first.reasons, judged.reasons[0]), look_alikes=first.look_alikes)
+        return found, {first.label: fitted.refit.robot}
 
     def beside(
         self,
@@ -93,6 +124,21 @@ class SpringTrials:
         far = missing or {joint: self.before.channels[name] for joint, name in channels}
         can = catalogue()[SPRING].owners_of(robot)
         return sorted((joint for joint in can if far[joint] > FAR), key=lambda joint: -far[joint])[:MOST_TRIED]
+
+    def _calibrated(self, spring: Candidate, start: dict[str, float]) -> ValidatedRefit | None:
+        """The model with a spring from its start values, calibrated with everything, as the rigid one was.
+
+        Whether it is there was asked of blocks left out before; None where it cannot be calibrated.
+        """
+        try:
+            elastic = BaseModel.of(add_effect(self.base.result.start, spring.label, start), self.base.recordings)
+            errors = judged_error(elastic, elastic.robot, elastic.calibrations, self.spans[1])
+        except (JointscopeError, np.linalg.LinAlgError):
+            return None
+        own = {name: elastic.robot.parameters[f"{spring.owner}.{SPRING}.{name}"].sigma for name in start}
+        sigmas = {name: float("nan") if sigma is None else sigma for name, sigma in own.items()}
+        refit = Refit(elastic.robot, spring.label, elastic.calibrations, sigmas, converged=True)
+        return ValidatedRefit(refit, errors, reported_heldout_error(elastic.robot, self.holdout))
 
     def _fitted(self, joint: str) -> ValidatedRefit | None:
         """The model with a spring; None where it cannot be calibrated.

@@ -7,7 +7,7 @@ judged so; others by their predictions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -17,6 +17,7 @@ from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
+from jointscope.graphs.judging.elastic_reaction import is_spring, spring_start
 from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
 from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
 from jointscope.graphs.judging.torque_rows import TorqueEquations
@@ -27,7 +28,11 @@ from jointscope.robots.units import of_slide
 
 BANDS = (30.0, 15.0, 8.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
-FINE = 30.0  # [sensor sigma] error from which the model, not the sensor, limits the prediction
+FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
+UNHELD = "a calibration with it does not bear it out"
+TIED = 0.01  # of a score: less says nothing
+# a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
+SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -52,14 +57,24 @@ class TorqueVerdicts:
     sentence: str
 
 
-def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison) -> TorqueVerdicts | None:
-    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short."""
+def torque_verdicts(
+    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, barred: Collection[str] = ()
+) -> TorqueVerdicts | None:
+    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short.
+
+    Args:
+        base: the model.
+        scored: the catalogue.
+        comparison: of the model with a recording.
+        barred: ID@OWNER of candidates that did not hold elsewhere.
+    """
     judge = _judge(base, comparison)
     if judge is None:
         return None
-    hypotheses = hypotheses_on_motion(base.robot, judge.rows)
+    hypotheses = hypotheses_on_motion(base.robot, judge.equations)
     judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
     found = {j.hypothesis.label: j for j in judged if j is not None}
+    found |= {label: replace(found[label], refused=UNHELD) for label in barred if label in found}
     accepted = sorted((j for j in found.values() if not j.refused), key=lambda j: -j.common)
     equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
     fewest = min((j.dof for j in equal), default=0)
@@ -80,11 +95,22 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, comparison: Model
     shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
     scores = {label: j.score for label, j in found.items()}
     candidates.sort(key=lambda c: (order[c.verdict], -shares.get(c.label, -2.0), -scores.get(c.label, 0.0)))
-    candidates.sort(key=lambda c: -scores[c.label] if c.verdict == "missing" else 0.0)
+    best = max((scores[c.label] for c in candidates if c.verdict == "missing"), default=0.0)
+    candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
     candidates.sort(key=lambda c: order[c.verdict])
     return TorqueVerdicts(
         candidates, refits, missing, percent, judge.unexplained, _sentence(base.robot, judge, missing, percent)
     )
+
+
+def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[float, ...]:
+    """Where missing ones stand; between those that the motion does not tell apart no rounding decides."""
+    if candidate.verdict != "missing":
+        return (0.0,)
+    if score < best - max(TIED * best, 1.0):
+        return (1.0, -score)
+    known = candidate.effect in SIMPLEST
+    return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
 
 
 def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
@@ -130,12 +156,16 @@ def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
 
 def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot: Robot) -> Candidate:
     here = j.hypothesis.here
-    start = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
+    known = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
     sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
     parameters = {
         p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
     }
-    if parameters:
+    if is_spring(j.hypothesis):
+        start = spring_start(robot, j.hypothesis)
+        units = {p.name: robot.unit_at(here.owner, p.unit) for p in here.effect.parameters_at(robot, here.owner)}
+        parameters = {name: EffectEstimate(v, float("nan"), units[name]) for name, v in start.items()}
+    elif parameters:
         shapes = {p.name: p.unit for p in here.effect.parameters_at(robot, here.owner) if p.is_shape}
         for name, value in j.hypothesis.shapes.items():
             parameters[name] = EffectEstimate(
@@ -159,11 +189,13 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
         stands_in = j.share > SHARE and not j.refused.startswith("there")
         verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
     return replace(
-        start, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
+        known, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
     )
 
 
 def _with(robot: Robot, j: TorqueJudgement) -> Robot:
+    if is_spring(j.hypothesis):
+        return add_effect(robot, j.hypothesis.label, dict(spring_start(robot, j.hypothesis)))
     start = {p.name: float(v) for p, v in zip(j.hypothesis.sizes, j.sizes, strict=True)}
     return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
 

@@ -10,8 +10,9 @@ from itertools import groupby, product
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.judging.elastic_reaction import is_spring, spring_hypotheses
 from jointscope.graphs.judging.torque_noise import speeds
-from jointscope.graphs.judging.torque_rows import TorqueRows
+from jointscope.graphs.judging.torque_rows import TorqueEquations, TorqueRows
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.robots.model.robot import Robot
 
@@ -22,12 +23,15 @@ MOST_PERIODS = 60.0
 STEP = 0.5  # [periods in the stroke]
 
 
-def hypotheses_on_motion(robot: Robot, rows: Sequence[TorqueRows]) -> list[EffectHypothesis]:
+def hypotheses_on_motion(robot: Robot, equations: TorqueEquations) -> list[EffectHypothesis]:
     """The catalogue with shapes on grids from the motion; those of one effect and owner stand together."""
-    own = {r.joint: r for r in rows}
+    own = {r.joint: r for r in equations.rows}
     found = []
     for _, group in groupby(hypotheses_of(robot), key=lambda h: h.label):
         alike = list(group)
+        if is_spring(alike[0]):
+            found += spring_hypotheses(alike[0].here, equations.period)
+            continue
         grids = _grids(alike, own[alike[0].here.owner], robot) if alike[0].here.owner in own else {}
         if grids:
             names, values = list(grids), product(*grids.values())

@@ -14,20 +14,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.judging.elastic_reaction import is_spring
+from jointscope.graphs.judging.free_curves import hats, over_speed, stacked
+from jointscope.graphs.judging.row_blocks import blocks_of
+from jointscope.graphs.judging.shape_search import Fitted, between_shapes
 from jointscope.graphs.judging.torque_noise import Yardstick, independent, saturated, yardstick_of
-from jointscope.graphs.judging.torque_rows import TorqueEquations, TorqueRows
+from jointscope.graphs.judging.torque_rows import TorqueEquations
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 
 Array = NDArray[np.float64]
 
-BLOCK, FEWEST_BLOCKS, FOLDS = 2.0, 8, 4  # [s] at the most
-FEWEST_ROWS = 10  # of a block that counts
+FEWEST_BLOCKS, FOLDS = 8, 4
 NET, SHARE, COMMON = 12.0, 0.05, 0.02  # significance; share of the own equations, of all
 HELPED, HELPED_BY_COMMAND = 0.8, 0.9  # of the blocks
 HARM, CEILING = 1.5, 0.5
 ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
 GAUGE = 1e-4  # of a column's square outside the base columns
-KNOTS, SPEED_KNOTS = 8, 5
 DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
 
 
@@ -71,7 +73,7 @@ class TorqueJudge:
 
     def __init__(self, equations: TorqueEquations):
         self.equations, self.rows = equations, equations.rows
-        self.blocks = [_blocks(rows) for rows in self.rows]
+        self.blocks = [blocks_of(rows) for rows in self.rows]
         self.noise: list[Yardstick] = [yardstick_of(r, b) for r, b in zip(self.rows, self.blocks, strict=True)]
         self.drive = np.array([_rms(r.drive) for r in self.rows])
         self._everything = np.vstack([rows.base for rows in self.rows])
@@ -91,24 +93,31 @@ class TorqueJudge:
     @property
     def unexplained(self) -> float:
         """Share of the squared missing torque that smooth laws would explain on blocks left out, 0 to 1."""
-        smooth = self._left_out(_stacked([independent(saturated(rows)) for rows in self.rows]))
+        smooth = self._left_out(stacked([independent(saturated(rows)) for rows in self.rows]))
         return max(self._common(smooth), 0.0)
 
     def judge(self, hypotheses: Sequence[EffectHypothesis]) -> TorqueJudgement | None:
         """The best of hypotheses that differ in their shapes alone; None for what does not act through torques."""
-        best: tuple[float, EffectHypothesis, Array, Array, Array] | None = None
+        found: list[Fitted] = []
         for hypothesis in hypotheses:
-            columns = self.equations.columns(hypothesis)
-            if columns is None:
+            fitted = self._fit(hypothesis)
+            if fitted is None:
                 return None
-            C = np.vstack(columns)
-            found = self._score(C, hypothesis)
-            if best is None or found[0] > best[0]:
-                best = (found[0], hypothesis, found[1], found[2], C[:, np.isfinite(found[2])])
-        assert best is not None
-        score, hypothesis, sizes, sigmas, C = best
-        net = score - C.shape[1] * np.log(self.samples) - 2.0 * np.log(len(hypotheses))
-        return self._judged(hypothesis, score, float(net), sizes, sigmas, C)
+            found.append(fitted)
+        best = max(found, key=lambda fitted: fitted.score)
+        if best.score > 0.0:
+            best = between_shapes(self._fit, best, hypotheses)
+        C = best.columns[:, np.isfinite(best.sigmas)]
+        net = best.score - C.shape[1] * np.log(self.samples) - 2.0 * np.log(len(hypotheses))
+        return self._judged(best.hypothesis, best.score, float(net), best.sizes, best.sigmas, C)
+
+    def _fit(self, hypothesis: EffectHypothesis) -> Fitted | None:
+        """Score and sizes of one hypothesis; None for what does not act through torques."""
+        columns = self.equations.columns(hypothesis)
+        if columns is None:
+            return None
+        C = np.vstack(columns)
+        return Fitted(hypothesis, C, *self._score(C, hypothesis))
 
     def _judged(
         self, hypothesis: EffectHypothesis, score: float, net: float, sizes: Array, sigmas: Array, C: Array
@@ -193,8 +202,8 @@ class TorqueJudge:
         sizes, sigmas = np.zeros(k), np.full(k, np.inf)
         sizes[told], sigmas[told] = covariance @ s, np.sqrt(np.diag(covariance))
         possible = all(size >= 0.0 for size, p in zip(sizes, hypothesis.sizes, strict=True) if p.sign == "+")
-        # no effect is larger than the drive that overcomes it
-        acts = [_rms(part @ sizes) for part in self._split(C)]
+        # no effect is larger than the drive that overcomes it; a load near its resonance carries itself
+        acts = [0.0 if is_spring(hypothesis) else _rms(part @ sizes) for part in self._split(C)]
         if not possible or not told or np.any(np.array(acts) > self.drive):
             return none
         return float(s @ sizes[told]), sizes, sigmas
@@ -240,8 +249,8 @@ class TorqueJudge:
 
     def _ceiling(self) -> float:
         """Share that free curves over position or over speed explain on blocks left out; 0 where they run away."""
-        curves = ([_hats(r.q, KNOTS) for r in self.rows], [_over_speed(r.v) for r in self.rows])
-        return max(0.0, *(self._common(self._left_out(_stacked(c))) for c in curves))
+        curves = ([hats(r.q) for r in self.rows], [over_speed(r.v) for r in self.rows])
+        return max(0.0, *(self._common(self._left_out(stacked(c))) for c in curves))
 
 
 def _told(rest: Array, whole: Array) -> list[int]:
@@ -255,42 +264,9 @@ def _told(rest: Array, whole: Array) -> list[int]:
     return kept
 
 
-def _blocks(rows: TorqueRows) -> NDArray[np.intp]:
-    """Block of each row, from 0 on, those with few rows joined to the one before, shape (m,)."""
-    told = float(np.sum(np.minimum(np.diff(rows.times), 1.0))) if len(rows.times) else 0.0
-    length = min(BLOCK, max(told, 1e-3) / 10.0)
-    raw = ((rows.times - rows.times[0]) / length).astype(int)
-    found, now, count = np.zeros(len(raw), np.intp), 0, 0
-    for i in range(len(raw)):
-        if i and raw[i] != raw[i - 1] and count >= FEWEST_ROWS:
-            now, count = now + 1, 0
-        found[i], count = now, count + 1
-    return found
-
-
 def _by_block(before: Array, after: Array, blocks: NDArray[np.intp]) -> Array:
     return np.array([[_rms(before[blocks == b]), _rms(after[blocks == b])] for b in np.unique(blocks)])
 
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _hats(x: Array, knots: int) -> Array:
-    """Linear interpolation between knots at quantiles, shape (m, knots)."""
-    at = np.unique(np.quantile(x, np.linspace(0.0, 1.0, knots)))
-    return np.column_stack([np.interp(x, at, unit) for unit in np.eye(len(at))])
-
-
-def _over_speed(v: Array) -> Array:
-    parts = [np.where((v > 0.0) == forward, 1.0, 0.0) for forward in (True, False)]
-    return np.hstack([part[:, None] * _hats(np.sqrt(np.abs(v)), SPEED_KNOTS) for part in parts])
-
-
-def _stacked(columns: Sequence[Array]) -> Array:
-    """Columns of their own for every equation, shape (m of all, k of all)."""
-    total, start = np.zeros((sum(len(c) for c in columns), sum(c.shape[1] for c in columns))), [0, 0]
-    for c in columns:
-        total[start[0] : start[0] + len(c), start[1] : start[1] + c.shape[1]] = c
-        start = [start[0] + len(c), start[1] + c.shape[1]]
-    return total

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.priors import DynamicsPrior
+from jointscope.graphs.judging.elastic_reaction import is_spring, reaction_column
 from jointscope.graphs.judging.torque_steps import TorqueSteps
 from jointscope.graphs.problem.standstill import near, slowest_speed
 from jointscope.graphs.scoring.columns.column import Column
@@ -132,10 +133,18 @@ class TorqueEquations:
         signals = [_asked_for(part.segment, part.missing, by) for part, by in zip(steps, gains, strict=True)]
         return TorqueEquations(steps, windows, found, signals, expected, prior.sigma)
 
+    @property
+    def period(self) -> float:
+        """Of the ticks [s]."""
+        return float(np.median(np.diff(self.signals[0].ticks)))
+
     def columns(self, hypothesis: EffectHypothesis) -> list[Array] | None:
         """What each size of a hypothesis adds to the missing torque, shape (m, k) by equation; None for numerics."""
         by_segment = []
         for steps, signals in zip(self.steps, self.signals, strict=True):
+            if is_spring(hypothesis):
+                by_segment.append(reaction_column(steps, hypothesis))
+                continue
             columns = columns_of(hypothesis, signals)
             if not columns or any(c.better_integrator for c in columns):
                 return None

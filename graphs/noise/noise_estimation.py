@@ -42,6 +42,7 @@ from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
 
+UNSEEN = 1e-2  # of the random torque of a motor, that of a link which no sensor sees
 SMALLEST_LASTING = 1e-3  # [rad/s^2/sqrt(s)] density of torques that last
 CHANGE_TOLERANCE = 0.08  # relative change of a density that no longer matters
 FAR = 5.0  # [sigma times misfit] a Gauss-Newton step beyond this is checked and damped
@@ -106,6 +107,9 @@ def scaled(noise: ProcessNoise, factors: Array) -> ProcessNoise:
     lasting = np.maximum(noise.memory[kept:] * memory[kept:], SMALLEST_LASTING)
     velocities = np.concatenate([noise.link_velocity * link, noise.motor_velocity * motor])
     links, motors = np.split(np.maximum(velocities, noise.smallest), [len(link)])
+    if len(noise.unseen):
+        least = np.broadcast_to(noise.smallest, velocities.shape)[: len(links)]
+        links = np.where(noise.unseen >= 0, np.maximum(UNSEEN * motors[noise.unseen], least), links)
     return replace(
         noise,
         link_velocity=links,

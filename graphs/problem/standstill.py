@@ -7,6 +7,7 @@ would do so without a stop. So all that is slower than friction needs for its fu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,7 @@ CLEARLY = 0.5  # of the speed at which friction has its full size, what is wante
 RESOLVED = 3.0  # [sigma] of that speed
 SLOW_EFFECTS = ("motor_stribeck", "pwm_deadband")  # of which nothing is seen at higher speeds
 HARDLY_MOVES = 0.25  # of the 95 % speed; no more is left out
+GRAIN = 0.003  # of the 95 % speed, at which friction that is taken for a sign has its full size
 
 
 def slowest_speed(v: Array, sharpness: float) -> float:
@@ -43,19 +45,21 @@ def near(mask: Mask, steps: int) -> Mask:
 def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     """The recording with the stretches in which each rigid joint is too slow for the size of its friction to be known.
 
-    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest.
+    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest; one
+    that got its spring as an effect has it, too, but its link may be seen by nothing else than what its motor does.
 
-    A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion. So does one
-    whose encoder does not show them.
+    A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion unless its
+    friction is held as a sign. So does one whose encoder does not show them.
     """
     encoder, found = robot.motor_encoder, {}
     stream = recording.streams[encoder.name]
     for j, joint in enumerate(robot.joints):
         own = robot.parameters.get(f"{joint}.{SHARPNESS}")
         asked = own is not None and not own.fixed
-        told = asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
+        sign = own is not None and own.fixed
+        told = asked or (not sign and any(robot.has_effect(id, joint) for id in SLOW_EFFECTS))
         rounded = SATURATED / robot.sharpness_of(joint)
-        if joint in robot.layout.motors or told:
+        if told or (joint in robot.layout.motors and not robot.has_effect("joint_elasticity", joint)):
             continue
         v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
         if seen < rounded:
@@ -63,6 +67,30 @@ def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
             slow[1:] |= v[1:] * v[:-1] < 0.0
             found[joint] = _stretches(slow, stream.times, reach)
     return replace(recording, sticking=found)
+
+
+def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
+    """The robot with the dry friction of each joint that looks for its sharpness as a sign, as far as motion tells.
+
+    A true sign drives the sharpness up without an end, and what a model lacks drives it down, until friction is one
+    more viscous one that hides it. Held so that friction has its full size at a small part of the joint's own speed, or
+    at the slowest that the encoder tells from zero, standstill can be left out.
+    """
+    parameters, encoder = dict(robot.parameters), robot.motor_encoder
+    for j, joint in enumerate(robot.joints):
+        own = robot.parameters.get(f"{joint}.{SHARPNESS}")
+        if own is None or own.fixed:
+            continue
+        slowest = []
+        for recording in recordings:
+            stream = recording.streams[encoder.name]
+            q, times = stream.values[:, j], stream.times
+            v, _, _ = _speed(times, q, float(encoder.sigmas[j]), 0.0)
+            grain = GRAIN * float(np.quantile(np.abs(v), 0.95))
+            slowest.append(max(grain, _speed(times, q, float(encoder.sigmas[j]), grain)[1]))
+        if np.all(np.isfinite(slowest)) and min(slowest) > 0.0:
+            parameters[f"{joint}.{SHARPNESS}"] = replace(own, value=SATURATED / min(slowest), fixed=True)
+    return replace(robot, parameters=parameters)
 
 
 def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, float, float]:

@@ -24,6 +24,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.starts.drive_starts import with_drive_starts
 from jointscope.graphs.starts.encoder_motion import encoder_motion
+from jointscope.graphs.starts.swinging_links import swinging_links
 from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.joint_parameters import JointParameters
@@ -55,6 +56,9 @@ def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:
     links = robot.link_encoder
     if links is not None:
         return np.hstack([*encoder_motion(problem.recording.streams[links.name], links, ticks), q_motor, v_motor])
+    unseen = swinging_links(problem, calibration, q_motor, v_motor)
+    if unseen is not None:
+        return np.hstack([unseen, q_motor, v_motor])
     q_relaxed, v_relaxed = joint_angles(robot, q_motor), joint_angles(robot, v_motor)
     v_link = _link_rates(problem, calibration, q_relaxed, v_relaxed)
     h = np.diff(ticks, prepend=ticks[0])

@@ -15,7 +15,7 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
-from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities
+from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities, unseen_links
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
@@ -163,6 +163,7 @@ def carried_noise(old: Robot, new: Robot) -> ProcessNoise:
         motor_velocity=np.array([motor.get(name, link.get(name, HINGE_DENSITY)) for name in after.motors]),
         memory=np.array([memory.get(label, m.noise) for label, m in new.memories.items()]),
         smallest=smallest_densities(new),
+        unseen=unseen_links(new),
     )
     if not noise.n_lasting:
         return white

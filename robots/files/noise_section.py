@@ -53,6 +53,7 @@ def process_noise(section: Section, robot: Robot) -> ProcessNoise:
         position=section.number("position", positive=True) if model == "independent" else 0.0,
         memory=np.array(memory),
         smallest=smallest_densities(robot),
+        unseen=unseen_links(robot),
     )
     return _with_lasting(white, section, robot)
 
@@ -74,3 +75,13 @@ def smallest_densities(robot: Robot) -> Array:
     """Densities below which none is estimated, link before motor, shape (n_link + n_motor,)."""
     slides = np.isin([*robot.layout.links, *robot.layout.motors], robot.tree.slides)
     return np.where(slides, SMALLEST_SLIDING, SMALLEST_TURNING)
+
+
+def unseen_links(robot: Robot) -> Array:
+    """Motors of links that got their spring as an effect and no sensor of their own, see `ProcessNoise.unseen`."""
+    layout, alone = robot.layout, len(robot.sensors) == 1
+    found = np.full(layout.n_link, -1)
+    for link, joint in zip(layout.joint_link, robot.joints, strict=True):
+        if alone and joint in layout.motors and robot.has_effect("joint_elasticity", joint):
+            found[link] = layout.motors.index(joint)
+    return found if np.any(found >= 0) else np.zeros(0, dtype=int)

@@ -27,6 +27,8 @@ class ProcessNoise:
         motor_velocity: density of each motor equation, shape (n_motor,) [rad/s/sqrt(s)].
         memory: density of each memory of the state, shape (n_memory,). Where torques last, theirs stand last, link
             before motor [rad/s^2/sqrt(s)].
+        unseen: index of the motor behind which each link swings that no sensor sees, -1 for others, shape (n_link,);
+            empty for none. Its random torques cannot be told from those of the motor, where friction and ripples act.
         correlation_time: T of the torques that last, dw/dt = -w / T + white noise [s]; 0 where none do.
         position: density of the positions for model "independent" [rad/sqrt(s)].
         smallest: of link and motor velocities, below which rounding in the Hessian and the integration error take over,
@@ -41,6 +43,7 @@ class ProcessNoise:
     memory: Array = field(default_factory=lambda: np.zeros(0))
     smallest: Array = field(default_factory=lambda: np.array(1e-3))
     correlation_time: float = 0.0
+    unseen: Array = field(default_factory=lambda: np.zeros(0, dtype=int))
 
     @property
     def n_lasting(self) -> int:

@@ -57,7 +57,7 @@ class Equations:
 def hypothesis(*columns, sign=None, effect="torque_offset"):
     size = SimpleNamespace(name="torque", sign=sign, prior_sigma=100.0)
     here = SimpleNamespace(effect=SimpleNamespace(id=effect))
-    return SimpleNamespace(columns=columns, sizes=(size,) * len(columns), here=here)
+    return SimpleNamespace(columns=columns, sizes=(size,) * len(columns), here=here, shapes={})
 
 
 def one(q, v):
