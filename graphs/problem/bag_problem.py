@@ -9,6 +9,7 @@ initial  enc,  gyro                          ...          gyro: full, vertical o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
+from jointscope.graphs.problem.standstill import Stretches, holding_motors
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
@@ -77,8 +79,9 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        acting, free = path if path.changes else None, _free(robot, recording, timeline)
-        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free)
+        acting, holds = path if path.changes else None, holding_motors(robot, recording, timeline.h)
+        free, slides = _free(robot, recording, timeline, holds), _sliding(robot, timeline, holds)
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free, slides)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory_spreads(robot).tolist())
@@ -153,8 +156,9 @@ def _add_rotors(M: Array, robot: Robot, recording: Recording, timeline: Timeline
     M[sticks] = (M[sticks] + np.diag(rotors)) * (alone / (alone + rotors))[:, :, None]
 
 
-def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
+def _free(robot: Robot, recording: Recording, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
     """Where steps bind no motion: all in a stretch that is left out, one joint where it sticks; None for neither."""
+    recording = replace(recording, sticking={**recording.sticking, **holds})
     if not recording.left_out and not recording.sticking:
         return None
     end, h, layout = timeline.ticks[1:], timeline.h, robot.layout
@@ -165,6 +169,17 @@ def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | Non
             held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / inertias[row] * np.sqrt(h)
             free[:, row] = np.maximum(free[:, row], np.where(recording.sticks(joint, end, h), held, 0.0))
     return free
+
+
+def _sliding(robot: Robot, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
+    """Whether friction acts by its law at both ends of each step, 1 or 0, shape (m, 2, n); None where it does."""
+    if not holds:
+        return None
+    ticks = np.ones((len(timeline.ticks), robot.n))
+    for joint, stretches in holds.items():
+        for t0, t1 in stretches:
+            ticks[(timeline.ticks >= t0) & (timeline.ticks <= t1), robot.joints.index(joint)] = 0.0
+    return np.stack([ticks[:-1], ticks[1:]], axis=1)
 
 
 def first_command_time(recording: Recording) -> float:

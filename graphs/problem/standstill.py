@@ -18,6 +18,7 @@ from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Stretches = tuple[tuple[float, float], ...]
 
 SATURATED = 3.0  # tanh of this is 1 to half a percent: dry friction is a sign from here on
 SLOW = 1e-3  # of the 95 % speed
@@ -25,6 +26,8 @@ LOOK = 0.02  # [s] over which an encoder may show a speed, five samples at least
 CLEARLY = 0.5  # of the speed at which friction has its full size, what is wanted to be told from zero
 RESOLVED = 3.0  # [sigma] of that speed
 SLOW_EFFECTS = ("motor_stribeck", "pwm_deadband")  # of which nothing is seen at higher speeds
+STIFF = 1.0  # times that friction may stop a motor in one step
+DOUBTFUL = 3.0  # times the speed of full friction, up to which a step may turn a motor over whose friction is stiff
 HARDLY_MOVES = 0.25  # of the 95 % speed; no more is left out
 
 
@@ -43,26 +46,64 @@ def near(mask: Mask, steps: int) -> Mask:
 def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     """The recording with the stretches in which each rigid joint is too slow for the size of its friction to be known.
 
-    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest.
+    An elastic one has an equation of its own for its motor, see `holding_motors`.
 
     A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion. So does one
     whose encoder does not show them.
     """
-    encoder, found = robot.motor_encoder, {}
-    stream = recording.streams[encoder.name]
-    for j, joint in enumerate(robot.joints):
-        own = robot.parameters.get(f"{joint}.{SHARPNESS}")
-        asked = own is not None and not own.fixed
-        told = asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
-        rounded = SATURATED / robot.sharpness_of(joint)
-        if joint in robot.layout.motors or told:
-            continue
-        v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
-        if seen < rounded:
-            slow = np.abs(v) < max(seen, min(rounded, HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))))
-            slow[1:] |= v[1:] * v[:-1] < 0.0
-            found[joint] = _stretches(slow, stream.times, reach)
+    found = {}
+    for joint in robot.joints:
+        stretches = None if joint in robot.layout.motors else _standing(robot, recording, joint)
+        if stretches is not None:
+            found[joint] = stretches
     return replace(recording, sticking=found)
+
+
+def holding_motors(robot: Robot, recording: Recording, h: Array) -> dict[str, Stretches]:
+    """Stretches in which each elastic joint's motor stands, where its friction is stiff.
+
+    Over a step of length h the rounded law stops a slow motor many times over if mu k h is above its inertia. No rule
+    of integration follows that: the cost has a minimum of its own for every tick of a motor that stands, and a process
+    noise that took what friction does there would hide what happens in motion. So the law is silent there, and what
+    friction does is left open.
+
+    Args:
+        robot: the model, with friction, sharpness and inertias as its file says.
+        recording: tells by its encoder where motors stand.
+        h: lengths of the steps, shape (m,) [s].
+    """
+    longest, found = float(np.median(h)) if len(h) else 0.0, {}
+    for joint in robot.layout.motors:
+        friction = robot.drive_parameter(joint, "coulomb_torque").value * robot.sharpness_of(joint)
+        if longest * friction > STIFF * robot.drive_parameter(joint, "inertia").value:
+            stretches = _standing(robot, recording, joint, DOUBTFUL)
+            if stretches is not None:
+                found[joint] = stretches
+    return found
+
+
+def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0) -> Stretches | None:
+    """Where a joint is too slow for its friction to be known; None where that is wanted, or cannot be seen.
+
+    Args:
+        robot: the model.
+        recording: the data.
+        joint: which one.
+        times: the speed at which friction has its full size, below which the joint is too slow.
+    """
+    encoder, j = robot.motor_encoder, robot.joints.index(joint)
+    stream = recording.streams[encoder.name]
+    own = robot.parameters.get(f"{joint}.{SHARPNESS}")
+    asked = own is not None and not own.fixed
+    if asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS):
+        return None
+    rounded = SATURATED / robot.sharpness_of(joint)
+    v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
+    if seen >= rounded:
+        return None
+    slow = np.abs(v) < max(seen, min(times * rounded, HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))))
+    slow[1:] |= v[1:] * v[:-1] < 0.0
+    return _stretches(slow, stream.times, reach)
 
 
 def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, float, float]:
@@ -84,7 +125,7 @@ def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, 
     return np.interp(times, grid, slope), float(seen), half * period
 
 
-def _stretches(mask: Mask, ticks: Array, reach: float) -> tuple[tuple[float, float], ...]:
+def _stretches(mask: Mask, ticks: Array, reach: float) -> Stretches:
     """Times in which a mask holds, widened by `reach` [s] and joined where they touch."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     joined: list[tuple[float, float]] = []
