@@ -38,8 +38,8 @@ class Steps:
         index: place of each step in the path, shape (m,).
         free: least density of the velocities in each step [rad/s/sqrt(s)], shape (m, k), where something acts that no
             law tells, such as a hand, or friction that holds; 0 where the equation binds, None where all do.
-        sliding: whether the dry friction of each joint acts by its law at the beginning and the end of each step, 1 or
-            0, shape (m, 2, n); None where it does.
+        sliding: how sharply the dry friction of each joint turns over at the beginning and the end of each step, as a
+            part of what its law says, shape (m, 2, n); None where all is as it says.
     """
 
     h: Array
@@ -66,7 +66,7 @@ class Steps:
 
     @property
     def begins(self) -> Array | None:
-        """Whether friction acts by its law where each step begins, shape (m, n)."""
+        """How sharply friction turns over where each step begins, shape (m, n)."""
         return None if self.sliding is None else self.sliding[:, 0]
 
     @property

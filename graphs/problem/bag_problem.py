@@ -25,7 +25,7 @@ from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
-from jointscope.graphs.problem.standstill import Stretches, holding_motors
+from jointscope.graphs.problem.standstill import Stretches, holding_motors, stiffness
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
@@ -45,6 +45,7 @@ DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
 FREE = 20.0  # [rad/s / sqrt(s)] density of velocities where something unknown acts; the sensors alone tell states there
+BAND = 3.0  # the same of a motor that stands, whose friction brakes it
 BANDS = 10.0  # times the dry friction that the robot file says, by which the torque that holds a joint may be off
 
 
@@ -166,19 +167,28 @@ def _free(robot: Robot, recording: Recording, timeline: Timeline, holds: Mapping
     inertias = equation_inertias(robot)
     for row, joint in zip(layout.motor_row, robot.joints, strict=True):
         if joint in recording.sticking:
-            held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / inertias[row] * np.sqrt(h)
+            held = (
+                (BAND if joint in holds else BANDS)
+                * robot.drive_parameter(joint, "coulomb_torque").value
+                / inertias[row]
+                * np.sqrt(h)
+            )
             free[:, row] = np.maximum(free[:, row], np.where(recording.sticks(joint, end, h), held, 0.0))
     return free
 
 
 def _sliding(robot: Robot, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
-    """Whether friction acts by its law at both ends of each step, 1 or 0, shape (m, 2, n); None where it does."""
+    """How sharply friction turns over at both ends of each step, shape (m, 2, n), see `Steps`; None for its own law.
+
+    Where a motor stands, as sharply as may be integrated: it is braked, its friction is what it may be.
+    """
     if not holds:
         return None
-    ticks = np.ones((len(timeline.ticks), robot.n))
+    ticks, h = np.ones((len(timeline.ticks), robot.n)), float(np.median(timeline.h))
     for joint, stretches in holds.items():
+        gentle = 1.0 / stiffness(robot, joint, h)
         for t0, t1 in stretches:
-            ticks[(timeline.ticks >= t0) & (timeline.ticks <= t1), robot.joints.index(joint)] = 0.0
+            ticks[(timeline.ticks >= t0) & (timeline.ticks <= t1), robot.joints.index(joint)] = gentle
     return np.stack([ticks[:-1], ticks[1:]], axis=1)
 
 

@@ -72,14 +72,41 @@ def holding_motors(robot: Robot, recording: Recording, h: Array) -> dict[str, St
         recording: tells by its encoder where motors stand.
         h: lengths of the steps, shape (m,) [s].
     """
-    longest, found = float(np.median(h)) if len(h) else 0.0, {}
-    for joint in robot.layout.motors:
-        friction = robot.drive_parameter(joint, "coulomb_torque").value * robot.sharpness_of(joint)
-        if longest * friction > STIFF * robot.drive_parameter(joint, "inertia").value:
-            stretches = _standing(robot, recording, joint, DOUBTFUL)
-            if stretches is not None:
-                found[joint] = stretches
+    found = {}
+    for joint in stiff_motors(robot, float(np.median(h)) if len(h) else 0.0):
+        stretches = _standing(robot, recording, joint, DOUBTFUL)
+        if stretches is not None:
+            found[joint] = stretches
     return found
+
+
+def stiff_motors(robot: Robot, h: float) -> list[str]:
+    """Elastic joints whose friction would stop a motor more than once in a step of length h [s].
+
+    Not those whose sharpness is looked for: it says what friction does there.
+    """
+    found = []
+    for joint in robot.layout.motors:
+        if not _is_asked(robot, joint) and stiffness(robot, joint, h) > STIFF:
+            found.append(joint)
+    return found
+
+
+def stiffness(robot: Robot, joint: str, h: float) -> float:
+    """How many times the dry friction of a joint stops its motor in a step of length h [s], at the lowest speeds."""
+    friction = robot.drive_parameter(joint, "coulomb_torque").value * robot.sharpness_of(joint)
+    return h * friction / robot.drive_parameter(joint, "inertia").value
+
+
+def only_stiff_motors(robot: Robot, h: float) -> bool:
+    """Whether all joints have one, and the friction is that of the motors' velocity."""
+    return stiff_motors(robot, h) == list(robot.joints) and robot.choices.friction_velocity == "motor"
+
+
+def _is_asked(robot: Robot, joint: str) -> bool:
+    """Whether the sharpness of a joint's friction is looked for."""
+    own = robot.parameters.get(f"{joint}.{SHARPNESS}")
+    return own is not None and not own.fixed
 
 
 def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0) -> Stretches | None:
@@ -93,9 +120,8 @@ def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0
     """
     encoder, j = robot.motor_encoder, robot.joints.index(joint)
     stream = recording.streams[encoder.name]
-    own = robot.parameters.get(f"{joint}.{SHARPNESS}")
-    asked = own is not None and not own.fixed
-    if asked or any(robot.has_effect(id, joint) for id in SLOW_EFFECTS):
+    elastic = joint in robot.layout.motors
+    if _is_asked(robot, joint) or (not elastic and any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)):
         return None
     rounded = SATURATED / robot.sharpness_of(joint)
     v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)

@@ -78,7 +78,7 @@ class ElasticJoints:
             x: states, shape (m, d).
             u: commands in their SI unit, shape (m, n).
             parameters: values of the free parameters, shape (p,).
-            sliding: whether the dry friction of each joint acts by its law, 1 or 0, shape (m, n); it does if None.
+            sliding: how sharply the dry friction of each joint turns over, as a part of what its law says, (m, n).
 
         Returns:
             Shape (m, r) [rad/s^2].
@@ -116,14 +116,13 @@ class ElasticJoints:
             Both, and the rigid bodies' derivatives between the ticks where they are cheap to know.
         """
         if self._commands_move_links:
-            ends = (slice(None, -1), slice(1, None))
-            slides = [None if sliding is None else sliding[end] for end in ends]
-            parts = zip(ends, slides, strict=True)
-            first, last = (self._differentiate(x[end], parameters, None, u, slide) for end, slide in parts)
+            begins, ends = (None, None) if sliding is None else (sliding[:-1], sliding[1:])
+            first = self._differentiate(x[:-1], parameters, None, u, begins)
+            last = self._differentiate(x[1:], parameters, None, u, ends)
             return first, last, None
         free = self.without_command(x, parameters, sliding=sliding)
-        ends = free.part(slice(None, -1)), free.part(slice(1, None))
-        first, last = (self.with_command(end, u, parameters) for end in ends)
+        parts = free.part(slice(None, -1)), free.part(slice(1, None))
+        first, last = (self.with_command(part, u, parameters) for part in parts)
         return first, last, free.rigid.between()
 
     def without_command(
@@ -264,7 +263,7 @@ class ElasticJoints:
         return value, rigid
 
     def _sharp(self, values: Mapping[str, float], sliding: Array | None) -> Array | None:
-        """Sharpness of the friction, 0 where the law says nothing; None where it acts everywhere."""
+        """Sharpness of the friction; None where it is that of the law everywhere."""
         return None if sliding is None else sliding * self._friction_sharpness(values)
 
     def _terms(
