@@ -116,6 +116,14 @@ class BagProblem:
         return replace(BagProblem.of(robot, self.recording), owner=self.owner)
 
     @property
+    def as_predicted(self) -> BagProblem:
+        """The same problem with the noise that predictions have: about a motor that sticks nothing is open."""
+        if self.dynamics.steps.sliding is None:
+            return self
+        steps = replace(self.dynamics.steps, free=_free(self.robot, self.recording, self.timeline, {}))
+        return replace(self, dynamics=replace(self.dynamics, steps=steps))
+
+    @property
     def initial(self) -> InitialStateFactor:
         """The prior of the first state."""
         first = self.placed[0].factor
