@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo docs story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l fuzz clean
+.PHONY: demo docs story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l bench-biorob fuzz clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -72,6 +72,9 @@ bench-real: $(VENV)/bench $(VENV)/code
 
 bench-tx90l: $(VENV)/sim $(VENV)/code
 	$(BIN)/python benchmarks/bench_tx90l.py
+
+bench-biorob: $(VENV)/code
+	$(BIN)/python benchmarks/bench_biorob.py
 
 # Below an hour; fails where something is found.
 fuzz: $(VENV)/sim $(VENV)/code

@@ -22,13 +22,17 @@ class EulerDynamics(DynamicsFactor):
 
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
         """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
-        return self._defects(x0, x1, self.model.accelerations(x0, self.command(parameters), parameters))
+        return self._defects(
+            x0, x1, self.model.accelerations(x0, self.command(parameters), parameters, self.steps.begins)
+        )
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
         """Defects and derivatives for m pairs of states."""
         h = self.steps.h[:, None, None]
         Q, V = selectors(self.model.layout)
-        a = self.model.with_derivatives(x0, self.command(calibration.values), calibration.values)
+        a = self.model.with_derivatives(
+            x0, self.command(calibration.values), calibration.values, None, self.steps.begins
+        )
         return self.assemble(
             self._defects(x0, x1, a.value),
             (-V - h * a.by_state, -Q - h * V[: len(Q)]),

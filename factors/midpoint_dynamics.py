@@ -22,13 +22,15 @@ class MidpointDynamics(DynamicsFactor):
 
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
         """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
-        return self._defects(x0, x1, self.model.accelerations(0.5 * (x0 + x1), self.command(parameters), parameters))
+        u = self.command(parameters)
+        return self._defects(x0, x1, self.model.accelerations(0.5 * (x0 + x1), u, parameters, self.steps.throughout))
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
         """Defects and derivatives for m pairs of states."""
         h = self.steps.h[:, None, None]
         Q, V = selectors(self.model.layout)
-        a = self.model.with_derivatives(0.5 * (x0 + x1), self.command(calibration.values), calibration.values)
+        u, values = self.command(calibration.values), calibration.values
+        a = self.model.with_derivatives(0.5 * (x0 + x1), u, values, None, self.steps.throughout)
         half = 0.5 * h * a.by_state
         return self.assemble(
             self._defects(x0, x1, a.value),

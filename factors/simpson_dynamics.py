@@ -26,18 +26,18 @@ class SimpsonDynamics(DynamicsFactor):
 
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
         """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
-        u = self.command(parameters)
-        a0 = self.model.accelerations(x0, u, parameters)
-        a1 = self.model.accelerations(x1, u, parameters)
-        a_mid = self.model.accelerations(self._middle(x0, x1, a0, a1), u, parameters)
+        u, steps = self.command(parameters), self.steps
+        a0 = self.model.accelerations(x0, u, parameters, steps.begins)
+        a1 = self.model.accelerations(x1, u, parameters, steps.ends)
+        a_mid = self.model.accelerations(self._middle(x0, x1, a0, a1), u, parameters, steps.throughout)
         return self._defects(x0, x1, a0, a_mid, a1)
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
         """Defects and derivatives for m pairs of states."""
         values = calibration.values
         u = self.command(values)
-        a0 = self.model.with_derivatives(x0, u, values)
-        a1 = self.model.with_derivatives(x1, u, values)
+        a0 = self.model.with_derivatives(x0, u, values, None, self.steps.begins)
+        a1 = self.model.with_derivatives(x1, u, values, None, self.steps.ends)
         return self._linearize(x0, x1, a0, a1, calibration)
 
     def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
@@ -47,7 +47,7 @@ class SimpsonDynamics(DynamicsFactor):
         much), the residual not at all.
         """
         values = calibration.values
-        a0, a1, rigid = self.model.at_ticks(x, self.command(values), values)
+        a0, a1, rigid = self.model.at_ticks(x, self.command(values), values, self.steps.at_ticks)
         return self._linearize(x[:-1], x[1:], a0, a1, calibration, rigid)
 
     def _middle(self, x0: Array, x1: Array, a0: Array, a1: Array) -> Array:
@@ -77,7 +77,7 @@ class SimpsonDynamics(DynamicsFactor):
 
         layout, values = self.model.layout, calibration.values
         middle = self._middle(x0, x1, a0.value, a1.value)
-        mid = self.model.with_derivatives(middle, self.command(values), values, rigid)
+        mid = self.model.with_derivatives(middle, self.command(values), values, rigid, self.steps.throughout)
         m, r, d = mid.by_state.shape
         k, p = len(layout.positions), mid.by_parameter.shape[2]
         by_x0, by_x1, by_p = ((np.empty((m, r, c)), np.empty((m, k, c))) for c in (d, d, p))

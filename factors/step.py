@@ -38,6 +38,8 @@ class Steps:
         index: place of each step in the path, shape (m,).
         free: least density of the velocities in each step [rad/s/sqrt(s)], shape (m, k), where something acts that no
             law tells, such as a hand, or friction that holds; 0 where the equation binds, None where all do.
+        sliding: how sharply the dry friction of each joint turns over at the beginning and the end of each step, as a
+            part of what its law says, shape (m, 2, n); None where all is as it says.
     """
 
     h: Array
@@ -48,6 +50,7 @@ class Steps:
     path: CommandPath | None = None
     index: NDArray[np.intp] | None = None
     free: Array | None = None
+    sliding: Array | None = None
 
     def __len__(self) -> int:
         return len(self.h)
@@ -57,7 +60,29 @@ class Steps:
         weight = None if self.weight is None else self.weight[samples]
         index = None if self.index is None else self.index[samples]
         free = None if self.free is None else self.free[samples]
-        return replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index, free=free)
+        sliding = None if self.sliding is None else self.sliding[samples]
+        part = replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index)
+        return replace(part, free=free, sliding=sliding)
+
+    @property
+    def begins(self) -> Array | None:
+        """How sharply friction turns over where each step begins, shape (m, n)."""
+        return None if self.sliding is None else self.sliding[:, 0]
+
+    @property
+    def ends(self) -> Array | None:
+        """The same where it ends."""
+        return None if self.sliding is None else self.sliding[:, 1]
+
+    @property
+    def throughout(self) -> Array | None:
+        """The same of a whole step."""
+        return None if self.sliding is None else self.sliding.min(axis=1)
+
+    @property
+    def at_ticks(self) -> Array | None:
+        """The same at the ticks of steps side by side, shape (m + 1, n)."""
+        return None if self.sliding is None else np.vstack([self.sliding[:, 0], self.sliding[-1:, 1]])
 
     def acting(self, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
         """Commands that act, shape (m, n), and their derivatives by parameters of effects, by full name.

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 PIECE = 0.5  # [s] of filtered states from each run
 SETTLED, ROUNDS = 1e-6, 10  # [sigma] largest change of the last round; rounds of linear steps at the most
+SHRINKS, ROUNDING = 0.5, 0.02  # of the round before; [sigma] changes that no longer do so and are rounding
 BURN_IN = 0.5  # [s] that each run starts earlier; a state is forgotten within a few tenths of a second
 
 
@@ -82,6 +83,7 @@ def _settled(problem: BagProblem, begin: FilteredStates, calibration: Calibratio
     for first in range(0, len(mean) - 1, CHUNK):
         ticks = np.arange(first, min(first + CHUNK, len(mean) - 1))
         own = slice(first, first + len(ticks) + 1)
+        before = np.inf
         for _ in range(ROUNDS):
             H, g, ahead = _linear_steps(problem, predictor, mean, ticks, calibration)
             found, known, good = filter_steps(H, g, mean[own], ahead, mean[first], information[first])
@@ -89,8 +91,10 @@ def _settled(problem: BagProblem, begin: FilteredStates, calibration: Calibratio
             if not good or not np.all(np.isfinite(change)):
                 return None
             mean[own], information[own] = found, known
-            if np.max(change) < SETTLED:
+            now = float(np.max(change))
+            if now < SETTLED or SHRINKS * before < now < ROUNDING:
                 break
+            before = now
         else:
             return None
     return FilteredStates(mean, _inverse(information))

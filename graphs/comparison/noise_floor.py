@@ -71,9 +71,9 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
     start = np.unique(np.linspace(min(first, last), last, STARTS).astype(int))
     judged = are_judged(problem, start, horizon)
     start = start[judged] if np.any(judged) else start
-    P = filtered.covariance[start]
+    P, ahead = filtered.covariance[start], quiet.as_predicted
     for i in range(min(steps, len(x) - 2)):
-        P = _advance(quiet, x, calibration, start + i, P)
+        P = _advance(ahead, x, calibration, start + i, P)
     floors = np.sqrt(np.mean(_channel_variances(quiet, x, calibration, start + steps, P), axis=0))
     return dict(zip(problem.robot.channels, map(float, floors), strict=True))
 

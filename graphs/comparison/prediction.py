@@ -2,8 +2,9 @@
 """Predicted motion: many starts advance side by side through the recorded commands, or one through all of them.
 
 The paper's Euler step where the robot file says euler, else Runge-Kutta of order 4 with as many substeps as springs,
-dampers and friction ask for. Predictions share no code with the collocation that smoothed the states. A model that
-contradicts the recording may run away: its states are then infinite or no numbers, without a word.
+dampers and friction ask for. Motors whose friction would stop them many times over in one step stick and slip instead.
+Predictions share no code with the collocation that smoothed the states. A model that contradicts the recording may run
+away: its states are then infinite or no numbers, without a word.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta_from
+from jointscope.graphs.comparison.stick_slip import StickSlip
+from jointscope.graphs.problem.standstill import only_stiff_motors
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.rates_of_many import RatesOfMany
@@ -32,12 +35,14 @@ class Predictor:
     """
 
     def __init__(self, robot: Robot, timeline: Timeline):
+        h = float(np.median(timeline.h))
+        self._dry = StickSlip(robot, h) if only_stiff_motors(robot, h) else None
         self._model = RatesOfMany(robot)
         self._euler = robot.choices.integrator == "euler"
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         self._h, u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
         self._torque = self._model.torque_of(u)
-        self._cuts = StepCuts(robot, float(np.median(self._h)))
+        self._cuts = StepCuts(robot, h)
 
     def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States one tick later, shape (s, d).
@@ -46,20 +51,27 @@ class Predictor:
             x: states, shape (s, d).
             step: step that each state takes, shape (s,).
         """
-        h, torque, cuts = self._h[step][:, None], self._torque[step], self._cuts
+        h, torque = self._h[step][:, None], self._torque[step]
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            first = self._model.rates(x, torque)
-            if self._euler:
-                return x + h * first
-            if cuts.fine == cuts.coarse:
-                return _advanced(lambda at: self._model.rates(at, torque), x, first, h, cuts.coarse)
-            fine, after = cuts.fine_ones(x, first, h), np.empty_like(x)
-            for some, count in ((fine, cuts.fine), (~fine, cuts.coarse)):
-                if np.any(some):
-                    acting = torque[some]
-                    rate = _with_torque(self._model.rates, acting)
-                    after[some] = _advanced(rate, x[some], first[some], h[some], count)
-            return after
+            if self._dry is not None:
+                return self._dry.advance(x, torque, h)
+            return self._rounded(x, h, torque)
+
+    def _rounded(self, x: Array, h: Array, torque: Array) -> Array:
+        """The same with friction rounded off, as its law says."""
+        cuts = self._cuts
+        first = self._model.rates(x, torque)
+        if self._euler:
+            return x + h * first
+        if cuts.fine == cuts.coarse:
+            return _advanced(lambda at: self._model.rates(at, torque), x, first, h, cuts.coarse)
+        fine, after = cuts.fine_ones(x, first, h), np.empty_like(x)
+        for some, count in ((fine, cuts.fine), (~fine, cuts.coarse)):
+            if np.any(some):
+                acting = torque[some]
+                rate = _with_torque(self._model.rates, acting)
+                after[some] = _advanced(rate, x[some], first[some], h[some], count)
+        return after
 
     def with_accelerations(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States with the link accelerations that the equations of motion give behind them, shape (s, d + n_link).

@@ -9,6 +9,7 @@ initial  enc,  gyro                          ...          gyro: full, vertical o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
+from jointscope.graphs.problem.standstill import Stretches, holding_motors, stiffness
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
@@ -43,6 +45,7 @@ DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
 FREE = 20.0  # [rad/s / sqrt(s)] density of velocities where something unknown acts; the sensors alone tell states there
+BAND = 3.0  # the same of a motor that stands, whose friction brakes it
 BANDS = 10.0  # times the dry friction that the robot file says, by which the torque that holds a joint may be off
 
 
@@ -77,8 +80,9 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))
-        acting, free = path if path.changes else None, _free(robot, recording, timeline)
-        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free)
+        acting, holds = path if path.changes else None, holding_motors(robot, recording, timeline.h)
+        free, slides = _free(robot, recording, timeline, holds), _sliding(robot, timeline, holds)
+        steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free, slides)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory_spreads(robot).tolist())
@@ -110,6 +114,14 @@ class BagProblem:
     def of_robot(self, robot: Robot) -> BagProblem:
         """The same recording, the same piece, of a robot with other choices, constants or sensors."""
         return replace(BagProblem.of(robot, self.recording), owner=self.owner)
+
+    @property
+    def as_predicted(self) -> BagProblem:
+        """The same problem with the noise that predictions have: about a motor that sticks nothing is open."""
+        if self.dynamics.steps.sliding is None:
+            return self
+        steps = replace(self.dynamics.steps, free=_free(self.robot, self.recording, self.timeline, {}))
+        return replace(self, dynamics=replace(self.dynamics, steps=steps))
 
     @property
     def initial(self) -> InitialStateFactor:
@@ -153,8 +165,9 @@ def _add_rotors(M: Array, robot: Robot, recording: Recording, timeline: Timeline
     M[sticks] = (M[sticks] + np.diag(rotors)) * (alone / (alone + rotors))[:, :, None]
 
 
-def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | None:
+def _free(robot: Robot, recording: Recording, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
     """Where steps bind no motion: all in a stretch that is left out, one joint where it sticks; None for neither."""
+    recording = replace(recording, sticking={**recording.sticking, **holds})
     if not recording.left_out and not recording.sticking:
         return None
     end, h, layout = timeline.ticks[1:], timeline.h, robot.layout
@@ -162,9 +175,29 @@ def _free(robot: Robot, recording: Recording, timeline: Timeline) -> Array | Non
     inertias = equation_inertias(robot)
     for row, joint in zip(layout.motor_row, robot.joints, strict=True):
         if joint in recording.sticking:
-            held = BANDS * robot.drive_parameter(joint, "coulomb_torque").value / inertias[row] * np.sqrt(h)
+            held = (
+                (BAND if joint in holds else BANDS)
+                * robot.drive_parameter(joint, "coulomb_torque").value
+                / inertias[row]
+                * np.sqrt(h)
+            )
             free[:, row] = np.maximum(free[:, row], np.where(recording.sticks(joint, end, h), held, 0.0))
     return free
+
+
+def _sliding(robot: Robot, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
+    """How sharply friction turns over at both ends of each step, shape (m, 2, n), see `Steps`; None for its own law.
+
+    Where a motor stands, as sharply as may be integrated: it is braked, its friction is what it may be.
+    """
+    if not holds:
+        return None
+    ticks, h = np.ones((len(timeline.ticks), robot.n)), float(np.median(timeline.h))
+    for joint, stretches in holds.items():
+        gentle = 1.0 / stiffness(robot, joint, h)
+        for t0, t1 in stretches:
+            ticks[(timeline.ticks >= t0) & (timeline.ticks <= t1), robot.joints.index(joint)] = gentle
+    return np.stack([ticks[:-1], ticks[1:]], axis=1)
 
 
 def first_command_time(recording: Recording) -> float:

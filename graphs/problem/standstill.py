@@ -19,13 +19,17 @@ from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Stretches = tuple[tuple[float, float], ...]
 
 SATURATED = 3.0  # tanh of this is 1 to half a percent: dry friction is a sign from here on
 SLOW = 1e-3  # of the 95 % speed
 LOOK = 0.02  # [s] over which an encoder may show a speed, five samples at least
 CLEARLY = 0.5  # of the speed at which friction has its full size, what is wanted to be told from zero
 RESOLVED = 3.0  # [sigma] of that speed
+ADDED_SPRING = "joint_elasticity"  # the effect that makes a rigid joint elastic
 SLOW_EFFECTS = ("motor_stribeck", "pwm_deadband")  # of which nothing is seen at higher speeds
+STIFF = 1.0  # times that friction may stop a motor in one step
+DOUBTFUL = 3.0  # times the speed of full friction, up to which a step may turn a motor over whose friction is stiff
 HARDLY_MOVES = 0.25  # of the 95 % speed; no more is left out
 GRAIN = 0.003  # of the 95 % speed, at which friction that is taken for a sign has its full size
 
@@ -45,27 +49,18 @@ def near(mask: Mask, steps: int) -> Mask:
 def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     """The recording with the stretches in which each rigid joint is too slow for the size of its friction to be known.
 
-    An elastic one has an equation of its own for its motor, whose process noise takes what friction does at rest; one
-    that got its spring as an effect has it, too, but its link may be seen by nothing else than what its motor does.
+    An elastic one has an equation of its own for its motor, see `holding_motors`; one that got its spring as an effect
+    has it, too, but its link may be seen by nothing else than what its motor does.
 
     A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion unless its
     friction is held as a sign. So does one whose encoder does not show them.
     """
-    encoder, found = robot.motor_encoder, {}
-    stream = recording.streams[encoder.name]
-    for j, joint in enumerate(robot.joints):
-        own = robot.parameters.get(f"{joint}.{SHARPNESS}")
-        asked = own is not None and not own.fixed
-        sign = own is not None and own.fixed
-        told = asked or (not sign and any(robot.has_effect(id, joint) for id in SLOW_EFFECTS))
-        rounded = SATURATED / robot.sharpness_of(joint)
-        if told or (joint in robot.layout.motors and not robot.has_effect("joint_elasticity", joint)):
-            continue
-        v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
-        if seen < rounded:
-            slow = np.abs(v) < max(seen, min(rounded, HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))))
-            slow[1:] |= v[1:] * v[:-1] < 0.0
-            found[joint] = _stretches(slow, stream.times, reach)
+    found = {}
+    for joint in robot.joints:
+        elastic = joint in robot.layout.motors and not robot.has_effect(ADDED_SPRING, joint)
+        stretches = None if elastic else _standing(robot, recording, joint)
+        if stretches is not None:
+            found[joint] = stretches
     return replace(recording, sticking=found)
 
 
@@ -93,6 +88,83 @@ def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     return replace(robot, parameters=parameters)
 
 
+def holding_motors(robot: Robot, recording: Recording, h: Array) -> dict[str, Stretches]:
+    """Stretches in which each elastic joint's motor stands, where its friction is stiff.
+
+    Over a step of length h the rounded law stops a slow motor many times over if mu k h is above its inertia. No rule
+    of integration follows that: the cost has a minimum of its own for every tick of a motor that stands, and a process
+    noise that took what friction does there would hide what happens in motion. So the law is silent there, and what
+    friction does is left open.
+
+    Args:
+        robot: the model, with friction, sharpness and inertias as its file says.
+        recording: tells by its encoder where motors stand.
+        h: lengths of the steps, shape (m,) [s].
+    """
+    found = {}
+    for joint in stiff_motors(robot, float(np.median(h)) if len(h) else 0.0):
+        if robot.has_effect(ADDED_SPRING, joint):
+            continue  # `leaving_standstill_out` says what is asked of it
+        stretches = _standing(robot, recording, joint, DOUBTFUL)
+        if stretches is not None:
+            found[joint] = stretches
+    return found
+
+
+def stiff_motors(robot: Robot, h: float) -> list[str]:
+    """Elastic joints whose friction would stop a motor more than once in a step of length h [s].
+
+    Not those whose sharpness is looked for: it says what friction does there.
+    """
+    found = []
+    for joint in robot.layout.motors:
+        if not _is_asked(robot, joint) and stiffness(robot, joint, h) > STIFF:
+            found.append(joint)
+    return found
+
+
+def stiffness(robot: Robot, joint: str, h: float) -> float:
+    """How many times the dry friction of a joint stops its motor in a step of length h [s], at the lowest speeds."""
+    friction = robot.drive_parameter(joint, "coulomb_torque").value * robot.sharpness_of(joint)
+    return h * friction / robot.drive_parameter(joint, "inertia").value
+
+
+def only_stiff_motors(robot: Robot, h: float) -> bool:
+    """Whether all joints have one, and the friction is that of the motors' velocity."""
+    return stiff_motors(robot, h) == list(robot.joints) and robot.choices.friction_velocity == "motor"
+
+
+def _is_asked(robot: Robot, joint: str) -> bool:
+    """Whether the sharpness of a joint's friction is looked for."""
+    own = robot.parameters.get(f"{joint}.{SHARPNESS}")
+    return own is not None and not own.fixed
+
+
+def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0) -> Stretches | None:
+    """Where a joint is too slow for its friction to be known; None where that is wanted, or cannot be seen.
+
+    Args:
+        robot: the model.
+        recording: the data.
+        joint: which one.
+        times: the speed at which friction has its full size, below which the joint is too slow.
+    """
+    encoder, j = robot.motor_encoder, robot.joints.index(joint)
+    stream = recording.streams[encoder.name]
+    elastic = joint in robot.layout.motors and not robot.has_effect(ADDED_SPRING, joint)
+    held = (own := robot.parameters.get(f"{joint}.{SHARPNESS}")) is not None and own.fixed  # as a sign
+    slow_effects = any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
+    if _is_asked(robot, joint) or (slow_effects and not (elastic or held)):
+        return None
+    rounded = SATURATED / robot.sharpness_of(joint)
+    v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
+    if seen >= rounded:
+        return None
+    slow = np.abs(v) < max(seen, min(times * rounded, HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))))
+    slow[1:] |= v[1:] * v[:-1] < 0.0
+    return _stretches(slow, stream.times, reach)
+
+
 def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, float, float]:
     """Slopes of local parabolas over as few samples as show the wanted speed, at most LOOK or five samples.
 
@@ -112,7 +184,7 @@ def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, 
     return np.interp(times, grid, slope), float(seen), half * period
 
 
-def _stretches(mask: Mask, ticks: Array, reach: float) -> tuple[tuple[float, float], ...]:
+def _stretches(mask: Mask, ticks: Array, reach: float) -> Stretches:
     """Times in which a mask holds, widened by `reach` [s] and joined where they touch."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     joined: list[tuple[float, float]] = []

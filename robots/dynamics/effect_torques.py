@@ -72,7 +72,7 @@ class EffectTorques:
             springs: springs of the base model.
             values: all parameters of the robot by full name.
             outside: torques of known loads about the joints, shape (m, n) [N m].
-            sharpness: another one than that of the robot, shape (n,) [s/rad].
+            sharpness: another one than that of the robot, shape (n,) or (m, n) [s/rad].
         """
         sharpness = self._sharpness(values) if sharpness is None else sharpness
         carried = None
@@ -82,9 +82,10 @@ class EffectTorques:
             by_parameter = w.by_parameter(x, values, outside) if slopes else {}
             carried = Carried(w.torque(x, values, outside), by_q, by_parameter)
         for law in self._local:
-            law.add(terms, x, springs, values, float(sharpness[law.joint]), carried)
+            law.add(terms, x, springs, values, sharpness[..., law.joint], carried)
         for here in self._global:
-            self._add_global(terms, here, here.own(values), self._signals(here, x, springs, sharpness), springs)
+            own = sharpness if sharpness.ndim == 1 else self._sharpness(values)
+            self._add_global(terms, here, here.own(values), self._signals(here, x, springs, own), springs)
 
     def _add_global(
         self, terms: TorqueTerms, here: EffectAt, p: dict[str, float], signals: RobotSignals, springs: Springs
@@ -209,7 +210,7 @@ class _LocalLaw:
         x: Array,
         springs: Springs,
         values: Mapping[str, float],
-        sharpness: float,
+        sharpness: Array,
         carried: Carried | None,
     ) -> None:
         """Adds the torque, and the rate of the memory."""

@@ -58,6 +58,7 @@ class ElasticJoints:
         self._lasting = LastingTorques(robot, parameters)
         self._transmission = Transmission.of(robot, self.names)
         weight = CarriedWeight(robot, self.names)
+        self._friction_sharpness = robot.friction_sharpness
         self._behind, self._effects = (
             EffectTorques(some, robot.joints, layout, self.names, robot.friction_sharpness, weight)
             for some in parted(robot, self._transmission)
@@ -70,32 +71,38 @@ class ElasticJoints:
         """The rigid bodies."""
         return self._tree
 
-    def accelerations(self, x: Array, u: Array, parameters: Array) -> Array:
+    def accelerations(self, x: Array, u: Array, parameters: Array, sliding: Array | None = None) -> Array:
         """Link and motor accelerations, and rates of memories.
 
         Args:
             x: states, shape (m, d).
             u: commands in their SI unit, shape (m, n).
             parameters: values of the free parameters, shape (p,).
+            sliding: how sharply the dry friction of each joint turns over, as a part of what its law says, (m, n).
 
         Returns:
             Shape (m, r) [rad/s^2].
         """
         values = self.named(parameters)
-        terms = self._terms(x, values, derivatives=False)
+        terms = self._terms(x, values, derivatives=False, sharpness=self._sharp(values, sliding))
         terms.value[:, self.layout.motor_row] += self._motors.of_command(u, values)
         return self._solve(x, terms, values)[0]
 
     def with_derivatives(
-        self, x: Array, u: Array, parameters: Array, rigid: RigidDerivatives | None = None
+        self,
+        x: Array,
+        u: Array,
+        parameters: Array,
+        rigid: RigidDerivatives | None = None,
+        sliding: Array | None = None,
     ) -> Accelerations:
         """Accelerations with derivatives; arguments as in `accelerations` and `without_command`."""
         if self._commands_move_links:
-            return self._differentiate(x, parameters, rigid, u)
-        return self.with_command(self.without_command(x, parameters, rigid), u, parameters)
+            return self._differentiate(x, parameters, rigid, u, sliding)
+        return self.with_command(self.without_command(x, parameters, rigid, sliding), u, parameters)
 
     def at_ticks(
-        self, x: Array, u: Array, parameters: Array
+        self, x: Array, u: Array, parameters: Array, sliding: Array | None = None
     ) -> tuple[Accelerations, Accelerations, RigidDerivatives | None]:
         """Accelerations at the beginning and the end of m steps, with the command of each step.
 
@@ -103,19 +110,24 @@ class ElasticJoints:
             x: states at the m + 1 ticks, shape (m + 1, d).
             u: commands of the m steps, shape (m, n).
             parameters: values of the free parameters, shape (p,).
+            sliding: as in `accelerations`, at the ticks.
 
         Returns:
             Both, and the rigid bodies' derivatives between the ticks where they are cheap to know.
         """
         if self._commands_move_links:
-            first, last = (self._differentiate(part, parameters, None, u) for part in (x[:-1], x[1:]))
+            begins, ends = (None, None) if sliding is None else (sliding[:-1], sliding[1:])
+            first = self._differentiate(x[:-1], parameters, None, u, begins)
+            last = self._differentiate(x[1:], parameters, None, u, ends)
             return first, last, None
-        free = self.without_command(x, parameters)
-        ends = free.part(slice(None, -1)), free.part(slice(1, None))
-        first, last = (self.with_command(end, u, parameters) for end in ends)
+        free = self.without_command(x, parameters, sliding=sliding)
+        parts = free.part(slice(None, -1)), free.part(slice(1, None))
+        first, last = (self.with_command(part, u, parameters) for part in parts)
         return first, last, free.rigid.between()
 
-    def without_command(self, x: Array, parameters: Array, rigid: RigidDerivatives | None = None) -> Accelerations:
+    def without_command(
+        self, x: Array, parameters: Array, rigid: RigidDerivatives | None = None, sliding: Array | None = None
+    ) -> Accelerations:
         """As `with_derivatives` at u = 0; the dear part, which consecutive steps share.
 
         Args:
@@ -123,8 +135,9 @@ class ElasticJoints:
             parameters: values of the free parameters, shape (p,).
             rigid: derivatives of the rigid bodies where they are known well enough; the accelerations themselves are
                 always exact.
+            sliding: as in `accelerations`.
         """
-        return self._differentiate(x, parameters, rigid, None)
+        return self._differentiate(x, parameters, rigid, None, sliding)
 
     def with_command(self, free: Accelerations, u: Array, parameters: Array) -> Accelerations:
         """Adds the command to the result of `without_command`; for robots without rigid joints.
@@ -200,12 +213,12 @@ class ElasticJoints:
         return len(self._elastic) < len(self.layout.joints)
 
     def _differentiate(
-        self, x: Array, parameters: Array, rigid: RigidDerivatives | None, u: Array | None
+        self, x: Array, parameters: Array, rigid: RigidDerivatives | None, u: Array | None, sliding: Array | None
     ) -> Accelerations:
         from jointscope.robots.dynamics.follow_kernel import links_follow  # numba takes half a second to import
 
         layout, values = self.layout, self.named(parameters)
-        terms = self._terms(x, values, derivatives=True)
+        terms = self._terms(x, values, derivatives=True, sharpness=self._sharp(values, sliding))
         assert terms.by_state is not None and terms.by_parameter is not None
         if u is not None:
             terms.value[:, layout.motor_row] += self._motors.of_command(u, values)
@@ -248,6 +261,10 @@ class ElasticJoints:
         value[:, :n] = a_link
         value[:, self._own_motor] /= self.motor_inertia(values)[self._elastic]
         return value, rigid
+
+    def _sharp(self, values: Mapping[str, float], sliding: Array | None) -> Array | None:
+        """Sharpness of the friction; None where it is that of the law everywhere."""
+        return None if sliding is None else sliding * self._friction_sharpness(values)
 
     def _terms(
         self,

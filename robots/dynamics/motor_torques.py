@@ -62,7 +62,7 @@ class MotorTorques:
             terms: receives them.
             x: states, shape (m, d).
             values: all parameters by full name.
-            sharpness: of the friction, where it is another one than the robot's, shape (n,) [s/rad].
+            sharpness: of the friction, where it is another one than the robot's, shape (n,) or (m, n) [s/rad].
         """
         layout, parameters = self._layout, self._parameters
         mu = parameters.of(values, "coulomb_torque")
@@ -77,7 +77,7 @@ class MotorTorques:
             if terms.by_state is None or terms.by_parameter is None:
                 continue
             slope = mu[i] * (1.0 - smooth_sign[:, i] ** 2)
-            terms.by_state[:, row, friction_v[i]] -= slope * sharpness[i]
+            terms.by_state[:, row, friction_v[i]] -= slope * sharpness[..., i]
             parameters.add(terms.by_parameter, SHARPNESS, i, row, -slope * x[:, friction_v[i]])
             terms.by_state[:, row, layout.motor_v[i]] -= k_mi[i]
             parameters.add(terms.by_parameter, "coulomb_torque", i, row, -smooth_sign[:, i])

@@ -33,12 +33,13 @@ class RatesOfMany:
 
     Args:
         robot: tree, drives, effects and parameters.
+        sharpness: of the dry friction of all motors instead of the robot's [s/rad].
 
     Attributes:
         layout: of the states.
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, sharpness: float | None = None):
         robot.need_link_dynamics()
         self.layout = layout = robot.layout
         values = {name: parameter.value for name, parameter in robot.parameters.items()}
@@ -48,13 +49,15 @@ class RatesOfMany:
         self._linear = linear_torques(robot, parameters, springs, motors, values).T
         self._gain = motors.of_command(np.ones((1, robot.n)), values)[0]
         self._coulomb, self._sharpness = parameters.of(values, "coulomb_torque"), robot.friction_sharpness(values)
+        if sharpness is not None:
+            self._sharpness = np.full(robot.n, sharpness)
         self._friction = layout.joint_v if robot.choices.friction_velocity == "link" else layout.motor_v
         own = [robot.joints.index(joint) for joint in layout.motors]
         n, m = layout.n_link, layout.n_motor
         self._inertia, self._motors = parameters.of(values, "inertia")[own], slice(n, n + m)
         at_rest = springs.at(np.zeros((1, layout.size)), values)
         weight = CarriedWeight(robot)
-        laws = [_LawOfMany(h, robot, at_rest, values, weight) for h in robot.effects if _is_law(h)]
+        laws = [_LawOfMany(h, robot, at_rest, values, weight, sharpness) for h in robot.effects if _is_law(h)]
         for law in laws:
             self._linear = self._linear + law.linear
         self._laws = [law for law in laws if not law.is_linear]
@@ -75,12 +78,7 @@ class RatesOfMany:
         Returns:
             Shape (m, d).
         """
-        layout = self.layout
-        tau = x @ self._linear
-        tau[:, layout.motor_row] += command_torque - self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
-        load = None if self._weight is None else self._weight.torque(x, self._values)
-        for law in self._laws:
-            law.add(x, tau, load)
+        layout, tau = self.layout, self._torques(x, command_torque)
         n = layout.n_link
         rate = np.empty_like(x)
         rate[:, layout.positions] = x[:, layout.velocities]
@@ -88,6 +86,20 @@ class RatesOfMany:
         rate[:, layout.v_motor] = tau[:, self._motors] / self._inertia
         rate[:, layout.memory] = tau[:, n + layout.n_motor :]
         return rate
+
+    def of_motors(self, x: Array, command_torque: Array | None = None) -> Array:
+        """Accelerations of the motors, shape (m, n_motor), without the bodies; arguments as in `rates`."""
+        command = np.zeros((1, len(self._gain))) if command_torque is None else command_torque
+        return self._torques(x, command)[:, self._motors] / self._inertia
+
+    def _torques(self, x: Array, command_torque: Array) -> Array:
+        tau = x @ self._linear
+        dry = self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
+        tau[:, self.layout.motor_row] += command_torque - dry
+        load = None if self._weight is None else self._weight.torque(x, self._values)
+        for law in self._laws:
+            law.add(x, tau, load)
+        return tau
 
     def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Of the links, with the share of the Coriolis terms that the model has, shape (m, n_link)."""
@@ -108,7 +120,13 @@ class _LawOfMany:
     """
 
     def __init__(
-        self, here: EffectAt, robot: Robot, springs: Springs, values: Mapping[str, float], weight: CarriedWeight
+        self,
+        here: EffectAt,
+        robot: Robot,
+        springs: Springs,
+        values: Mapping[str, float],
+        weight: CarriedWeight,
+        sharpness: float | None = None,
     ):
         layout, effect = robot.layout, here.effect
         self._layout, self._effect, self._p = layout, effect, here.own(values)
@@ -116,6 +134,8 @@ class _LawOfMany:
         self._maps = None if transmission is None else transmission.maps(values)
         self._joint = j = robot.joints.index(here.owner) if here.owner in robot.joints else 0
         self._joints, self._springs, self._sharpness = robot.joints, springs, robot.friction_sharpness(values)
+        if sharpness is not None and isinstance(effect, JointTorque) and effect.side == "motor":
+            self._sharpness = np.full(robot.n, sharpness)
         self.needs_weight = False
         if isinstance(effect, JointTorque):
             link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])

@@ -2,6 +2,7 @@
 """One finite-difference test for the Jacobians of every factor, and GTSAM's own check of the wrapped ones."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import gtsam
@@ -111,6 +112,8 @@ def _factors_with_effects():
         steps = Steps(h, u, robot.noise, robot.layout, weight, path if path.changes else None, np.arange(M))
         if not isinstance(robot.effects[-1].effect if robot.effects else None, ReadingEffect | TimeShift):
             yield f"dynamics with {label}", SimpsonDynamics(ElasticJoints(robot), steps, robot.joints), robot
+            gentle = replace(steps, sliding=rng.choice([0.1, 1.0], (M, 2, robot.n)))
+            yield f"gentle friction, {label}", SimpsonDynamics(ElasticJoints(robot), gentle, robot.joints), robot
         for name, sensor in robot.sensors.items():
             values = {n: p.value for n, p in robot.parameters.items()}
             times, fraction = rng.uniform(1.0, 2.0, M), rng.uniform(size=M)
@@ -264,9 +267,11 @@ def test_a_chain_linearizes_as_its_pairs_do():
     q = 0.6 * np.sin(8.0 * t + phase)
     v = 4.8 * np.cos(8.0 * t + phase)
     x = np.hstack([q, v, q + 0.01 * np.sin(30.0 * t), v + 0.3 * np.cos(30.0 * t)])
-    steps = Steps(np.full(40, 1e-3), rng.uniform(-1, 1, (40, 3)), ROBOT.noise, ROBOT.layout)
+    plain = Steps(np.full(40, 1e-3), rng.uniform(-1, 1, (40, 3)), ROBOT.noise, ROBOT.layout)
+    at_ticks = rng.choice([0.1, 1.0], (41, 3))
+    gentle = replace(plain, sliding=np.stack([at_ticks[:-1], at_ticks[1:]], axis=1))
     calibration = Calibration.of(ROBOT)
-    for kind in (EulerDynamics, MidpointDynamics, SimpsonDynamics):
+    for kind, steps in product((EulerDynamics, MidpointDynamics, SimpsonDynamics), (plain, gentle)):
         factor = kind(ElasticJoints(ROBOT), steps, ROBOT.joints)
         pairs, chain = factor.linearize((x[:-1], x[1:]), calibration), factor.linearize_chain(x, calibration)
         np.testing.assert_allclose(chain.residual, pairs.residual, rtol=1e-12, atol=1e-14)

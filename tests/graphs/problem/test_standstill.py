@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jointscope.graphs.problem.standstill import leaving_standstill_out, near, slowest_speed
+from jointscope.graphs.problem.standstill import holding_motors, leaving_standstill_out, near, slowest_speed
 from jointscope.robots.recordings.recording import Recording, Stream
 
 PERIOD, SIGMA = 4e-3, 1e-5
@@ -62,3 +62,27 @@ def test_a_standstill_and_a_reversal_are_left_out_and_nothing_else(stopping, hel
 )
 def test_standstill_stays_where_it_tells_something_or_nobody_sees_it(stopping, told):
     assert leaving_standstill_out(joint(**told), stopping).sticking == {}
+
+
+def elastic(friction, inertia=1e-3, **kwargs):
+    """A joint with a spring, whose motor has a friction [N m] and an inertia [kg m2]."""
+    robot = joint(motors=("j",), **kwargs)
+    values = {"coulomb_torque": SimpleNamespace(value=friction), "inertia": SimpleNamespace(value=inertia)}
+    robot.drive_parameter = lambda name, what: values[what]
+    return robot
+
+
+def test_a_motor_that_stands_is_left_open_where_its_friction_is_stiff(stopping):
+    h = np.full(100, PERIOD)
+    found = holding_motors(elastic(0.05), stopping, h)["j"]
+    np.testing.assert_allclose(found, [(1.0, 1.5), (2.5, 2.5)], atol=0.03)
+
+
+def test_a_motor_whose_friction_can_be_integrated_keeps_its_law(stopping):
+    h = np.full(100, PERIOD)
+    assert holding_motors(elastic(1e-4), stopping, h) == {}
+    assert holding_motors(elastic(0.05), stopping, 1e-3 * h) == {}
+
+
+def test_a_motor_whose_sharpness_is_looked_for_keeps_its_law(stopping):
+    assert holding_motors(elastic(0.05, parameters=("j.friction_sharpness",)), stopping, np.full(9, PERIOD)) == {}
