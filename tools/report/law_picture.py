@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
 
 Array = NDArray[np.float64]
 
+MOTION = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring")
 SIZES = {"half": 0.5, "the example": 1.0, "twice": 2.0}
 STIFFNESS = 150.0  # [N m/rad] of the spring on which laws of springs are drawn
 SPEED, SWING, BEND, LOAD = 1.0, np.pi, 0.05, 20.0  # [rad/s], [rad], [rad], [N m] to either side
@@ -89,8 +92,7 @@ def _of_unit(effect: JointTorque, example: Mapping[str, float], unit: str, other
 
 def _signals(**given: Array) -> JointSignals:
     zero = np.zeros_like(next(iter(given.values())))
-    names = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring")
-    return JointSignals(**{name: given.get(name, zero) for name in names}, stiffness=STIFFNESS)
+    return JointSignals(stiffness=STIFFNESS, **{name: given.get(name, zero) for name in MOTION})
 
 
 def _with_memory(effect: JointTorque, signals: JointSignals, values: Mapping[str, float]) -> JointSignals:
@@ -101,12 +103,6 @@ def _with_memory(effect: JointTorque, signals: JointSignals, values: Mapping[str
     h, memory = 2.0 * CYCLE / (n - 1), np.zeros(n)
     for k in range(n):
         memory[k] = z
-        now = JointSignals(
-            *(getattr(signals, name)[k] for name in ("q_link", "v_link", "q_motor", "v_motor", "tau_spring")),
-            stiffness=STIFFNESS,
-            memory=z,
-        )
-        z += h * float(np.real(effect.memory.rate(now, values)))
-    return JointSignals(
-        signals.q_link, signals.v_link, signals.q_motor, signals.v_motor, signals.tau_spring, STIFFNESS, memory=memory
-    )
+        now: dict[str, Any] = {name: getattr(signals, name)[k] for name in MOTION}
+        z += h * float(np.real(effect.memory.rate(replace(signals, memory=z, **now), values)))
+    return replace(signals, memory=memory)
