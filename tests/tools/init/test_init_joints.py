@@ -429,3 +429,18 @@ def test_what_is_wrong_in_the_urdf_is_not_taken_for_a_lack_of_masses(arm, free, 
     assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 1
     said = capsys.readouterr().err
     assert told in said and "add <inertial>" not in said
+
+
+def test_strange_names_are_matched_with_those_of_the_encoders(arm, free, tmp_path):
+    """Neither topic has the URDF's names: one of them is taken in its order, the other by the names of the first."""
+    strange = {"shoulder": "m1", "elbow": "m2", "wrist": "m3"}
+    topics = {
+        "/joint_states": free.states(("shoulder", "elbow", "wrist"), strange),
+        "/motor_command": free.commands(("wrist", "elbow", "shoulder"), strange),
+    }
+    bag = write_arm_bag(tmp_path / "a.mcap", free.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    robot = load_robot(tmp_path / "a.yaml")
+    expected = tuple(strange[joint] for joint in robot.joints)
+    assert robot.motor_encoder.source.names == expected
+    assert robot.command.names == expected

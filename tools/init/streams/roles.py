@@ -265,7 +265,10 @@ def _driving(
 ) -> NamedSignal:
     """What a command calls the joints; one without names has as many columns as the encoder, or as joints move."""
     if signal.names:
-        return named_signal(signal, urdf_joints, wish)
+        named = named_signal(signal, urdf_joints, wish)
+        if named.by_order and motors.by_order and {*named.names.values()} == {*motors.names.values()}:
+            return replace(named, names=motors.names)  # strange names, but the encoders have the same ones
+        return named
     if signal.joints:
         return NamedSignal(signal, {joint: str(place) for place, joint in enumerate(signal.joints)})
     shown = tuple(joint for joint in urdf_joints if joint in motors.names)
