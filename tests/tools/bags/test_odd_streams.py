@@ -226,6 +226,10 @@ def test_commands_without_numbers_are_left_out_in_runs_but_only_few_alone():
     kept, _ = without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off), held=False)
     assert kept.values[100, 0] == pytest.approx(samples.values[700, 0], abs=2e-4)  # a measured one runs on
     off[600::10, 0] = np.nan  # whatever acted there stands in no message
+    with pytest.raises(RecordingError, match=r"a.motor_position is no number .* let the node repeat its last command"):
+        without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
+    off = samples.values.copy()
+    off[:1000] = np.nan
     with pytest.raises(RecordingError, match=r"a.motor_position is no number .* use a part of the recording in which"):
         without_gibberish("command", CHANNELS, dataclasses.replace(samples, values=off))
 

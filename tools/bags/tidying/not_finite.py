@@ -108,16 +108,17 @@ def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
 def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, bad: Flags) -> None:
     counts = np.count_nonzero(bad, axis=0)
     worst, n = int(np.argmax(counts)), len(samples)
-    too_many = counts[worst] > MOST * n
+    too_many, scattered = counts[worst] > MOST * n, False
     if name == COMMAND:
         rows = np.asarray(bad.any(axis=1))
-        too_many |= np.count_nonzero(rows & ~_in_runs(rows)) > max(FEW, ALONE * n) or rows.sum() > MOST * n
+        scattered = bool(np.count_nonzero(rows & ~_in_runs(rows)) > max(FEW, ALONE * n))
+        too_many |= scattered or rows.sum() > MOST * n
     if too_many:
         since = (samples.stamps[int(np.argmax(bad.any(axis=1)))] - samples.stamps[0]) / 1e9
         raise RecordingError(
             f"{channels[worst]} is no number (NaN or infinite) in {counts[worst]} of {n} messages "
             f"({100 * counts[worst] / n:.3g} %), the first at {since:.3f} s; expected at most {_expected(name)}: "
-            f"{_way_out(name)}"
+            f"{_way_out(name, scattered)}"
         )
 
 
@@ -136,7 +137,13 @@ def _expected(name: str) -> str:
     return f"{100 * ALONE:g} % beside runs of {RUN} and more, and {100 * MOST:g} % in all"
 
 
-def _way_out(name: str) -> str:
+def _way_out(name: str, scattered: bool) -> str:
+    """What to do; commands that are missing one by one all over the recording are no pauses."""
+    if name == COMMAND and scattered:
+        return (
+            "nothing says what acted then: let the node repeat its last command where it has no new one and record "
+            "again, or record the effort that the motors report beside the positions"
+        )
     if name == COMMAND:
         return (
             "use a part of the recording in which the drives are on, cut out with `ros2 bag convert`, or record again"
