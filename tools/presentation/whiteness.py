@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 PART = 10  # samples for every lag at the least: autocorrelations over most of a recording are mostly chance
 LAGS = 100  # samples; 0.1 s at 1 kHz, longer than any elastic mode of interest takes to turn
+AS_EXPECTED = 1.25  # mean square of a channel's residual in sigmas, up to which it is as large as expected
 WINDOW = 0.25  # [s]
 
 
@@ -44,15 +45,18 @@ def channel_memory(fit: BagFit, robot: Robot) -> dict[str, float]:
 
     States follow the noise of a sensor that is slow for the motion. What is left is sigma^2 (1 - S) with a smoother S
     that is symmetric and has no elements above its diagonal's, so an autocorrelation down to -s / (1 - s), with s on
-    the diagonal, is made by the smoother and says nothing of the model.
+    the diagonal, is made by the smoother and says nothing of the model. Where residuals are larger than that, the model
+    of their noise is wrong, too, and nothing is excused.
     """
     found: dict[str, float] = {}
     for name, series in fit.residuals.items():
-        sigmas = np.asarray(robot.sensors[name].sigmas)
+        sensor = robot.sensors.get(name)
         for i, channel in enumerate(series.channels):
             rho = autocorrelation((series.measured - series.predicted)[:, i], min(LAGS, len(series.times) // PART))
-            left = float(np.nanmean((series.sigma[:, i] / sigmas[i]) ** 2))  # 1 - s
-            by_smoother = max(1.0 - left, 0.0) / max(left, 1e-12)
+            by_smoother = 0.0
+            if sensor is not None and i < len(series.chi2) and series.chi2[i] <= AS_EXPECTED:
+                left = float(np.nanmean((series.sigma[:, i] / sensor.sigmas[i]) ** 2))  # 1 - s
+                by_smoother = max(1.0 - left, 0.0) / max(left, 1e-12)
             beyond = np.where(rho < 0.0, np.maximum(-rho - by_smoother, 0.0), rho)
             found[channel] = float(np.max(beyond, initial=0.0))
     return found

@@ -83,13 +83,20 @@ def following(result, left):
     predicted, sigma = series.predicted.copy(), series.sigma.copy()
     predicted[:, 0] = series.measured[:, 0] - 1e-5 * (noise[1:] - noise[:-1])
     sigma[:, 0] = np.sqrt(left) * result.robot.motor_encoder.sigmas[0]
-    residuals = {**bag.residuals, "motor_encoder": dataclasses.replace(series, predicted=predicted, sigma=sigma)}
+    residuals = {
+        **bag.residuals,
+        "motor_encoder": dataclasses.replace(series, predicted=predicted, sigma=sigma, chi2=np.ones(3)),
+    }
     return dataclasses.replace(result, bags=(dataclasses.replace(bag, residuals=residuals),))
 
 
 def test_neighbours_that_are_unlike_because_states_follow_the_noise_are_no_memory(good):
     assert level(judge(following(good, 0.6)), MEMORY) == "good"  # an autocorrelation of -0.5 is within -0.4 / 0.6
     assert level(judge(following(good, 0.99)), MEMORY) == "warn"
+    large = following(good, 0.6)
+    series = dataclasses.replace(large.bags[0].residuals["motor_encoder"], chi2=np.full(3, 1.9))
+    bag = dataclasses.replace(large.bags[0], residuals={**large.bags[0].residuals, "motor_encoder": series})
+    assert level(judge(dataclasses.replace(large, bags=(bag,))), MEMORY) == "warn"  # larger than states could leave
 
 
 def test_few_samples_are_asked_for_few_lags(good):
