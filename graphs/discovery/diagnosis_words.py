@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.robots.files.effect_catalogue import catalogue
 
@@ -20,6 +22,11 @@ def paragraphs_of(diagnosis: Diagnosis) -> tuple[str, ...]:
     if untestable:
         found.append(_untestable(untestable))
     return tuple(found)
+
+
+def part_in_words(share: float) -> str:
+    """A share in percent; predictions that run away leave none that is a number."""
+    return f"{100 * share:.0f} %" if isfinite(share) else "a part that cannot be told"
 
 
 def _verdict(d: Diagnosis) -> str:
@@ -42,7 +49,7 @@ def _verdict(d: Diagnosis) -> str:
             f"leave {d.floor:.3g}, and no effect of the catalogue would lower that."
         )
     return (
-        f"Nothing in the catalogue explains what is missing: {100 * d.unexplained_share:.0f} % of the squared error "
+        f"Nothing in the catalogue explains what is missing: {part_in_words(d.unexplained_share)} of the squared error "
         f"({d.error:.3g} sigma against a floor of {d.floor:.3g}) stays unexplained."
     )
 

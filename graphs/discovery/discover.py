@@ -15,6 +15,7 @@ from typing import Any
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.diagnosis_words import part_in_words
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
@@ -285,10 +286,8 @@ def _did_not_hold(refused: dict[str, str]) -> str:
 def _why(diagnosis: Diagnosis) -> str:
     if diagnosis.adequate:
         return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
-    return (
-        f"nothing in the catalogue explains the rest: {100 * diagnosis.unexplained_share:.0f} % of the squared error "
-        "above what noise alone would leave"
-    )
+    part = part_in_words(diagnosis.unexplained_share)
+    return f"nothing in the catalogue explains the rest: {part} of the squared error above what noise alone would leave"
 
 
 def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> str:

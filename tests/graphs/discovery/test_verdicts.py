@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jointscope.graphs.discovery.diagnosis_words import part_in_words
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
 from jointscope.graphs.discovery.verdicts import excess_share, judge, worth_a_refit
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
@@ -193,3 +194,8 @@ def test_a_refit_that_ran_away_leaves_an_effect_possible():
 def test_one_weak_size_of_two_does_not_make_an_effect_untestable():
     candidate = scored("bearing_flexibility@joint1", (1e-4, 1e-4), (1e-6, 1.0), chance=1.0)
     assert judge(candidate, BASE, None, SECONDS).verdict == "absent"
+
+
+def test_a_share_that_is_no_number_is_not_printed_as_one():
+    assert part_in_words(0.896) == "90 %"
+    assert part_in_words(float("nan")) == part_in_words(float("inf")) == "a part that cannot be told"
