@@ -73,8 +73,7 @@ def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     """
     parameters, encoder = dict(robot.parameters), robot.motor_encoder
     for j, joint in enumerate(robot.joints):
-        own = robot.parameters.get(f"{joint}.{SHARPNESS}")
-        if own is None or own.fixed:
+        if not _is_asked(robot, joint):
             continue
         slowest = []
         for recording in recordings:
@@ -84,7 +83,8 @@ def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
             grain = GRAIN * float(np.quantile(np.abs(v), 0.95))
             slowest.append(max(grain, _speed(times, q, float(encoder.sigmas[j]), grain)[1]))
         if np.all(np.isfinite(slowest)) and min(slowest) > 0.0:
-            parameters[f"{joint}.{SHARPNESS}"] = replace(own, value=SATURATED / min(slowest), fixed=True)
+            name = f"{joint}.{SHARPNESS}"
+            parameters[name] = replace(parameters[name], value=SATURATED / min(slowest), fixed=True)
     return replace(robot, parameters=parameters)
 
 
@@ -152,9 +152,10 @@ def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0
     encoder, j = robot.motor_encoder, robot.joints.index(joint)
     stream = recording.streams[encoder.name]
     elastic = joint in robot.layout.motors and not robot.has_effect(ADDED_SPRING, joint)
-    held = (own := robot.parameters.get(f"{joint}.{SHARPNESS}")) is not None and own.fixed  # as a sign
+    asked = _is_asked(robot, joint)
+    held = f"{joint}.{SHARPNESS}" in robot.parameters and not asked  # as a sign
     slow_effects = any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
-    if _is_asked(robot, joint) or (slow_effects and not (elastic or held)):
+    if asked or (slow_effects and not (elastic or held)):
         return None
     rounded = SATURATED / robot.sharpness_of(joint)
     v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)

@@ -75,7 +75,7 @@ def acts_until_the_next(
         sharpness: k in tanh(k v), which stands for sign(v), of all joints or of each, shape (n,) [s/rad].
     """
     held, linear = (
-        [_missing(equation) for equation in drive_equations(tree, recordings, sigmas, held=way, sharpness=sharpness)]
+        [open_torque(equation) for equation in drive_equations(tree, recordings, sigmas, held=way, sharpness=sharpness)]
         for way in (True, False)
     )
     ratios = [a[0] / b[0] for a, b in zip(held, linear, strict=True) if min(a[1], b[1]) < EXPLAINED and b[0] > 0 < a[0]]
@@ -85,7 +85,7 @@ def acts_until_the_next(
     return True if ratio < 1.0 / CLEARLY else False if ratio > CLEARLY else None
 
 
-def _missing(equation: DriveEquation) -> tuple[float, float]:
+def open_torque(equation: DriveEquation) -> tuple[float, float]:
     """Torque that an equation leaves [N m], and its share of what drives the joint."""
     values = equation.solve()
     given = {} if GAIN in values else {GAIN: 1.0}

@@ -28,7 +28,7 @@ from jointscope.graphs.starts.drive_regression import (
 )
 from jointscope.graphs.starts.drive_starts import driven_joints
 from jointscope.graphs.starts.motion_cells import MotionCells, motion_cells
-from jointscope.graphs.starts.windowed_sums import joint_signals
+from jointscope.graphs.starts.windowed_sums import joint_signals, smooth_window
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
@@ -131,8 +131,7 @@ def _missing_torque(signals: Array, values: Mapping[str, float], width: float, h
     """What drives the joint and is not used, under the window that suits the noise, shape (m,) [N m]."""
     weights = [values[GAIN], -1.0, *(-values.get(law, 0.0) for law in (VISCOUS, DRY, INERTIA))]
     length = max(round(width / h), 1)
-    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
-    return np.asarray(convolve1d(signals @ np.array(weights), window / np.sum(window), mode="nearest"))
+    return np.asarray(convolve1d(signals @ np.array(weights), smooth_window(length) / length, mode="nearest"))
 
 
 def _contacts(at_end: Flags, pressed: Flags) -> Flags:

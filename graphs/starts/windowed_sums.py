@@ -65,6 +65,11 @@ def joint_signals(cells: MotionCells, load: Array, sharpness: float | Array) -> 
     return np.stack([cells.u, load, cells.v, _mean_sign(cells.v_smooth, sharpness), cells.a], axis=2)
 
 
+def smooth_window(length: int) -> Array:
+    """A window that begins and ends at zero and has a mean of one, shape (length,)."""
+    return np.asarray(1.0 - np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length))
+
+
 def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float) -> list[WindowedSums]:
     """Sums of every joint.
 
@@ -78,7 +83,7 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
     signals, known, h = _coarser(signals, cells, max(round(width / cells.h) // CELLS, 1))
     m, n = signals.shape[:2]
     length = max(round(width / h), FEWEST_CELLS)
-    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
+    window = smooth_window(length)
     stride = max(length // PER_WINDOW, 1)
     if length > m:
         return [WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(n)]

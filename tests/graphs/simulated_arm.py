@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.robots.recordings.recording import Stream
 
 mujoco = pytest.importorskip("mujoco", reason="arms are moved by MuJoCo, which the extra `sim` brings")
@@ -173,6 +175,15 @@ def robot_file(arm: Arm, folder: Path) -> Path:
     text += "".join(VALUES.replace("jN", joint) for joint in arm.joints)
     (folder / "arm.yaml").write_text(text, encoding="utf-8")
     return folder / "arm.yaml"
+
+
+def assert_right(arm: Arm, parameters: Iterable[ParameterEstimate], rel: float) -> None:
+    """Every value of every drive is that of the arm."""
+    table = {p.name: p.value for p in parameters}
+    truth = {"inertia": arm.inertia, "coulomb_torque": arm.dry, "motor_viscous.coefficient": arm.viscous}
+    for law, values in truth.items():
+        for joint, value in zip(arm.joints, values, strict=True):
+            assert table[f"{joint}.{law}"] == pytest.approx(value, rel=rel), (joint, law)
 
 
 def _stamps(rng: np.random.Generator, seconds: float, rate: float) -> np.ndarray:

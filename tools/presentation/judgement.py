@@ -12,7 +12,7 @@ from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.plausible_torques import plausible_torques
 from jointscope.tools.presentation.torque_constants import suspicious_constants
-from jointscope.tools.presentation.whiteness import LAGS, channel_memory, strength
+from jointscope.tools.presentation.whiteness import AS_EXPECTED, LAGS, channel_memory, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
@@ -20,7 +20,7 @@ ANSWERS = {
     "warn": "Usable, with reservations.",
     "bad": "No, do not rely on this calibration yet.",
 }
-CHI2 = (1.25, 2.0)  # mean square of a channel's residual in sigmas: fine up to the first, bad beyond the second
+CHI2 = (AS_EXPECTED, 2.0)  # mean square of a channel's residual in sigmas: fine up to the first, bad beyond the second
 TOO_SMALL = 0.4  # mean square of a channel's residual in sigmas below which its sigma is too large
 CORRELATION = (0.25, 0.5)  # largest autocorrelation within LAGS; a quantized encoder at rest reaches 0.2
 UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open after DRIFT, in the worst window

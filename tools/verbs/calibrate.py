@@ -5,13 +5,16 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.acceptance.evaluation import check_models
+from jointscope.tools.acceptance.evaluation import AcceptedBy, check_models
+from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
-from jointscope.tools.terminal.progress import progress_bar, reading
+from jointscope.tools.terminal.progress import Progress, progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.frequency_runs import (
     add_frequency_option,
@@ -23,6 +26,9 @@ from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_cal
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
+
+if TYPE_CHECKING:
+    from jointscope.robots.model.robot import Robot
 
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
@@ -89,24 +95,12 @@ def run(args: argparse.Namespace) -> int:
 
     load_user_effects(args.effects)
     robot, limits = load_robot(args.robot), limits_of(args)
-    if args.poses and args.frequency:
+    still = _still_kinds(args, robot, files, limits)
+    if still is not None:
         with progress_bar() as progress:
-            text, checked = run_kinds_calibration(robot, args.frequency, args.poses, files, args.urdf, limits, progress)
+            text, checked = still(progress)
         print(text)
         files.tell(args.urdf)
-        return print_acceptance(checked)
-    if args.poses:
-        with progress_bar() as progress:
-            text, checked = run_pose_calibration(robot, args.poses, files, args.urdf, limits, progress)
-        print(text)
-        files.tell(args.urdf)
-        return print_acceptance(checked)
-    if (args.rests or args.frequency) and not args.bags:
-        with progress_bar() as progress:
-            still = run_rest_calibration if args.rests else run_frequency_calibration
-            text, checked = still(robot, args.rests or args.frequency, files, limits, progress)
-        print(text)
-        files.tell()
         return print_acceptance(checked)
     check_viewer(robot, files)
     if robot.free_links and (args.incremental or args.solver != "condensed"):
@@ -131,6 +125,20 @@ def run(args: argparse.Namespace) -> int:
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
     return print_acceptance(checked)
+
+
+def _still_kinds(
+    args: argparse.Namespace, robot: Robot, files: ResultFiles, limits: Sequence[Limit]
+) -> Callable[[Progress], tuple[str, AcceptedBy]] | None:
+    """What calibrates from poses, frequency responses or rests alone; None where there is motion."""
+    if args.poses and args.frequency:
+        return partial(run_kinds_calibration, robot, args.frequency, args.poses, files, args.urdf, limits)
+    if args.poses:
+        return partial(run_pose_calibration, robot, args.poses, files, args.urdf, limits)
+    if args.bags or not (args.rests or args.frequency):
+        return None
+    run_still = run_rest_calibration if args.rests else run_frequency_calibration
+    return partial(run_still, robot, args.rests or args.frequency, files, limits)
 
 
 def _check_kinds(args: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_arm import Arm, moved, robot_file
+from simulated_arm import Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -54,11 +54,7 @@ def timing_check(result):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sticking_arm_is_right_and_good_and_nothing_is_named(robot, seed):
     result = calibrate(robot, [recorded(seed=seed)])
-    table = {p.name: p for p in result.parameters}
-    truth = {"inertia": ARM.inertia, "coulomb_torque": ARM.dry, "motor_viscous.coefficient": ARM.viscous}
-    for law, values in truth.items():
-        for joint, value in zip(ARM.joints, values, strict=True):
-            assert table[f"{joint}.{law}"].value == pytest.approx(value, rel=0.005), (joint, law)
+    assert_right(ARM, result.parameters, rel=0.005)
     assert judge(result).level == "good"
     assert timing_check(result).level == "good"
     assert result.bags[0].isolated == ()

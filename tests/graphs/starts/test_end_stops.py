@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_arm import Arm, moved, robot_file
+from simulated_arm import Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.starts.end_stops import end_stops
@@ -92,11 +92,7 @@ def test_a_spring_that_the_model_lacks_is_no_stop(robot):
 def test_a_calibration_without_the_contacts_is_right_and_says_so(robot):
     recording = with_end_stops_left_out(recorded(stop=(1, -9.0, UPPER)), robot)
     result = calibrate(robot, [recording])
-    table = {p.name: p for p in result.parameters}
-    truth = {"inertia": ARM.inertia, "coulomb_torque": ARM.dry, "motor_viscous.coefficient": ARM.viscous}
-    for law, values in truth.items():
-        for joint, value in zip(ARM.joints, values, strict=True):
-            assert table[f"{joint}.{law}"].value == pytest.approx(value, rel=0.005), (joint, law)
+    assert_right(ARM, result.parameters, rel=0.005)
     assert judge(result).level == "good"
     assert any("j1 presses" in text and "left out there" in text for text in result.findings)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import GAIN, Driven, drive_equations
+from jointscope.graphs.starts.drive_signal import open_torque
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream
@@ -76,11 +77,7 @@ def _left(tree: RigidTree, encoder: Stream, command: Stream, held: bool) -> floa
         equations = drive_equations(tree, [Driven(encoder, command)], np.zeros(tree.n), held=held)
     except RecordingError:
         return np.inf
-    shares = []
-    for equation in equations:
-        values = {name: value.value for name, value in equation.solve().items()}
-        if GAIN in values and (driving := equation.torque(values[GAIN])) > 0.0:
-            shares.append(min(equation.missing(values) / driving, 1.0))
+    shares = [min(open_torque(equation)[1], 1.0) for equation in equations if GAIN in equation.solve()]
     return float(np.sqrt(np.mean(np.square(shares)))) if shares else np.inf
 
 
