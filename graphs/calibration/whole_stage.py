@@ -91,10 +91,10 @@ class WholeStage:
         blunt = blunt_sharpness(problems[0].robot, [p.recording for p in problems])
         softer = [anchored([blunted(p, sharpness) for p in problems], calibrations) for sharpness in blunt]
         estimate = approach(softer[0] if softer else problems, noise, calibrations, self.hold)
-        estimate = self._with_sets(estimate)
+        estimate = self.with_sets(estimate)
         for soft in softer:
-            estimate = self._step("blunt friction", soft, noise, estimate, FEW_ITERATIONS).estimate
-        solved = self._settled(problems, noise, estimate)
+            estimate = self.step("blunt friction", soft, noise, estimate, FEW_ITERATIONS).estimate
+        solved = self.settled(problems, noise, estimate)
         return self._from_below(solved) if blunt and noise.estimate else solved
 
     def with_memory(self, white: Solved) -> Solved:
@@ -110,18 +110,18 @@ class WholeStage:
             robot, before = found.robot, white.robot.layout
             now = anchored([p.of_robot(robot) for p in white.problems], estimate.calibrations)
             states = [robot.layout.carried_over(x, before) for x in estimate.states[:motions]]
-            start = self._with_sets(Estimate(tuple(states), estimate.calibrations[:motions]))
-            return self._settled(now, robot.noise, start)
+            start = self.with_sets(Estimate(tuple(states), estimate.calibrations[:motions]))
+            return self.settled(now, robot.noise, start)
         except SolveError:
             return white
 
-    def _settled(
+    def settled(
         self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
     ) -> Solved:
         """A solution whose noise agrees with its residuals."""
         passes = FixedPoint()
         for _ in range(NOISE_PASSES):
-            solution = self._step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
+            solution = self.step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
             _must_converge(solution, problems[0].robot, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
@@ -140,7 +140,7 @@ class WholeStage:
         if np.all(densities(noise) < BETTER * densities(smaller)):
             return above
         try:
-            below = self._settled(above.problems, smaller, above.solution.estimate, BELOW_ITERATIONS)
+            below = self.settled(above.problems, smaller, above.solution.estimate, BELOW_ITERATIONS)
         except SolveError:
             return above
         found = below.problems[0].dynamics.steps.noise
@@ -148,9 +148,10 @@ class WholeStage:
         gained = float(np.sum(np.log(densities(noise) / densities(found))))
         return below if gained > np.log(BETTER) and rise < AS_GOOD else above
 
-    def _step(
+    def step(
         self, name: str, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int
     ) -> Solution:
+        """The solution for a given noise; arguments as in `settled`, `most` iterations are allowed."""
         now: list[Problem] = [*(p.with_noise(noise) for p in problems), *self._sets_of(problems)]
         solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
@@ -160,7 +161,7 @@ class WholeStage:
         """The recordings of other kinds on the robot of the motions."""
         return [other.of_robot(problems[0].robot) for other in self.sets]
 
-    def _with_sets(self, estimate: Estimate) -> Estimate:
+    def with_sets(self, estimate: Estimate) -> Estimate:
         """The estimate of the motions with states and blocks of the other kinds."""
         starts = [other.start(estimate.calibrations[0]) for other in self.sets]
         states, calibrations = [x for x, _ in starts], [c for _, c in starts]

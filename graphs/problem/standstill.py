@@ -52,8 +52,9 @@ def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     An elastic one has an equation of its own for its motor, see `holding_motors`; one that got its spring as an effect
     has it, too, but its link may be seen by nothing else than what its motor does.
 
-    A joint whose sharpness is looked for keeps them: they tell it, as they tell effects of slow motion unless its
-    friction is held as a sign. So does one whose encoder does not show them.
+    A joint whose sharpness is looked for is left out where its encoder does not tell it from standing. One with an
+    effect of slow motion keeps what tells that, unless its friction is held as a sign, and so does one that hardly
+    moves beside what its encoder shows.
     """
     found = {}
     for joint in robot.joints:
@@ -64,6 +65,11 @@ def leaving_standstill_out(robot: Robot, recording: Recording) -> Recording:
     return replace(recording, sticking=found)
 
 
+def asked_joints(robot: Robot) -> list[str]:
+    """Joints whose sharpness of dry friction is looked for."""
+    return [joint for joint in robot.joints if _is_asked(robot, joint)]
+
+
 def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     """The robot with the dry friction of each joint that looks for its sharpness as a sign, as far as motion tells.
 
@@ -71,21 +77,23 @@ def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     more viscous one that hides it. Held so that friction has its full size at a small part of the joint's own speed, or
     at the slowest that the encoder tells from zero, standstill can be left out.
     """
-    parameters, encoder = dict(robot.parameters), robot.motor_encoder
-    for j, joint in enumerate(robot.joints):
-        if not _is_asked(robot, joint):
-            continue
-        slowest = []
-        for recording in recordings:
-            stream = recording.streams[encoder.name]
-            q, times = stream.values[:, j], stream.times
-            v, _, _ = _speed(times, q, float(encoder.sigmas[j]), 0.0)
-            grain = GRAIN * float(np.quantile(np.abs(v), 0.95))
-            slowest.append(max(grain, _speed(times, q, float(encoder.sigmas[j]), grain)[1]))
+    parameters = dict(robot.parameters)
+    for joint in asked_joints(robot):
+        slowest = [slowest_seen(robot, recording, joint) for recording in recordings]
         if np.all(np.isfinite(slowest)) and min(slowest) > 0.0:
             name = f"{joint}.{SHARPNESS}"
             parameters[name] = replace(parameters[name], value=SATURATED / min(slowest), fixed=True)
     return replace(robot, parameters=parameters)
+
+
+def slowest_seen(robot: Robot, recording: Recording, joint: str) -> float:
+    """The slowest speed of a joint that its encoder tells from zero, or a small part of its own [rad/s, m/s]."""
+    encoder, j = robot.motor_encoder, robot.joints.index(joint)
+    stream = recording.streams[encoder.name]
+    q, times, sigma = stream.values[:, j], stream.times, float(encoder.sigmas[j])
+    v, _, _ = _speed(times, q, sigma, 0.0)
+    grain = GRAIN * float(np.quantile(np.abs(v), 0.95))
+    return max(grain, _speed(times, q, sigma, grain)[1])
 
 
 def holding_motors(robot: Robot, recording: Recording, h: Array) -> dict[str, Stretches]:
@@ -155,13 +163,14 @@ def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0
     asked = _is_asked(robot, joint)
     held = f"{joint}.{SHARPNESS}" in robot.parameters and not asked  # as a sign
     slow_effects = any(robot.has_effect(id, joint) for id in SLOW_EFFECTS)
-    if asked or (slow_effects and not (elastic or held)):
+    if slow_effects and not (elastic or held):
         return None
-    rounded = SATURATED / robot.sharpness_of(joint)
+    rounded = slowest_seen(robot, recording, joint) if asked else SATURATED / robot.sharpness_of(joint)
     v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
-    if seen >= rounded:
+    hardly = HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))
+    if seen >= max(rounded, hardly):
         return None
-    slow = np.abs(v) < max(seen, min(times * rounded, HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))))
+    slow = np.abs(v) < max(seen, min(times * rounded, hardly))
     slow[1:] |= v[1:] * v[:-1] < 0.0
     return _stretches(slow, stream.times, reach)
 

@@ -37,6 +37,7 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
         document["command"]["held"] = robot.command.held
     for parameter in robot.parameters.values():
         if parameter.fixed:
+            _write_held(document.get("parameters", {}), parameter)
             continue
         entry = _entry(document, parameter)
         entry["value"] = _rounded(parameter.value)
@@ -88,6 +89,14 @@ def _entry(document: Any, parameter: Parameter) -> Any:
     if parameter.name not in parameters:
         parameters[parameter.name] = _flow({"value": 0.0, "unit": parameter.unit, "positive": parameter.positive})
     return parameters[parameter.name]
+
+
+def _write_held(parameters: Any, parameter: Parameter) -> None:
+    """A value that the file looked for, and that is held now."""
+    entry = parameters.get(parameter.name)
+    if entry is not None and not entry.get("fixed", False):
+        entry["value"] = _rounded(parameter.value, 4)
+        entry["fixed"] = True
 
 
 def _write_locked(document: Any, locked: Mapping[str, float]) -> None:

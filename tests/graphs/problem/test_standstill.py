@@ -57,11 +57,23 @@ def test_a_standstill_and_a_reversal_are_left_out_and_nothing_else(stopping, hel
 
 @pytest.mark.parametrize(
     "told",
-    [{"parameters": ("j.friction_sharpness",)}, {"sigma": 1e-3}, {"motors": ("j",)}],
+    [{"sigma": 1e-2}, {"motors": ("j",)}],
     ids=lambda told: next(iter(told)),
 )
 def test_standstill_stays_where_it_tells_something_or_nobody_sees_it(stopping, told):
     assert leaving_standstill_out(joint(**told), stopping).sticking == {}
+
+
+def test_a_joint_whose_sharpness_is_looked_for_is_left_out_where_it_cannot_be_told_from_standing(stopping):
+    asked = joint(parameters=("j.friction_sharpness",), sharpness=5.0)  # 0.6 rad/s, which the motion hardly leaves
+    found = leaving_standstill_out(asked, stopping).sticking["j"]
+    np.testing.assert_allclose(found, [(1.0, 1.5), (2.5, 2.5)], atol=0.025)
+
+
+def test_friction_is_known_beyond_what_the_encoder_shows_where_it_shows_less_than_friction_needs(stopping):
+    (first, second) = leaving_standstill_out(joint(sigma=2e-4), stopping).sticking["j"]
+    assert first[0] == pytest.approx(1.0, abs=0.1) and first[1] == pytest.approx(1.5, abs=0.1)
+    assert second[0] == pytest.approx(2.5, abs=0.1) and second[1] == pytest.approx(2.5, abs=0.1)
 
 
 def elastic(friction, inertia=1e-3, **kwargs):

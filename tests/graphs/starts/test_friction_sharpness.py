@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_arm import SHARP, Arm, moved, written
+from simulated_arm import SHARP, STEP, Arm, moved, written
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.whole_stage import blunted
@@ -20,6 +20,7 @@ from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.files.robot_writer import robot_text
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.recordings.recording import Recording
 
@@ -55,8 +56,9 @@ def lift(tmp_path):
     return make
 
 
-def test_a_calibration_finds_how_sharply_the_dry_friction_of_a_slow_slide_turns_over(lift):
-    encoder, command = moved(SLIDE, noise=5e-6)
+@pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
+def test_a_calibration_finds_how_sharply_the_dry_friction_of_a_slow_slide_turns_over(lift, rate):
+    encoder, command = moved(SLIDE, noise=5e-6, encoder_rate=rate, command_rate=rate)
     recording = Recording("", "", 10**18, {"encoder": encoder, "command": command})
     found = {name: calibrate(lift(text), [recording]).robot.parameters for name, text in (("free", FREE), ("held", ""))}
     free, held = found["free"], found["held"]
@@ -66,6 +68,21 @@ def test_a_calibration_finds_how_sharply_the_dry_friction_of_a_slow_slide_turns_
     # held at 200 s/m where 400 is true does no harm: speeds at which the two differ are not asked
     assert held["j0.coulomb_torque"].value == pytest.approx(2.0, rel=0.001)
     assert held["j0.motor_viscous.coefficient"].value == pytest.approx(15.0, rel=0.002)
+
+
+def test_a_slide_that_truly_sticks_is_right_and_its_sharpness_is_held_as_far_as_the_encoder_tells(lift, tmp_path):
+    encoder, command = moved(SLIDE, noise=5e-6, sticks=True)
+    result = calibrate(lift(FREE), [Recording("", "", 10**18, {"encoder": encoder, "command": command})])
+    found = result.robot.parameters
+    assert found["j0.coulomb_torque"].value == pytest.approx(2.0, rel=0.001)
+    assert found["j0.motor_viscous.coefficient"].value == pytest.approx(15.0, rel=0.002)
+    inertia = 0.7 + STEP / 2.0 * 15.0  # MuJoCo damps by the velocity at the end of a step, stamps take half of it back
+    assert abs(found["j0.inertia"].value - inertia) < 3.0 * found["j0.inertia"].sigma
+    assert found["j0.friction_sharpness"].fixed and found["j0.friction_sharpness"].value > 2.0 * SHARP
+    assert any("j0 sticks where it stands" in said for said in result.findings)
+    (tmp_path / "found.yaml").write_text(robot_text(result.robot, tmp_path))
+    read = load_robot(tmp_path / "found.yaml").parameters["j0.friction_sharpness"]
+    assert read.fixed and read.value == pytest.approx(found["j0.friction_sharpness"].value, rel=1e-3)
 
 
 OWN_LAW = RobotTorque(
