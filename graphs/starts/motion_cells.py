@@ -31,8 +31,7 @@ GAP = 4.5  # [sample periods] between two samples from which nobody knows what h
 MEMORY = 0.03  # [s] over which accelerations are alike
 UNCLEAR = 3.0  # [sigma] of a velocity below which its sign is not known
 AT_REST = 0.01  # of the rms velocity
-DWELL = 0.02  # [s] at such velocities that is no mere reversal: dry friction is then smaller than its limit
-REVERSAL = 2.0  # [times as long as a reversal at the rms acceleration takes] the same for noisy velocities
+REVERSAL = 1.6  # times as long as a joint turns over at its rms acceleration: who is slower sticks, below the limit
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def motion_cells(
     slow = np.maximum(UNCLEAR * v_sigma, AT_REST * np.sqrt(np.mean(v_smooth**2, axis=0)))
     resting = np.abs(v_smooth) < slow
     rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
-    fewest = np.maximum(DWELL + REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
+    fewest = np.maximum(REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
     measured = np.isfinite(encoder.measured)  # one joint's motion moves the others, too
     usable = ~np.any([_missing(encoder.times[good], middle, period) for good in measured.T], axis=0)
     for begin, end in left_out:

@@ -102,6 +102,17 @@ def test_standstill_is_left_out_as_friction_is_below_its_limit_there(tmp_path):
         assert found["inertia"].value == pytest.approx(ARM.truth(j)["inertia"], rel=0.02)
 
 
+@pytest.mark.parametrize("rate", [50.0, 100.0, 250.0])
+def test_reversals_at_which_a_joint_sticks_for_a_moment_are_left_out(tmp_path, rate):
+    """For some hundredths of a second friction is below its limit there, just where accelerations are largest."""
+    arm = Arm("yxy", dry=(4.0, 1.5, 0.5))
+    sticking = {"sticks": True, "noise": 5e-5, "seconds": 20.0, "seed": 3}
+    streams = moved(arm, encoder_rate=rate, command_rate=rate, **sticking)
+    for j, equation in enumerate(equations(arm, tmp_path, streams, noise=5e-5)):
+        for name, value in equation.solve({"gain": 1.0}).items():
+            assert value.value == pytest.approx(arm.truth(j)[name], rel=0.0125), (arm.joints[j], name)
+
+
 def test_what_is_left_out_or_missing_changes_nothing(tmp_path, streams):
     encoder, command = streams
     pushed = encoder.values + np.where((encoder.times > 4.0) & (encoder.times < 4.5), 0.3, 0.0)[:, None]
