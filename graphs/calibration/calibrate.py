@@ -41,7 +41,7 @@ from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
-from jointscope.robots.recordings.recording import LEFT_OUT, Notice, Recording
+from jointscope.robots.recordings.recording import TOLD_WITH_RESULTS, Notice, Recording
 from jointscope.robots.recordings.resting_joints import must_move
 from jointscope.robots.recordings.screening import screen
 
@@ -175,7 +175,7 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
                 f"{recording.path} is the same recording as {before}; give every recording once, "
                 "or its samples count twice"
             )
-    notices = [notice for recording in recordings for notice in recording.notices if notice.kind in LEFT_OUT]
+    notices = [notice for recording in recordings for notice in recording.notices if notice.kind in TOLD_WITH_RESULTS]
     notices += [notice for recording in recordings for notice in screen(recording, robot)]
     if every_joint:
         must_move(robot, recordings)

@@ -18,8 +18,9 @@ from jointscope.robots.errors import RecordingError
 Array = NDArray[np.float64]
 
 GRID = 1000  # instants at which a recording is looked at
-LEFT_OUT = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase")
-"""Kinds of notices by which the reader took data away or changed their times: whoever believes a result has to know."""
+TOLD_WITH_RESULTS = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase", "mimic")
+"""Kinds of notices that whoever believes a result has to know: the reader took data away, changed their times, or the
+robot file contradicts them."""
 SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
 
 
@@ -74,8 +75,8 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "clipping",
-            "end_stop", "out_of_order", "duplicate", "info", "jitter".
+        kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "mimic",
+            "clipping", "end_stop", "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

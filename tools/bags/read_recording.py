@@ -27,6 +27,7 @@ from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_parts import message_parts
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag
+from jointscope.tools.bags.mimic_positions import mimic_notices
 from jointscope.tools.bags.needed_streams import (
     StreamSource,
     check_topic,
@@ -72,7 +73,7 @@ def read_recording(
         notices += found
     parts = {n.name: message_parts(raw[n.source.topic], types[n.name], n.source.field, decode_all) for n in needed}
     posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
-    notices += found
+    notices += found + mimic_notices([parts[name] for name in _encoders(robot)], robot)
     acting = "command" if robot.command_held else ""
     columns = {n.name: fitting_messages(parts[n.name], *wanted_of(n), acts_on=n.name == acting) for n in needed}
     samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})

@@ -298,6 +298,19 @@ def test_mimic_joints_are_no_joints_of_the_robot(tmp_path, capsys):
     assert "finger_2 follows finger_1 and is modelled with it" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("factor", "said"), [(-1.0, False), (0.0, False), (1.0, True), (-0.5, True)])
+def test_a_mimic_joint_that_follows_otherwise_than_its_urdf_says_is_told(factor, said, tmp_path, capsys):
+    parents = {"shoulder": None, "finger_1": "shoulder", "finger_2": "shoulder"}
+    urdf = write_urdf(tmp_path / "hand.urdf", parents, {"finger_2": "finger_1"})
+    motion = ArmMotion(urdf, ("shoulder", "finger_1"))
+    motion.position["finger_2"] = factor * motion.position["finger_1"]
+    topics = {"/joint_states": motion.states(), "/cmd": motion.commands(("shoulder", "finger_1"))}
+    bag = write_arm_bag(tmp_path / "a.mcap", motion.times, topics)
+    assert init(urdf, bag, "-o", tmp_path / "a.yaml") == 0
+    told = f"with multiplier -1 and offset 0, but in the bag with {factor:g} and 0" in capsys.readouterr().out
+    assert told == said
+
+
 @needs_cases
 @pytest.mark.parametrize(
     ("name", "urdf", "joints", "locked"),
