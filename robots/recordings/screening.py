@@ -36,6 +36,7 @@ FROZEN_SAMPLES, FROZEN_SECONDS = 20, 0.1  # [1], [s] a gyro does not repeat itse
 MIN_SAMPLES = 100  # of each sensor
 BEYOND_LIMIT = 1.2  # times the robot's limit: odd
 IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
+FEW_JOINTS = 2  # others that keep their limits are enough to say that it is this joint
 DUTY_LIMIT = 1.0 + 1e-6
 PERCENT = 100.0
 OVER_VOLTAGE = 1.2  # times the supply
@@ -192,10 +193,24 @@ def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
         channel, unit = f"{robot.joints[k]}.motor_position", robot.unit_at(robot.joints[k], turning_unit)
         text = f"{channel} {what} {seen[k]:.4g} {unit}; {robot.tree.urdf.name} allows {allowed[k]:.4g} {unit}"
         if share[k] > IMPOSSIBLE:
+            others = [joint for j, joint in enumerate(robot.joints) if share[j] <= 1.0]
+            if len(others) == robot.n - 1 >= FEW_JOINTS:
+                raise RecordingError(f"{text}; {_one_joint_hint(robot, others)}")
             raise RecordingError(f"{text}; {_unit_hint(robot, k, float(share[k]))}")
         if share[k] > BEYOND_LIMIT:
             notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
     return notices
+
+
+def _one_joint_hint(robot: Robot, others: list[str]) -> str:
+    """What may be wrong where all other joints keep their limits."""
+    encoder = robot.motor_encoder
+    now = ", ".join(encoder.source.bag_units(robot.n))
+    return (
+        "all other joints keep theirs: look whether its samples jump, whether it alone has another unit (`unit: "
+        f"[{now}]` of sensors.{encoder.name} has one for each joint), or whether the URDF allows it too little; "
+        f"without it: jointscope init {robot.tree.urdf} BAG --joints {','.join(others)} -o NEW.yaml"
+    )
 
 
 def _unit_hint(robot: Robot, joint: int, excess: float) -> str:

@@ -66,8 +66,9 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.init.robot_guess import guess_robot
     from jointscope.tools.init.streams.other_joints import Typed
     from jointscope.tools.init.text.drive_table import drive_content, drive_table
+    from jointscope.tools.init.text.guessed_lines import guesses, guesses_in_sections
     from jointscope.tools.init.text.held_text import locked_line
-    from jointscope.tools.init.text.robot_text import guesses, robot_text
+    from jointscope.tools.init.text.robot_text import robot_text
 
     _check_order(args.urdf, args.bag)
     typed = Typed(
@@ -91,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
     print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
     held = {h.joint for h in guess.held}
-    for line in guesses(text):
+    for line in guesses_in_sections(text):
         key = line.partition(":")[0].strip("'")
         if key not in held and key != "parameters":  # these stand in the table that follows
             print(f"  {_plain(line)}")
@@ -100,15 +101,18 @@ def run(args: argparse.Namespace) -> int:
     lines += [f"not used: {text}" for text in guess.left_out]
     for line in (*(f"  {line}" for line in lines), *(f"note: {notice}" for notice in description.notices)):
         print(line)
-    verdict = "can" if description.usable else "cannot"
-    reason = "" if description.usable else f": {description.problem}"
-    print(f"\nWrote {args.output}; the recording {verdict} be used with it{reason}")
     if not description.usable:
+        print(f"\nWrote {args.output}; the recording cannot be used with it: {description.problem}")
         return 0
     poor = [joint for joint, drive in zip(guess.roles.joints, guess.drives, strict=True) if drive.explained < EXPLAINED]
     if poor and not guess.free_links:
-        lost = ", ".join(poor)
-        print(f"The regression does not explain {lost} (table above): something is wrong there; look at it first.")
+        print(
+            f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
+            f"{', '.join(poor)} (table above): names, units, signs, gravity or masses are wrong there, or a spring is "
+            "missing; look at it first"
+        )
+    else:
+        print(f"\nWrote {args.output}; the recording can be used with it")
     calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
     better = args.output.with_name(f"{args.output.stem}_better.yaml")
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")

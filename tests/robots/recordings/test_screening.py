@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.recordings.resting_joints import joints_without_motion, must_move
-from jointscope.robots.recordings.screening import screen
+from jointscope.robots.recordings.screening import _check_limits, screen
 from jointscope.tools.bags.read_recording import read_recording
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
@@ -229,6 +230,14 @@ def test_angles_in_degrees_are_recognized_by_the_limits(doggy, good, seconds):
     assert text.endswith(
         "the angles look like degrees: set `unit` of sensors.motor_encoder in the robot file (now rad) to deg"
     )
+
+
+def test_one_joint_that_is_too_fast_among_others_that_are_not_is_no_matter_of_their_unit(doggy):
+    v = np.tile(0.5 * doggy.tree.velocity_limits, (9, 1))
+    v[4, 2] *= 20.0
+    with pytest.raises(RecordingError, match=r"joint3.motor_position moves at .*; all other joints keep") as error:
+        _check_limits(SimpleNamespace(q=np.zeros((9, 3)), v=v), doggy)
+    assert "--joints joint1,joint2 -o" in str(error.value) and "look like" not in str(error.value)
 
 
 def test_small_angles_in_degrees_are_recognized_by_the_gyros(doggy, good):

@@ -68,16 +68,6 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def guesses(text: str) -> list[str]:
-    """The guessed lines of a robot file: "key: value (why)"."""
-    found = []
-    for line in text.splitlines():
-        value, mark, why = line.partition(f"# {GUESS}: ")
-        if mark:
-            found.append(f"{value.strip()}  ({why})")
-    return found
-
-
 def _gravity(guess: RobotGuess) -> str:
     return guess.gravity_reason or "z of the base points up"
 
