@@ -45,7 +45,7 @@ def plausible_torques(result: CalibrationResult) -> tuple[str, str]:
             f"{strong.name} is {significant(strong.value)} N m/A, more than any drive makes: masses of "
             f"{robot.tree.urdf.name} in grams, or commands in another unit? Mend it, then {_again(result)}."
         )
-    return _torques(result) or _load(result) or _scale(result, constants) or ("good", _nothing(constants))
+    return _torques(result) or _load(result, constants) or _scale(result, constants) or ("good", _nothing(constants))
 
 
 def _nothing(constants: list[ParameterEstimate]) -> str:
@@ -66,19 +66,21 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
     )
 
 
-def _load(result: CalibrationResult) -> tuple[str, str] | None:
+def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
     for mass in result.masses:
         shares = mass.moved(result.found)
         if not shares:
             continue
         worst = max(shares, key=lambda name: abs(shares[name]))
+        torques = mass.mass < 0.0 and constants and max(p.value for p in constants) < 1.0
+        other = f" Or its commands are torques, and it carries more: {_again(result, ' --unit Nm')}." if torques else ""
         return "bad", (
             f"The recording asks for another mass behind {mass.joint}, by {mass.mass:+.2g} ± "
             f"{significant(mass.sigma, 1)} kg if all of it were in the link there: a load that "
             f"{result.robot.tree.urdf.name} lacks, or another robot? With it {worst} would be "
             f"{100.0 * shares[worst]:+.0f} %. Add the load to the URDF as a link, with its mass and place, then "
-            f"{_again(result)}."
+            f"{_again(result)}.{other}"
         )
     return None
 

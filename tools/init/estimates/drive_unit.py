@@ -20,6 +20,7 @@ MASSES = 0.25  # relative; how far the masses of a URDF may be off
 ONE_DRIVE = 0.1  # relative; a single duty cycle may give about 1 N m by chance
 SURE = 3.5  # [sigma]
 ALIKE = 0.03  # relative
+LOADED = 0.3  # N m per N m: no arm carries more than twice what it weighs
 
 
 def drive_unit(
@@ -61,7 +62,10 @@ def drive_unit(
         return "duty", f"{size}, and one unit makes {constants} N m; volts cannot be told from it"
     mixed = f"; {', '.join(one)} could be N m: if so, check the masses beyond the others" if one else ""
     alike = f"; alike on all joints: or torques before gears of that ratio ({_ratio(told)})" if _all_alike(told) else ""
-    return "A", f"with the masses of the URDF one unit makes {constants} N m, not 1{_volts(largest)}{alike}{mixed}"
+    others = f"{_volts(largest)}{alike}{mixed}"
+    below = all(LOADED < gain.value < 1.0 for gain in told.values()) and not (one or alike)
+    others += "; or N m, if it carries a load that the URDF lacks: --unit Nm" if below else ""
+    return "A", f"with the masses of the URDF one unit makes {constants} N m, not 1{others}"
 
 
 def _is_one(gain: Value) -> bool:

@@ -30,6 +30,7 @@ def unit_of(*gains, largest=20.0, sigma=0.01, **more):
         ((1.2,), 0.9, "duty", "one unit makes 1.2 (hip) N m"),
         ((1.02,), 0.9, "N m", "one unit is 1.02 N m on every joint"),
         ((2.0, 2.0), 300.0, "A", "not 1; alike"),
+        ((0.54, 0.63, 0.7), 40.0, "A", "or N m, if it carries a load that the URDF lacks: --unit Nm"),
     ],
 )
 def test_constants_tell_the_unit(gains, largest, unit, said):
