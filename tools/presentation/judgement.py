@@ -12,7 +12,7 @@ from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.plausible_torques import plausible_torques
 from jointscope.tools.presentation.torque_constants import suspicious_constants
-from jointscope.tools.presentation.whiteness import AS_EXPECTED, LAGS, channel_memory, strength
+from jointscope.tools.presentation.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
@@ -111,6 +111,8 @@ def _white(result: CalibrationResult) -> Check:
             found[channel] = max(found.get(channel, 0.0), value)
     if not found:
         return Check("info", "Residuals without memory", "There are no residuals to check.")
+    if lasting := endless_torque(result):
+        return Check("bad", "Residuals without memory", lasting)
     levels = {c: _colour_level(value, result.channels[c].chi2) for c, value in found.items()}
     worst = max(found, key=lambda c: (LEVELS.index(levels[c]), found[c]))
     level = levels[worst]

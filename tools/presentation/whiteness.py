@@ -6,7 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.calibration.calibration_result import BagFit
+from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult
+from jointscope.graphs.noise.torque_memory import MEMORIES
+from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -15,6 +17,9 @@ PART = 10  # samples for every lag at the least: autocorrelations over most of a
 LAGS = 100  # samples; 0.1 s at 1 kHz, longer than any elastic mode of interest takes to turn
 AS_EXPECTED = 1.25  # mean square of a channel's residual in sigmas, up to which it is as large as expected
 WINDOW = 0.25  # [s]
+ENDLESS = (
+    0.1  # of the drive's torque, from which a torque by no law is no nuisance; no model that leaves more is adequate
+)
 
 
 def autocorrelation(residual: Array, lags: int = LAGS) -> Array:
@@ -81,3 +86,29 @@ def strength(times: Array, residual: Array, window: float = WINDOW) -> tuple[Arr
     number = np.bincount(which, minlength=count)[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         return edges, np.sqrt(sums / number)
+
+
+def endless_torque(result: CalibrationResult) -> str:
+    """A sentence about random torques that are a good part of a drive's, where no memory was too long; else nothing.
+
+    Such a torque follows whatever the model lacks, and the values beside it are those of a model without it.
+    """
+    robot, worst, where = result.robot, 0.0, ""
+    if robot.noise.correlation_time != MEMORIES[-1]:
+        return ""
+    torques = lasting_torques(robot)
+    gains = [
+        robot.command_volts * robot.drive_parameter(joint, robot.drive_gain).value if robot.drive_gain else 1.0
+        for joint in robot.joints
+    ]
+    for joint, gain, column in zip(robot.joints, gains, range(robot.n), strict=True):
+        drive = max(float(np.sqrt(np.mean((gain * bag.commands[:, column]) ** 2))) for bag in result.bags)
+        share = torques.get(f"{joint}.link", 0.0) / drive if drive > 0.0 else 0.0
+        if share > worst:
+            worst, where = share, joint
+    if worst < ENDLESS:
+        return ""
+    return (
+        f"At {where} torques come and go by no law, {100 * worst:.0f} % of the drive's, and no memory was long enough "
+        "for them: a missing effect looks like this, and the other values bear it."
+    )

@@ -77,9 +77,10 @@ def test_a_sigma_that_the_user_keeps_is_no_reason_for_no(tmp_path, held):
     assert judge(result).level in ("good", "warn")
 
 
-def test_no_sigma_hides_a_missing_effect(tmp_path, held):
+@pytest.mark.parametrize("keep", ["", ", estimate_sigma: false"])
+def test_neither_a_sigma_nor_a_torque_that_lasts_hides_a_missing_effect(tmp_path, held, keep):
     """Without its viscous friction the model is wrong, and the encoder is not to blame."""
-    robot = pendulum(tmp_path, 1e-4)
+    robot = pendulum(tmp_path, 1e-4, keep=keep)
     text = (tmp_path / "pendulum.yaml").read_text(encoding="utf-8")
     kept = text.replace("effects: [motor_viscous@swing]", "")
     start = kept.index("  swing.motor_viscous")
