@@ -10,25 +10,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby
-
-import numpy as np
+from math import isfinite
 
 from jointscope.graphs.calibration.base_model import BaseModel
-from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
-from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
+from jointscope.graphs.discovery.starting_model import torque_judge
 from jointscope.graphs.judging.elastic_reaction import is_spring, spring_start
 from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
-from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
-from jointscope.graphs.judging.torque_rows import TorqueEquations
-from jointscope.graphs.refits.loop_validation import judged_by_loop
+from jointscope.graphs.judging.torque_judge import NET, SHARE, TorqueJudge, TorqueJudgement
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.units import of_slide
 
-BANDS = (30.0, 15.0, 8.0)  # [Hz]
-QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
-FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
 UNHELD = "a calibration with it does not bear it out"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
@@ -57,18 +51,15 @@ class TorqueVerdicts:
     sentence: str
 
 
-def torque_verdicts(
-    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, barred: Collection[str] = ()
-) -> TorqueVerdicts | None:
-    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short.
+def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collection[str] = ()) -> TorqueVerdicts | None:
+    """Verdicts by the missing torque; None for a model that is judged by predictions.
 
     Args:
         base: the model.
         scored: the catalogue.
-        comparison: of the model with a recording.
         barred: ID@OWNER of candidates that did not hold elsewhere.
     """
-    judge = _judge(base, comparison)
+    judge = torque_judge(base)
     if judge is None:
         return None
     hypotheses = hypotheses_on_motion(base.robot, judge.equations)
@@ -113,27 +104,6 @@ def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[fl
     return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
 
 
-def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
-    robot = base.robot
-    if robot.layout.motors or robot.layout.memories or len(robot.sensors) > 1 or robot.transmission is not None:
-        return None
-    if judged_by_loop(robot, base.recordings) or not comparison.judged_error > FINE:
-        return None
-    segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
-    h = float(np.median(np.diff(segments[0].signals.ticks)))
-    for band in BANDS:
-        equations = TorqueEquations.of(segments, band)
-        if any(len(np.unique(rows.times)) < 100 for rows in equations.rows):
-            return None
-        judge = TorqueJudge(equations)
-        if any(len(np.unique(blocks)) < FEWEST_BLOCKS for blocks in judge.blocks):
-            return None
-        noise = robot.free_inertias() * (2.0 * np.pi * band) ** 2 * robot.motor_encoder.sigmas * np.sqrt(2.0 * h * band)
-        if bool(np.all(noise < QUIET * judge.missing)):
-            return judge
-    return None
-
-
 def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
     """Candidates as they are before anything is judged."""
     reason = "it is a choice of the computation, which torques averaged over many steps do not tell"
@@ -158,9 +128,8 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
     here = j.hypothesis.here
     known = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
     sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
-    parameters = {
-        p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
-    }
+    units = {p.name: robot.unit_at(here.owner, p.unit) for p in j.hypothesis.sizes}
+    parameters = {p.name: EffectEstimate(float(v), float(s), units[p.name]) for p, v, s in sizes if isfinite(s)}
     if is_spring(j.hypothesis):
         start = spring_start(robot, j.hypothesis)
         units = {p.name: robot.unit_at(here.owner, p.unit) for p in here.effect.parameters_at(robot, here.owner)}

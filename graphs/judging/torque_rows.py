@@ -84,6 +84,7 @@ class TorqueEquations:
         signals: of each segment, with accelerations of the motion and the commands that these ask for, not those that
             were logged: they hold what is missing, and in a loop the disturbances, too.
         expected, sigma: change of the base parameters that their prior expects, and its standard deviation, shape (p,).
+        band: frequency at which the windows let half of the amplitude pass [Hz].
     """
 
     steps: Sequence[TorqueSteps]
@@ -92,6 +93,7 @@ class TorqueEquations:
     signals: list[ScoreSignals]
     expected: Array
     sigma: Array
+    band: float
 
     @staticmethod
     def of(segments: Sequence[Segment], band: float) -> TorqueEquations:
@@ -131,7 +133,7 @@ class TorqueEquations:
         prior = DynamicsPrior.of(robot)
         expected = -prior.residual((), segments[0].calibration)[0]
         signals = [_asked_for(part.segment, part.missing, by) for part, by in zip(steps, gains, strict=True)]
-        return TorqueEquations(steps, windows, found, signals, expected, prior.sigma)
+        return TorqueEquations(steps, windows, found, signals, expected, prior.sigma, band)
 
     @property
     def period(self) -> float:
