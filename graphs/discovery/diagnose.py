@@ -156,6 +156,7 @@ def diagnose(
         heldout=holdout,
         missing_torque=None if torques is None else torques.missing,
         missing_torque_percent=None if torques is None else torques.percent,
+        small=() if torques is None else torques.small,
     )
     return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
 

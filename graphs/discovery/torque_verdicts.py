@@ -7,7 +7,7 @@ judged so; others by their predictions.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from math import isfinite
@@ -27,6 +27,7 @@ UNHELD = "a calibration with it does not bear it out"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
 SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
+MOST_SMALL = 4  # that are named
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -41,6 +42,7 @@ class TorqueVerdicts:
         percent: the same in percent of the drive's.
         unexplained: share of its square that smooth laws would explain.
         sentence: all that in plain words.
+        small: what is there, but not worth a parameter, with its torque; largest first.
     """
 
     candidates: list[Candidate]
@@ -49,6 +51,7 @@ class TorqueVerdicts:
     percent: Mapping[str, float]
     unexplained: float
     sentence: str
+    small: tuple[str, ...] = ()
 
 
 def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collection[str] = ()) -> TorqueVerdicts | None:
@@ -89,9 +92,9 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collectio
     best = max((scores[c.label] for c in candidates if c.verdict == "missing"), default=0.0)
     candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
     candidates.sort(key=lambda c: order[c.verdict])
-    return TorqueVerdicts(
-        candidates, refits, missing, percent, judge.unexplained, _sentence(base.robot, judge, missing, percent)
-    )
+    sentence = _sentence(base.robot, judge, missing, percent)
+    small = _small(base.robot, judge, [j for j in found.values() if j.small])
+    return TorqueVerdicts(candidates, refits, missing, percent, judge.unexplained, sentence, small)
 
 
 def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[float, ...]:
@@ -155,7 +158,7 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
     elif j.net <= NET:
         verdict, reasons = "absent", (j.refused,)
     else:
-        stands_in = j.share > SHARE and not j.refused.startswith("there")
+        stands_in = j.share > SHARE and not j.small
         verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
     return replace(
         known, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
@@ -169,10 +172,27 @@ def _with(robot: Robot, j: TorqueJudgement) -> Robot:
     return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
 
 
+def _small(robot: Robot, judge: TorqueJudge, found: Sequence[TorqueJudgement]) -> tuple[str, ...]:
+    """What is small in words: torques where it acts on one joint, else parts of the drives."""
+    texts, drive = [], {rows.joint: float(d) for rows, d in zip(judge.rows, judge.drive, strict=True)}
+    for j in sorted(found, key=lambda j: -j.removed)[:MOST_SMALL]:
+        owner, part = j.hypothesis.here.owner, f"{j.removed:.2g} % of the drive"
+        if owner in drive:
+            torque = f"{0.01 * j.removed * drive[owner]:.2g} of {drive[owner]:.3g} {_unit(robot, owner)}"
+            texts.append(f"{j.hypothesis.label}, {torque}, {part}")
+        else:
+            texts.append(f"{j.hypothesis.label}, {part}")
+    return tuple(texts)
+
+
+def _unit(robot: Robot, joint: str) -> str:
+    return of_slide("N m") if joint in robot.tree.slides else "N m"
+
+
 def _sentence(robot: Robot, judge: TorqueJudge, missing: Mapping[str, float], percent: Mapping[str, float]) -> str:
     parts = []
     for noise, (joint, value) in zip(judge.noise, missing.items(), strict=True):
-        unit = of_slide("N m") if joint in robot.tree.slides else "N m"
+        unit = _unit(robot, joint)
         parts.append(
             f"{value:.3g} {unit} at {joint}, {percent[joint]:.1f} % of its drive, of which a random torque of "
             f"{noise.size:.2g} {unit} with {1e3 * noise.memory:.0f} ms of memory follows no law"

@@ -29,6 +29,7 @@ NET, SHARE, COMMON = 12.0, 0.05, 0.02  # significance; share of the own equation
 HELPED, HELPED_BY_COMMAND = 0.8, 0.9  # of the blocks
 HARM, CEILING = 1.5, 0.5
 ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
+SMALL = "there, but small"  # how a refusal begins of what is significant and not worth a parameter
 GAUGE = 1e-4  # of a column's square outside the base columns
 DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
 
@@ -61,6 +62,11 @@ class TorqueJudgement:
     harm: float
     removed: float
     refused: str = ""
+
+    @property
+    def small(self) -> bool:
+        """Whether it is there, but not worth a parameter."""
+        return self.refused.startswith(SMALL)
 
     @property
     def dof(self) -> int:
@@ -160,7 +166,8 @@ class TorqueJudge:
         if found.net <= NET:
             return "it would explain no more than chance beside disturbances with a memory"
         if found.share <= SHARE or found.common <= COMMON or found.removed <= 100.0 * ABSOLUTE:
-            return f"there, but small: {100 * max(found.share, 0.0):.1f} % of the squared missing torque"
+            share = f"{100 * max(found.share, 0.0):.1f} % of the squared missing torque"
+            return f"{SMALL}: {share}, {found.removed:.2g} % of the drive's"
         if found.helped < needed * found.blocks:
             return f"it helps on {found.helped} of {found.blocks} blocks left out"
         if found.harm > HARM:
