@@ -24,6 +24,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.units import of_slide
 
 UNHELD = "a calibration with it does not bear it out"
+NUMERICS = "it is a choice of the computation, which torques averaged over many steps do not tell"
+BEHIND = "torques averaged over many steps do not tell it behind a spring whose link no sensor sees"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
 SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
@@ -65,7 +67,9 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collectio
     judge = torque_judge(base)
     if judge is None:
         return None
-    hypotheses = hypotheses_on_motion(base.robot, judge.equations)
+    rigid = judge.equations.steps[0].segment.problem.robot  # without the springs of the model
+    there = {here.label for here in base.robot.effects}
+    hypotheses = [h for h in hypotheses_on_motion(rigid, judge.equations) if h.label not in there]
     judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
     found = {j.hypothesis.label: j for j in judged if j is not None}
     found |= {label: replace(found[label], refused=UNHELD) for label in barred if label in found}
@@ -73,7 +77,7 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collectio
     equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
     fewest = min((j.dof for j in equal), default=0)
     first = [j for j in equal if j.dof == fewest]
-    by_label = {c.label: c for c in _scored_only(scored)}
+    by_label = {c.label: c for c in _scored_only(scored, BEHIND if base.layout.motors else NUMERICS)}
     candidates = [_candidate(by_label.get(label), j, j in first, base.robot) for label, j in found.items()]
     alike = tuple(j.hypothesis.label for j in first)
     candidates = [
@@ -107,9 +111,8 @@ def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[fl
     return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
 
 
-def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
+def _scored_only(scored: ScoredCandidates, reason: str) -> list[Candidate]:
     """Candidates as they are before anything is judged."""
-    reason = "it is a choice of the computation, which torques averaged over many steps do not tell"
     return [
         Candidate(
             effect=c.best.hypothesis.here.effect.id,
