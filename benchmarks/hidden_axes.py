@@ -46,10 +46,6 @@ HIDDEN: dict[str, dict[str, float]] = {
     "": {},
 }
 OUTSIDE = ("position_dependent_friction", "warming_friction", "joint_stop")
-SAME = {  # effects that no motion of one axis tells from it, and those that hold it as a part
-    "torque_offset": ("asymmetric_friction",),
-    "asymmetric_friction": ("torque_offset",),
-}
 AROUND = {  # random torque and ripple in the same parts, share of a Stribeck effect and an offset beside it
     "quiet": (0.002, 0.0, 0.0),
     "coloured": (0.015, 0.002, 0.0),
@@ -81,13 +77,8 @@ class HiddenAxis:
 
     @property
     def truth(self) -> tuple[str, ...]:
-        """ID@OWNER of what the model lacks, whether the catalogue has it or not."""
-        return (f"{self.hidden}@axis",) if self.hidden else ()
-
-    @property
-    def alike(self) -> tuple[str, ...]:
-        """ID@OWNER of what says the same."""
-        return tuple(f"{name}@axis" for name in SAME.get(self.hidden, ()))
+        """ID@OWNER of what the model lacks, as far as the catalogue has it."""
+        return (f"{self.hidden}@axis",) if self.hidden and self.hidden not in OUTSIDE else ()
 
     @property
     def force(self) -> float:

@@ -97,7 +97,7 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collectio
     candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
     candidates.sort(key=lambda c: order[c.verdict])
     sentence = _sentence(base.robot, judge, missing, percent)
-    small = _small(base.robot, judge, [j for j in found.values() if j.small])
+    small = _small(base.robot, judge, [j for j in found.values() if j.small and j.share > 0.0])
     return TorqueVerdicts(candidates, refits, missing, percent, judge.unexplained, sentence, small)
 
 
