@@ -30,6 +30,7 @@ TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
 SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
 MOST_SMALL = 4  # that are named
+DRIVE_LATE, SEEN_LATE = ("command_delay", "motor_lag"), ("clock_offset", "encoder_delay")
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -93,22 +94,34 @@ def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collectio
     shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
     scores = {label: j.score for label, j in found.items()}
     candidates.sort(key=lambda c: (order[c.verdict], -shares.get(c.label, -2.0), -scores.get(c.label, 0.0)))
-    best = max((scores[c.label] for c in candidates if c.verdict == "missing"), default=0.0)
-    candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
+    candidates = _simplest_first(candidates, scores)
     candidates.sort(key=lambda c: order[c.verdict])
     sentence = _sentence(base.robot, judge, missing, percent)
     small = _small(base.robot, judge, [j for j in found.values() if j.small and j.share > 0.0])
     return TorqueVerdicts(candidates, refits, missing, percent, judge.unexplained, sentence, small)
 
 
-def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[float, ...]:
-    """Where missing ones stand; between those that the motion does not tell apart no rounding decides."""
-    if candidate.verdict != "missing":
-        return (0.0,)
-    if score < best - max(TIED * best, 1.0):
-        return (1.0, -score)
-    known = candidate.effect in SIMPLEST
-    return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
+def _simplest_first(candidates: Sequence[Candidate], scores: Mapping[str, float]) -> list[Candidate]:
+    """Missing ones in their order: between those that the motion does not tell apart no rounding decides.
+
+    One encoder and one drive have one time between them, and a drive that acts late is what machines have; a clock or
+    an encoder stands behind it, also where their columns, which hold what is missing, score a little higher.
+    """
+    missing = [c for c in candidates if c.verdict == "missing"]
+    late = any(c.effect in DRIVE_LATE for c in missing)
+    behind = {c.label for c in missing if late and c.effect in SEEN_LATE}
+    best = max((scores[c.label] for c in missing if c.label not in behind), default=0.0)
+
+    def place(c: Candidate) -> tuple[float, ...]:
+        score = scores.get(c.label, 0.0)
+        if c.verdict != "missing":
+            return (0.0,)
+        if c.label in behind or score < best - max(TIED * best, 1.0):
+            return (1.0, -score)
+        known = c.effect in SIMPLEST
+        return (0.0, float(SIMPLEST.index(c.effect) if known else len(SIMPLEST)), -score)
+
+    return sorted(candidates, key=place)
 
 
 def _scored_only(scored: ScoredCandidates, reason: str) -> list[Candidate]:
