@@ -2,6 +2,9 @@
 """Hides effects in simulated recordings and lets `discover` find them; the table goes into docs/measured.md.
 
 Usage: python benchmarks/bench_discovery.py [--quick] [--only PATTERN] [--jobs N] [--results FILE] [--table] [--list]
+       [--seed N]
+
+The table of one whole kind, as `--only "spring:*"`, goes there, too, as a section of its own.
 """
 
 from __future__ import annotations
@@ -20,10 +23,10 @@ from concurrent.futures.process import BrokenProcessPool
 from functools import cache
 from pathlib import Path
 
-from discovery import section
+from discovery import kind_section, section
 from discovery_case import run_case
 from discovery_row import Row
-from hidden_effects import AnyCase, cases, tenth
+from hidden_effects import KINDS, AnyCase, cases, tenth
 from kept_rows import keep, known_rows
 from measured_page import environment, write_section
 from patience import say
@@ -36,7 +39,8 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 def main() -> None:
     arguments = _parse()
-    wanted = tenth(cases()) if arguments.quick else cases()
+    every = cases(arguments.seed)
+    wanted = tenth(every) if arguments.quick else every
     wanted = [case for case in wanted if fnmatch.fnmatch(f"{case.kind}: {case.name}", f"*{arguments.only}*")]
     if arguments.list:
         print("\n".join(f"{case.kind}: {case.name}" for case in wanted))
@@ -52,9 +56,14 @@ def main() -> None:
         known[row.name] = row
     rows = [known[case.name] for case in wanted if case.name in known]
     part = "" if len(rows) == len(wanted) else f" ({len(rows)} of {len(wanted)} cases)"
-    told = section(rows).markdown()
+    kind = arguments.only.removesuffix(":*")
+    told = (kind_section(kind, rows) if kind in KINDS else section(rows)).markdown()
     print(f"# Discovery{' (quick run)' if arguments.quick else ''}{part}\n\n{environment()}\n\n{told}")
-    if not part and not arguments.quick and not arguments.only:
+    if part or arguments.quick:
+        return
+    if kind in KINDS:
+        write_section(told, f'--only "{arguments.only}"' + (f" --seed {arguments.seed}" if arguments.seed else ""))
+    elif not arguments.only and not arguments.seed:
         write_section(told)
 
 
@@ -84,7 +93,10 @@ def code() -> str:
     """Changes with the package and with the table, so that no stale row is used."""
     package = Path(jointscope.graphs.__file__).parents[1]
     files = [p for room in ("robots", "factors", "graphs", "tools/simulator") for p in (package / room).rglob("*.py")]
-    files += [Path(__file__).with_name(name) for name in ("hidden_effects.py", "setting_arms.py", "spring_axes.py")]
+    files += [
+        Path(__file__).with_name(name)
+        for name in ("hidden_effects.py", "setting_arms.py", "spring_axes.py", "hidden_axes.py")
+    ]
     content = b"".join(path.read_bytes() for path in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]
 
@@ -99,6 +111,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument(
         "--only", default="", metavar="PATTERN", help="only cases whose name matches, as 'pair:*cogging'"
     )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="added to all seeds; 0 is the table")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes, each on one core; 2 by default")
     default = Path(tempfile.gettempdir()) / "jointscope-bench-discovery.jsonl"
     parser.add_argument("--results", type=Path, default=default, metavar="FILE", help=f"rows as JSON lines; {default}")

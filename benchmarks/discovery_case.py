@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 from discovery_row import Row
+from hidden_axes import HiddenAxis, record_hidden
+from hidden_axes import true_sizes as hidden_sizes
 from hidden_effects import FAR_START, LEFT_OUT, TEST, TRAIN, AnyCase, Case
 from setting_arms import TEST as ARM_TEST
 from setting_arms import TRAIN as ARM_TRAIN
@@ -57,7 +59,7 @@ def run_case(case: AnyCase) -> Row:
     """One row of the table; an error of the project becomes part of the row."""
     if isinstance(case, SettingCase):
         model, recordings = _arm(case)
-    elif isinstance(case, SpringAxis):
+    elif isinstance(case, SpringAxis | HiddenAxis):
         model, recordings = _axis(case)
     else:
         model, recordings = _model(case), _simulate(case)
@@ -91,16 +93,19 @@ def _arm(case: SettingCase) -> tuple[Robot, Recordings]:
     return robot, Recordings(*made, true_sizes(case, robot))
 
 
-def _axis(axis: SpringAxis) -> tuple[Robot, Recordings]:
+def _axis(axis: SpringAxis | HiddenAxis) -> tuple[Robot, Recordings]:
     """The axis as `init` makes it out, and what it did."""
     with tempfile.TemporaryDirectory() as name:
         folder, seconds = Path(name), (ARM_TRAIN, ARM_TEST)
-        bags = [record_axis(axis, folder, duration, i) for i, duration in enumerate(seconds)]
+        record = record_hidden if isinstance(axis, HiddenAxis) else record_axis
+        bags = [record(axis, folder, duration, i) for i, duration in enumerate(seconds)]
         path = folder / "axis.yaml"
         with redirect_stdout(io.StringIO()):
             main(["init", str(folder / "axis.urdf"), str(bags[0]), "--unit", "Nm", "-o", str(path)])
         robot = load_robot(path)
         made = [read_recording(bag, robot) for bag in bags]
+    if isinstance(axis, HiddenAxis):
+        return robot, Recordings(*made, hidden_sizes(axis))
     true = {"axis.joint_elasticity.compliance": axis.compliance} if axis.frequency else {}
     return robot, Recordings(*made, true)
 

@@ -3,8 +3,9 @@
 
 Every effect of the catalogue in two sizes and, where it has a choice, at two owners; recordings without any; pairs;
 effects outside the catalogue; short, disturbed and jittery recordings; plain mistakes; settings of arms of makers; axes
-with a spring that nobody declared. Seeds are fixed by the place in the table, so each recording is another robot on
-another occasion. Only append to a list: what is inserted moves the seeds of all that follow.
+with a spring that nobody declared; axes that lack one large thing among many small ones. Seeds are fixed by the place
+in the table, so each recording is another robot on another occasion. Only append to a list: what is inserted moves the
+seeds of all that follow.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+from hidden_axes import HiddenAxis, hidden_axes
 from setting_arms import SettingCase, setting_cases
 from spring_axes import SpringAxis, spring_axes
 
@@ -109,10 +111,11 @@ MISTAKES = (
 )
 
 CLEAN = 20
+AXES = 3  # of everything that is hidden in single axes
 TRAIN, TEST = 20.0, 8.0  # [s]
 DOGGYS = ("effect", "clean", "pair", "outside", "hard", "mistake")
-KINDS = (*DOGGYS, "setting", "spring")
-FIRST_SEED = dict(zip(KINDS, range(2000, 10000, 1000), strict=True))
+KINDS = (*DOGGYS, "setting", "spring", "axis")
+FIRST_SEED = dict(zip(KINDS, range(2000, 11000, 1000), strict=True))
 
 
 @dataclass(frozen=True)
@@ -146,11 +149,12 @@ class Case:
         return (*(text.split(":")[0] for text in self.hidden), *self.left_out)
 
 
-AnyCase: TypeAlias = Case | SettingCase | SpringAxis
+AnyCase: TypeAlias = Case | SettingCase | SpringAxis | HiddenAxis
 
 
-def cases() -> list[AnyCase]:
-    """The whole table."""
+def cases(shift: int = 0) -> list[AnyCase]:
+    """The whole table; `shift` is added to all seeds."""
+    first = {kind: seed + shift for kind, seed in FIRST_SEED.items()}
     hidden: dict[str, list[tuple[tuple[str, ...], tuple[str, ...], str]]] = {
         "effect": [((text,), (), "") for sizes in EFFECTS for text in sizes]
         + [((), (lo,), "") for lo in LEFT_OUT]
@@ -162,11 +166,12 @@ def cases() -> list[AnyCase]:
         "mistake": [((text,) if text else (), (), how) for text, how in MISTAKES],
     }
     doggys = [
-        Case(kind, texts, left_out, FIRST_SEED[kind] + i, how, HARD.get(how, {}))
+        Case(kind, texts, left_out, first[kind] + i, how, HARD.get(how, {}))
         for kind in DOGGYS
         for i, (texts, left_out, how) in enumerate(hidden[kind])
     ]
-    return [*doggys, *setting_cases(FIRST_SEED["setting"]), *spring_axes(FIRST_SEED["spring"])]
+    axes = [axis for i in range(AXES) for axis in hidden_axes(first["axis"] + i)]
+    return [*doggys, *setting_cases(first["setting"]), *spring_axes(first["spring"]), *axes]
 
 
 def tenth(every: list[AnyCase]) -> list[AnyCase]:

@@ -50,6 +50,8 @@ class BaseModel:
         states: smoothed states of each, shape (m + 1, d).
         calibrations: shared values with the biases of each.
         result: the calibration.
+        by_torques: whether what it lacks is asked of the torque that is missing while its joints move; friction at rest
+            has no say then. Where predictions are asked, which go through standstills, it has.
     """
 
     robot: Robot
@@ -57,28 +59,41 @@ class BaseModel:
     states: tuple[Array, ...]
     calibrations: tuple[Calibration, ...]
     result: CalibrationResult
+    by_torques: bool = False
 
     @staticmethod
-    def of(robot: Robot, recordings: Sequence[Recording], start: BaseModel | None = None) -> BaseModel:
+    def of(
+        robot: Robot,
+        recordings: Sequence[Recording],
+        start: BaseModel | None = None,
+        *,
+        by_torques: bool | None = None,
+    ) -> BaseModel:
         """Calibrates a robot.
 
         Args:
             robot: the model with start values.
             recordings: training recordings.
             start: a model of the same recordings whose values are near; nothing is guessed anew.
+            by_torques: see there; as the start where there is one, else wherever the robot allows it.
         """
+        if by_torques is None:
+            by_torques = start.by_torques if start is not None else seen_by_one_encoder(robot)
         torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
         near = [calibration for calibration in start.calibrations] if start is not None else None
-        result = calibrate(full, recordings, near=near, standstill=not _judged_by_torques(full), memory=False)
+        # motors behind which links swing that nobody sees tell of these while they move
+        moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
+        result = calibrate(full, recordings, near=near, standstill=not moving, memory=False)
         return BaseModel(
             result.robot,
             tuple(recordings),
             tuple(bag.states for bag in result.bags),
             tuple(bag.calibration for bag in result.bags),
             result,
+            by_torques,
         )
 
     @property
@@ -114,11 +129,8 @@ class BaseModel:
         return fit, validation
 
 
-def _judged_by_torques(robot: Robot) -> bool:
-    """Whether one encoder of rigid joints, or of motors behind which links swing unseen, is all that there is.
-
-    What is missing is then asked of the torque while they move: friction at rest would only hide it.
-    """
+def seen_by_one_encoder(robot: Robot) -> bool:
+    """Whether one encoder of rigid joints, or of motors behind which links swing unseen, is all that there is."""
     alone = len(robot.sensors) == 1 and robot.transmission is None
     return alone and (not robot.layout.motors or len(robot.noise.unseen) > 0)
 

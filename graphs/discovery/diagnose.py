@@ -21,6 +21,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_m
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.spring_trials import SpringTrials
+from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
@@ -101,7 +102,7 @@ def diagnose(
     report, clock, pool = progress or (lambda text, share: None), _Clock(), side_by_side or SideBySide()
     pool.begin(leaders)
     report("calibrating the base model", 0.0)
-    base = base or BaseModel.of(robot, recordings)
+    base = base or starting_model(robot, recordings)
     clock.stage("calibration")
     report("scoring the catalogue", 0.3)
     scored = score_candidates(base)
@@ -113,7 +114,7 @@ def diagnose(
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
     trials = SpringTrials(base, (fit, spans), before, holdout)
-    torques, elastic = _by_torques(base, scored, comparison, trials)
+    torques, elastic = _by_torques(base, scored, trials)
     clock.stage("missing torque")
     percent: Mapping[str, float] = {}
     if torques is None:
@@ -155,20 +156,21 @@ def diagnose(
         heldout=holdout,
         missing_torque=None if torques is None else torques.missing,
         missing_torque_percent=None if torques is None else torques.percent,
+        small=() if torques is None else torques.small,
     )
     return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
 
 
 def _by_torques(
-    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, trials: SpringTrials
+    base: BaseModel, scored: ScoredCandidates, trials: SpringTrials
 ) -> tuple[TorqueVerdicts | None, dict[str, Robot]]:
     """Verdicts by the missing torque, if it tells any, and the robot with the spring that comes first, if one does."""
-    torques = torque_verdicts(base, scored, comparison)
+    torques = torque_verdicts(base, scored)
     spring, elastic = trials.borne_out(torques, scored)
     if torques is None or spring is None:
         return torques, {}
     if not elastic:
-        return torque_verdicts(base, scored, comparison, barred=(spring.label,)), {}
+        return torque_verdicts(base, scored, barred=(spring.label,)), {}
     return replace(torques, candidates=[spring, *(c for c in torques.candidates if c.label != spring.label)]), elastic
 
 

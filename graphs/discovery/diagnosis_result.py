@@ -98,6 +98,7 @@ class Diagnosis:
         heldout: the held-out recording, if there was one.
         missing_torque: of each joint on blocks left out, root mean square [N m]; None where predictions are judged.
         missing_torque_percent: the same in percent of the drive's.
+        small: what is there, but not worth a parameter, with its torque; largest first.
     """
 
     robot: Robot
@@ -119,6 +120,7 @@ class Diagnosis:
     heldout: Recording | None = field(default=None, repr=False)
     missing_torque: Mapping[str, float] | None = None
     missing_torque_percent: Mapping[str, float] | None = None
+    small: tuple[str, ...] = ()
 
     @property
     def judged_by(self) -> str:
@@ -136,6 +138,7 @@ class Diagnosis:
             "missing_torque_percent": dict(self.missing_torque_percent)
             if self.missing_torque_percent is not None
             else None,
+            "small": list(self.small),
             "placebo_score": self.placebo_score,
             "noise_levels": {f"{level:g}": list(labels) for level, labels in self.noise_levels.items()},
             "paragraphs": list(self.paragraphs),

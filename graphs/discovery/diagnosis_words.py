@@ -18,6 +18,8 @@ def paragraphs_of(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(". ".join(sentence.rstrip(".") for sentence in diagnosis.failure.sentences[:3]) + ".")
     missing = [c for c in diagnosis.candidates if c.verdict == "missing"]
     found += [_explains(c, diagnosis) for c in missing[:3]]
+    if diagnosis.small:
+        found.append(there_but_small(diagnosis.small))
     untestable = [c for c in diagnosis.candidates if c.verdict == "untestable"]
     if untestable:
         found.append(_untestable(untestable))
@@ -27,6 +29,11 @@ def paragraphs_of(diagnosis: Diagnosis) -> tuple[str, ...]:
 def part_in_words(share: float) -> str:
     """A share in percent; predictions that run away leave none that is a number."""
     return f"{100 * share:.0f} %" if isfinite(share) else "a part that cannot be told"
+
+
+def there_but_small(small: tuple[str, ...]) -> str:
+    """What is significant and changes little."""
+    return f"There, but small, and not added: {'; '.join(small)}."
 
 
 def _verdict(d: Diagnosis) -> str:

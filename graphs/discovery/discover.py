@@ -16,7 +16,7 @@ from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.diagnosis_words import part_in_words
-from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep
+from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep, with_lasting_floors
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.verdicts import MATTERS, SURE
@@ -114,7 +114,7 @@ class _Search:
         stop, diagnosis = self._loop(base)
         last = self.steps[-1]
         adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE
-        return Discovery(tuple(self.steps), stop, adequate, last.robot_file, self.held_out)
+        return Discovery(with_lasting_floors(self.steps), stop, adequate, last.robot_file, self.held_out)
 
     def _loop(self, base: Any) -> tuple[str, Diagnosis | None]:
         refused: dict[str, str] = {}

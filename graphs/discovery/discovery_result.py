@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
 from typing import Any
 
 from jointscope.graphs.comparison.comparison_result import ModelComparison
@@ -69,6 +71,19 @@ class DiscoveryStep:
             return "base model"
         parts = ([f"+ {self.added}"] if self.added else []) + ([f"- {self.removed}"] if self.removed else [])
         return " ".join(parts)
+
+
+def with_lasting_floors(steps: Sequence[DiscoveryStep]) -> tuple[DiscoveryStep, ...]:
+    """Steps with the lowest floor that they or later ones found.
+
+    What noise alone would give is the same for all models of a recording. Noise that was estimated while something was
+    missing holds part of that, and may lie above the error itself; a better model knows it better.
+    """
+    found, lowest = [], float("inf")
+    for step in reversed(steps):
+        lowest = min(lowest, step.floor) if isfinite(step.floor) else lowest
+        found.append(replace(step, floor=lowest if isfinite(lowest) else step.floor))
+    return tuple(reversed(found))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Progress
@@ -59,7 +60,9 @@ class Motion:
 
     def calibrated(self, robot: Robot, start: BaseModel | None = None) -> BaseModel:
         """All components of every gyro are predicted."""
-        return BaseModel.of(robot if start is not None else with_full_gyros(robot), self.recordings, start)
+        if start is None:
+            return starting_model(with_full_gyros(robot), self.recordings)
+        return BaseModel.of(robot, self.recordings, start)
 
     def errors(self, model: BaseModel) -> ValidationError:
         """On the pieces where a diagnosis validates."""

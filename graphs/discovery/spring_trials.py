@@ -131,7 +131,7 @@ class SpringTrials:
         Whether it is there was asked of blocks left out before; None where it cannot be calibrated.
         """
         try:
-            elastic = BaseModel.of(add_effect(self.base.result.start, spring.label, start), self.base.recordings)
+            elastic = self._elastic(spring.label, start)
             errors = judged_error(elastic, elastic.robot, elastic.calibrations, self.spans[1])
         except (JointscopeError, np.linalg.LinAlgError):
             return None
@@ -140,6 +140,11 @@ class SpringTrials:
         refit = Refit(elastic.robot, spring.label, elastic.calibrations, sigmas, converged=True)
         return ValidatedRefit(refit, errors, reported_heldout_error(elastic.robot, self.holdout))
 
+    def _elastic(self, label: str, start: Mapping[str, float] | None = None) -> BaseModel:
+        """The model with a spring, calibrated for the measure by which the one without was judged."""
+        grown = add_effect(self.base.result.start, label, dict(start or {}))
+        return BaseModel.of(grown, self.base.recordings, by_torques=self.base.by_torques)
+
     def _fitted(self, joint: str) -> ValidatedRefit | None:
         """The model with a spring; None where it cannot be calibrated.
 
@@ -147,7 +152,7 @@ class SpringTrials:
         """
         label = f"{SPRING}@{joint}"
         try:
-            elastic = BaseModel.of(add_effect(self.base.result.start, label), self.base.recordings)
+            elastic = self._elastic(label)
             return refit_and_validate(elastic, self.spans, label=label, holdout=self.holdout)
         except (JointscopeError, np.linalg.LinAlgError):
             return None

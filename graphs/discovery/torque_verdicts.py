@@ -7,32 +7,30 @@ judged so; others by their predictions.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-
-import numpy as np
+from math import isfinite
 
 from jointscope.graphs.calibration.base_model import BaseModel
-from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
-from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, segments_of
+from jointscope.graphs.discovery.scored_candidates import ScoredCandidates
+from jointscope.graphs.discovery.starting_model import torque_judge
 from jointscope.graphs.judging.elastic_reaction import is_spring, spring_start
 from jointscope.graphs.judging.torque_grids import hypotheses_on_motion
-from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, NET, SHARE, TorqueJudge, TorqueJudgement
-from jointscope.graphs.judging.torque_rows import TorqueEquations
-from jointscope.graphs.refits.loop_validation import judged_by_loop
+from jointscope.graphs.judging.torque_judge import NET, SHARE, TorqueJudge, TorqueJudgement
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.units import of_slide
 
-BANDS = (30.0, 15.0, 8.0)  # [Hz]
-QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
-FINE = 10.0  # [sensor sigma] error below which the sensor may limit the prediction, not the model
 UNHELD = "a calibration with it does not bear it out"
+NUMERICS = "it is a choice of the computation, which torques averaged over many steps do not tell"
+BEHIND = "torques averaged over many steps do not tell it behind a spring whose link no sensor sees"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
 SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
+MOST_SMALL = 4  # that are named
+DRIVE_LATE, SEEN_LATE = ("command_delay", "motor_lag"), ("clock_offset", "encoder_delay")
 EQUAL = 0.02  # difference of shares that decides nothing
 
 
@@ -47,6 +45,7 @@ class TorqueVerdicts:
         percent: the same in percent of the drive's.
         unexplained: share of its square that smooth laws would explain.
         sentence: all that in plain words.
+        small: what is there, but not worth a parameter, with its torque; largest first.
     """
 
     candidates: list[Candidate]
@@ -55,23 +54,23 @@ class TorqueVerdicts:
     percent: Mapping[str, float]
     unexplained: float
     sentence: str
+    small: tuple[str, ...] = ()
 
 
-def torque_verdicts(
-    base: BaseModel, scored: ScoredCandidates, comparison: ModelComparison, barred: Collection[str] = ()
-) -> TorqueVerdicts | None:
-    """Verdicts by the missing torque; None where predictions tell more, or the recordings are too short.
+def torque_verdicts(base: BaseModel, scored: ScoredCandidates, barred: Collection[str] = ()) -> TorqueVerdicts | None:
+    """Verdicts by the missing torque; None for a model that is judged by predictions.
 
     Args:
         base: the model.
         scored: the catalogue.
-        comparison: of the model with a recording.
         barred: ID@OWNER of candidates that did not hold elsewhere.
     """
-    judge = _judge(base, comparison)
+    judge = torque_judge(base)
     if judge is None:
         return None
-    hypotheses = hypotheses_on_motion(base.robot, judge.equations)
+    rigid = judge.equations.steps[0].segment.problem.robot  # without the springs of the model
+    there = {here.label for here in base.robot.effects}
+    hypotheses = [h for h in hypotheses_on_motion(rigid, judge.equations) if h.label not in there]
     judged = [judge.judge(list(own)) for _, own in groupby(hypotheses, key=lambda h: h.label)]
     found = {j.hypothesis.label: j for j in judged if j is not None}
     found |= {label: replace(found[label], refused=UNHELD) for label in barred if label in found}
@@ -79,7 +78,7 @@ def torque_verdicts(
     equal = [j for j in accepted if j.common > accepted[0].common - EQUAL]
     fewest = min((j.dof for j in equal), default=0)
     first = [j for j in equal if j.dof == fewest]
-    by_label = {c.label: c for c in _scored_only(scored)}
+    by_label = {c.label: c for c in _scored_only(scored, BEHIND if base.layout.motors else NUMERICS)}
     candidates = [_candidate(by_label.get(label), j, j in first, base.robot) for label, j in found.items()]
     alike = tuple(j.hypothesis.label for j in first)
     candidates = [
@@ -95,48 +94,38 @@ def torque_verdicts(
     shares = {label: j.common if j.net > NET else -1.0 for label, j in found.items()}
     scores = {label: j.score for label, j in found.items()}
     candidates.sort(key=lambda c: (order[c.verdict], -shares.get(c.label, -2.0), -scores.get(c.label, 0.0)))
-    best = max((scores[c.label] for c in candidates if c.verdict == "missing"), default=0.0)
-    candidates.sort(key=lambda c: _simplest_first(c, scores.get(c.label, 0.0), best))
+    candidates = _simplest_first(candidates, scores)
     candidates.sort(key=lambda c: order[c.verdict])
-    return TorqueVerdicts(
-        candidates, refits, missing, percent, judge.unexplained, _sentence(base.robot, judge, missing, percent)
-    )
+    sentence = _sentence(base.robot, judge, missing, percent)
+    small = _small(base.robot, judge, [j for j in found.values() if j.small and j.share > 0.0])
+    return TorqueVerdicts(candidates, refits, missing, percent, judge.unexplained, sentence, small)
 
 
-def _simplest_first(candidate: Candidate, score: float, best: float) -> tuple[float, ...]:
-    """Where missing ones stand; between those that the motion does not tell apart no rounding decides."""
-    if candidate.verdict != "missing":
-        return (0.0,)
-    if score < best - max(TIED * best, 1.0):
-        return (1.0, -score)
-    known = candidate.effect in SIMPLEST
-    return (0.0, float(SIMPLEST.index(candidate.effect) if known else len(SIMPLEST)), -score)
+def _simplest_first(candidates: Sequence[Candidate], scores: Mapping[str, float]) -> list[Candidate]:
+    """Missing ones in their order: between those that the motion does not tell apart no rounding decides.
+
+    One encoder and one drive have one time between them, and a drive that acts late is what machines have; a clock or
+    an encoder stands behind it, also where their columns, which hold what is missing, score a little higher.
+    """
+    missing = [c for c in candidates if c.verdict == "missing"]
+    late = any(c.effect in DRIVE_LATE for c in missing)
+    behind = {c.label for c in missing if late and c.effect in SEEN_LATE}
+    best = max((scores[c.label] for c in missing if c.label not in behind), default=0.0)
+
+    def place(c: Candidate) -> tuple[float, ...]:
+        score = scores.get(c.label, 0.0)
+        if c.verdict != "missing":
+            return (0.0,)
+        if c.label in behind or score < best - max(TIED * best, 1.0):
+            return (1.0, -score)
+        known = c.effect in SIMPLEST
+        return (0.0, float(SIMPLEST.index(c.effect) if known else len(SIMPLEST)), -score)
+
+    return sorted(candidates, key=place)
 
 
-def _judge(base: BaseModel, comparison: ModelComparison) -> TorqueJudge | None:
-    robot = base.robot
-    if robot.layout.motors or robot.layout.memories or len(robot.sensors) > 1 or robot.transmission is not None:
-        return None
-    if judged_by_loop(robot, base.recordings) or not comparison.judged_error > FINE:
-        return None
-    segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
-    h = float(np.median(np.diff(segments[0].signals.ticks)))
-    for band in BANDS:
-        equations = TorqueEquations.of(segments, band)
-        if any(len(np.unique(rows.times)) < 100 for rows in equations.rows):
-            return None
-        judge = TorqueJudge(equations)
-        if any(len(np.unique(blocks)) < FEWEST_BLOCKS for blocks in judge.blocks):
-            return None
-        noise = robot.free_inertias() * (2.0 * np.pi * band) ** 2 * robot.motor_encoder.sigmas * np.sqrt(2.0 * h * band)
-        if bool(np.all(noise < QUIET * judge.missing)):
-            return judge
-    return None
-
-
-def _scored_only(scored: ScoredCandidates) -> list[Candidate]:
+def _scored_only(scored: ScoredCandidates, reason: str) -> list[Candidate]:
     """Candidates as they are before anything is judged."""
-    reason = "it is a choice of the computation, which torques averaged over many steps do not tell"
     return [
         Candidate(
             effect=c.best.hypothesis.here.effect.id,
@@ -158,9 +147,8 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
     here = j.hypothesis.here
     known = scored or Candidate(here.effect.id, here.owner, j.score, j.dof, float("nan"), {}, "absent")
     sizes = zip(j.hypothesis.sizes, j.sizes, j.sigmas, strict=True)
-    parameters = {
-        p.name: EffectEstimate(float(v), float(s), robot.unit_at(here.owner, p.unit)) for p, v, s in sizes if s < np.inf
-    }
+    units = {p.name: robot.unit_at(here.owner, p.unit) for p in j.hypothesis.sizes}
+    parameters = {p.name: EffectEstimate(float(v), float(s), units[p.name]) for p, v, s in sizes if isfinite(s)}
     if is_spring(j.hypothesis):
         start = spring_start(robot, j.hypothesis)
         units = {p.name: robot.unit_at(here.owner, p.unit) for p in here.effect.parameters_at(robot, here.owner)}
@@ -186,7 +174,7 @@ def _candidate(scored: Candidate | None, j: TorqueJudgement, first: bool, robot:
     elif j.net <= NET:
         verdict, reasons = "absent", (j.refused,)
     else:
-        stands_in = j.share > SHARE and not j.refused.startswith("there")
+        stands_in = j.share > SHARE and not j.small
         verdict, reasons = ("stand_in", (helps, f"but {j.refused}")) if stands_in else ("possible", (j.refused,))
     return replace(
         known, score=j.score, dof=j.dof, parameters=parameters, verdict=verdict, reasons=reasons, share=j.share
@@ -200,10 +188,27 @@ def _with(robot: Robot, j: TorqueJudgement) -> Robot:
     return add_effect(robot, j.hypothesis.label, start | {k: float(v) for k, v in j.hypothesis.shapes.items()})
 
 
+def _small(robot: Robot, judge: TorqueJudge, found: Sequence[TorqueJudgement]) -> tuple[str, ...]:
+    """What is small in words: torques where it acts on one joint, else parts of the drives."""
+    texts, drive = [], {rows.joint: float(d) for rows, d in zip(judge.rows, judge.drive, strict=True)}
+    for j in sorted(found, key=lambda j: -j.removed)[:MOST_SMALL]:
+        owner, part = j.hypothesis.here.owner, f"{j.removed:.2g} % of the drive"
+        if owner in drive:
+            torque = f"{0.01 * j.removed * drive[owner]:.2g} of {drive[owner]:.3g} {_unit(robot, owner)}"
+            texts.append(f"{j.hypothesis.label}, {torque}, {part}")
+        else:
+            texts.append(f"{j.hypothesis.label}, {part}")
+    return tuple(texts)
+
+
+def _unit(robot: Robot, joint: str) -> str:
+    return of_slide("N m") if joint in robot.tree.slides else "N m"
+
+
 def _sentence(robot: Robot, judge: TorqueJudge, missing: Mapping[str, float], percent: Mapping[str, float]) -> str:
     parts = []
     for noise, (joint, value) in zip(judge.noise, missing.items(), strict=True):
-        unit = of_slide("N m") if joint in robot.tree.slides else "N m"
+        unit = _unit(robot, joint)
         parts.append(
             f"{value:.3g} {unit} at {joint}, {percent[joint]:.1f} % of its drive, of which a random torque of "
             f"{noise.size:.2g} {unit} with {1e3 * noise.memory:.0f} ms of memory follows no law"

@@ -16,7 +16,8 @@ Reference: Spong (1987), Modeling and control of elastic joint robots, J. Dynami
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -35,6 +36,7 @@ SHARE = EffectParameter("share", "1", start=1.0, prior_sigma=3.0, sign="+")
 SLOWEST, FASTEST, FREQUENCIES = 3.0, 80.0, 42  # [Hz], 8 % apart
 PER_PERIOD = 6.0  # samples of the fastest resonance that is tried
 DAMPING_RATIOS = (0.01, 0.03, 0.1, 0.3)
+SLOPE = 1e-3  # relative step of a shape
 
 
 def is_spring(hypothesis: EffectHypothesis) -> bool:
@@ -73,9 +75,44 @@ def reaction_column(steps: TorqueSteps, hypothesis: EffectHypothesis) -> Array:
     return found
 
 
+def known_springs(elastic: Robot, rigid: Robot) -> list[EffectHypothesis]:
+    """Each spring of a robot as its reaction on the motors of the same robot without springs, with its shapes."""
+    found = []
+    for here in elastic.effects:
+        if not (isinstance(here.effect, Structure) and here.effect.form == "elasticity"):
+            continue
+        inertia = _inertia(rigid, here.owner)
+        compliance, damping = (elastic.parameters[here.parameter(name)].value for name in ("compliance", "damping"))
+        w = 1.0 / np.sqrt(inertia * compliance)
+        shapes = {"frequency": w / (2.0 * np.pi), "damping_ratio": damping / (2.0 * w * inertia)}
+        found.append(EffectHypothesis(here, (SHARE,), {name: float(value) for name, value in shapes.items()}))
+    return found
+
+
+def beside_springs(steps: TorqueSteps, springs: Sequence[EffectHypothesis]) -> TorqueSteps:
+    """What is still missing in the steps of a rigid model where springs swing, and how it changes with these.
+
+    Logarithms of frequency and damping ratio of each spring stand behind the base parameters.
+    """
+    for spring in springs:
+        slopes = []
+        for name, value in spring.shapes.items():
+            ends = [replace(spring, shapes={**spring.shapes, name: value * np.exp(d)}) for d in (SLOPE, -SLOPE)]
+            more, less = (reaction_column(steps, end) for end in ends)
+            slopes.append((more - less) / (2.0 * SLOPE))
+        left = steps.missing - reaction_column(steps, spring)[:, :, 0]
+        steps = replace(steps, missing=left, base=np.concatenate([steps.base, *slopes], axis=2))
+    return steps
+
+
 def spring_start(robot: Robot, hypothesis: EffectHypothesis) -> Mapping[str, float]:
     """Compliance [rad/(N m)] and damping [N m s/rad] for the inertia that the joint moves at zero angles."""
-    j = robot.joints.index(hypothesis.here.owner)
-    inertia = float(robot.tree.mass_matrix(np.zeros((1, robot.n)))[0, j, j])
+    inertia = _inertia(robot, hypothesis.here.owner)
     w, zeta = 2.0 * np.pi * hypothesis.shapes["frequency"], hypothesis.shapes["damping_ratio"]
     return {"compliance": 1.0 / (inertia * w * w), "damping": 2.0 * zeta * w * inertia}
+
+
+def _inertia(robot: Robot, joint: str) -> float:
+    """What a joint moves at zero angles [kg m2]."""
+    j = robot.joints.index(joint)
+    return float(robot.tree.mass_matrix(np.zeros((1, robot.n)))[0, j, j])

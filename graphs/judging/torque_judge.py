@@ -29,6 +29,8 @@ NET, SHARE, COMMON = 12.0, 0.05, 0.02  # significance; share of the own equation
 HELPED, HELPED_BY_COMMAND = 0.8, 0.9  # of the blocks
 HARM, CEILING = 1.5, 0.5
 ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
+WORTH = 0.01  # of the drive: what is taken away need not be larger than the random torque beside it
+SMALL = "there, but small"  # how a refusal begins of what is significant and not worth a parameter
 GAUGE = 1e-4  # of a column's square outside the base columns
 DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
 
@@ -61,6 +63,11 @@ class TorqueJudgement:
     harm: float
     removed: float
     refused: str = ""
+
+    @property
+    def small(self) -> bool:
+        """Whether it is there, but not worth a parameter."""
+        return self.refused.startswith(SMALL)
 
     @property
     def dof(self) -> int:
@@ -153,14 +160,18 @@ class TorqueJudge:
             harm,
             removed,
         )
-        return replace(found, refused=self._refusal(found))
+        noise = np.array([n.size for n in self.noise]) / self.drive
+        return replace(found, refused=self._refusal(found, 100.0 * _rms(noise[own])))
 
-    def _refusal(self, found: TorqueJudgement) -> str:
+    def _refusal(self, found: TorqueJudgement, random: float) -> str:
+        """Why a candidate is not let in; `random`: torque that follows no law, in percent of the drive."""
         needed = HELPED_BY_COMMAND if found.hypothesis.here.effect.id in DRIVEN else HELPED
         if found.net <= NET:
             return "it would explain no more than chance beside disturbances with a memory"
-        if found.share <= SHARE or found.common <= COMMON or found.removed <= 100.0 * ABSOLUTE:
-            return f"there, but small: {100 * max(found.share, 0.0):.1f} % of the squared missing torque"
+        least = max(100.0 * ABSOLUTE, min(100.0 * WORTH, random))
+        if found.share <= SHARE or found.common <= COMMON or found.removed <= least:
+            share = f"{100 * max(found.share, 0.0):.1f} % of the squared missing torque"
+            return f"{SMALL}: {share}, {found.removed:.2g} % of the drive's"
         if found.helped < needed * found.blocks:
             return f"it helps on {found.helped} of {found.blocks} blocks left out"
         if found.harm > HARM:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.priors import DynamicsPrior
-from jointscope.graphs.judging.elastic_reaction import is_spring, reaction_column
+from jointscope.graphs.judging.elastic_reaction import beside_springs, is_spring, reaction_column
 from jointscope.graphs.judging.torque_steps import TorqueSteps
 from jointscope.graphs.problem.standstill import near, slowest_speed
 from jointscope.graphs.scoring.columns.column import Column
@@ -84,6 +84,7 @@ class TorqueEquations:
         signals: of each segment, with accelerations of the motion and the commands that these ask for, not those that
             were logged: they hold what is missing, and in a loop the disturbances, too.
         expected, sigma: change of the base parameters that their prior expects, and its standard deviation, shape (p,).
+        band: frequency at which the windows let half of the amplitude pass [Hz].
     """
 
     steps: Sequence[TorqueSteps]
@@ -92,18 +93,20 @@ class TorqueEquations:
     signals: list[ScoreSignals]
     expected: Array
     sigma: Array
+    band: float
 
     @staticmethod
-    def of(segments: Sequence[Segment], band: float) -> TorqueEquations:
+    def of(segments: Sequence[Segment], band: float, springs: Sequence[EffectHypothesis] = ()) -> TorqueEquations:
         """From segments of a robot whose joints are all rigid.
 
         Args:
             segments: linearised at the base model's solution.
             band: frequency at which the window lets half of the amplitude pass [Hz].
+            springs: that swing behind these joints, see `known_springs`.
         """
         robot = segments[0].problem.robot
         windows = [[_window(s, j, band) for j in range(robot.n)] for s in segments]
-        steps = [TorqueSteps.of(s) for s in segments]
+        steps = [beside_springs(TorqueSteps.of(s), springs) for s in segments]
         gains = [
             part.columns([Column(in_steps=by) for by in np.moveaxis(part.segment.signals.response, 2, 0)])
             for part in steps
@@ -129,9 +132,11 @@ class TorqueEquations:
             slowest = max(_slowest(s, j) for s in segments)
             found.append(TorqueRows(joint, times, missing, base, drive, q, v, slowest))
         prior = DynamicsPrior.of(robot)
-        expected = -prior.residual((), segments[0].calibration)[0]
+        shapes = sum(len(spring.shapes) for spring in springs)
+        expected = np.concatenate([-prior.residual((), segments[0].calibration)[0], np.zeros(shapes)])
+        sigma = np.concatenate([prior.sigma, np.ones(shapes)])
         signals = [_asked_for(part.segment, part.missing, by) for part, by in zip(steps, gains, strict=True)]
-        return TorqueEquations(steps, windows, found, signals, expected, prior.sigma)
+        return TorqueEquations(steps, windows, found, signals, expected, sigma, band)
 
     @property
     def period(self) -> float:

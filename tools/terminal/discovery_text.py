@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from jointscope.graphs.discovery.diagnosis_words import there_but_small
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.tools.presentation.candidate_numbers import effect_rows
 from jointscope.tools.presentation.model_answer import discovery_answer, unexplained_share
@@ -17,6 +18,8 @@ def discovery_text(result: Discovery) -> str:
     paragraphs = [f"  - {step.paragraph}" for step in result.steps if step.paragraph]
     parts = ["\n".join([answer.headline, answer.why, *paragraphs]), waterfall_text(result), _sizes(result)]
     last = result.steps[-1].diagnosis
+    if last is not None and last.small:
+        parts.append(there_but_small(last.small))
     if last is not None and not result.adequate:
         parts.append(ranking_text(last))
     parts.append(f"Stopped: {result.stop_reason}")

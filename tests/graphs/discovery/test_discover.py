@@ -25,6 +25,7 @@ class MadeUp:
         self.hidden, self.idle, self.calibrated, self.diagnosed, self.torque = hidden, idle, [], [], torque
         self.runs_away = runs_away
         patch.setattr(search, "BaseModel", SimpleNamespace(of=self.calibrate))
+        patch.setattr(search, "starting_model", self.calibrate)
         patch.setattr(search, "diagnose", self.diagnose)
         patch.setattr(search, "compare_model", lambda label, robot, recording: self.compare(robot))
         patch.setattr(search, "judged_error", lambda base, robot, *rest: SimpleNamespace(error=self.error(robot)))

@@ -8,9 +8,8 @@ from jointscope.graphs.discovery.torque_verdicts import _simplest_first
 
 
 def order(scores, verdict="missing"):
-    best = max(scores.values())
     found = [Candidate(effect, "j", s, 1, 0.0, {}, verdict) for effect, s in scores.items()]
-    return [c.effect for c in sorted(found, key=lambda c: _simplest_first(c, c.score, best))]
+    return [c.effect for c in _simplest_first(found, {c.label: c.score for c in found})]
 
 
 @pytest.mark.parametrize("more", [1e-9, -1e-9])
@@ -21,3 +20,10 @@ def test_the_simplest_of_equals_comes_first_whatever_rounding_says(more):
 
 def test_a_clearly_better_one_comes_first_though_it_is_less_simple():
     assert order({"torque_offset": 650.0, "asymmetric_friction": 700.0}) == ["asymmetric_friction", "torque_offset"]
+
+
+def test_a_late_drive_comes_before_clocks_that_say_the_same():
+    scores = {"clock_offset": 14021.0, "encoder_delay": 14021.0, "command_delay": 13649.0, "motor_lag": 13600.0}
+    assert order(scores) == ["command_delay", "motor_lag", "clock_offset", "encoder_delay"]
+    early = {"clock_offset": 14021.0, "encoder_delay": 14020.0}  # no drive acts before it is told
+    assert order(early) == ["clock_offset", "encoder_delay"]

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The torque that a rigid model lacks for a load behind a spring, against loads integrated sample by sample."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from jointscope.graphs.judging.elastic_reaction import reaction_column, spring_hypotheses, spring_start
+from jointscope.graphs.judging.elastic_reaction import (
+    beside_springs,
+    known_springs,
+    reaction_column,
+    spring_hypotheses,
+    spring_start,
+)
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue
 
@@ -58,6 +65,44 @@ def test_a_rigid_model_lacks_what_the_load_keeps_back(frequency, ratio):
     assert np.sqrt(np.mean((found[: len(wanted)] - wanted) ** 2)) < 0.02 * np.sqrt(np.mean(wanted**2))
 
 
+@dataclass(frozen=True)
+class Steps:
+    """Steps whose missing torque and base columns may change."""
+
+    segment: SimpleNamespace
+    missing: np.ndarray
+    base: np.ndarray
+
+
+def test_what_a_known_spring_keeps_back_is_not_missing_and_its_error_is_a_base_column():
+    rng = np.random.default_rng(6)
+    accelerations = np.convolve(rng.normal(size=3000), np.ones(40) / 40.0)[:3000] * 20.0
+    accelerations[:100] = 0.0
+    (true,) = known_springs(elastic(12.0, 0.05), rigid())
+    assert true.shapes == pytest.approx({"frequency": 12.0, "damping_ratio": 0.05})
+    bare = steps_of(accelerations)
+    steps = Steps(bare.segment, reaction_column(bare, true)[:, :, 0] + 0.7, np.ones((2999, 1, 1)))
+    np.testing.assert_allclose(beside_springs(steps, [true]).missing, 0.7, atol=1e-12)
+    (wrong,) = known_springs(elastic(12.003, 0.0505), rigid())
+    beside = beside_springs(steps, [wrong])
+    fitted, left = np.linalg.lstsq(beside.base[:, 0], beside.missing[:, 0], rcond=None)[:2]
+    assert fitted == pytest.approx([0.7, np.log(12.0 / 12.003), np.log(0.05 / 0.0505)], rel=0.03)
+    assert left[0] < 1e-3 * np.sum((beside.missing - 0.7) ** 2)
+
+
+def elastic(frequency, ratio):
+    """A robot with a spring behind its axis."""
+    w = 2.0 * np.pi * frequency
+    values = {"compliance": 1.0 / (LOAD * w * w), "damping": 2.0 * ratio * w * LOAD}
+    parameters = {SPRING.parameter(name): SimpleNamespace(value=value) for name, value in values.items()}
+    return SimpleNamespace(effects=(SPRING,), parameters=parameters)
+
+
+def rigid():
+    """The same without."""
+    return SimpleNamespace(joints=("axis",), n=1, tree=SimpleNamespace(mass_matrix=lambda q: np.array([[[LOAD]]])))
+
+
 def test_resonances_that_the_ticks_hardly_show_are_not_tried():
     slow = [h.shapes["frequency"] for h in spring_hypotheses(SPRING, 0.01)]
     fast = [h.shapes["frequency"] for h in spring_hypotheses(SPRING, 0.001)]
@@ -65,7 +110,7 @@ def test_resonances_that_the_ticks_hardly_show_are_not_tried():
 
 
 def test_a_spring_starts_at_its_resonance():
-    robot = SimpleNamespace(joints=("axis",), n=1, tree=SimpleNamespace(mass_matrix=lambda q: np.array([[[LOAD]]])))
+    robot = rigid()
     hypothesis = SimpleNamespace(here=SPRING, shapes={"frequency": 10.0, "damping_ratio": 0.05})
     start = spring_start(robot, hypothesis)
     w = np.sqrt(1.0 / (start["compliance"] * LOAD))

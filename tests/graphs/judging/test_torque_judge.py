@@ -89,6 +89,16 @@ def test_what_is_there_but_small_is_said_and_not_let_in():
     assert faint.refused.startswith("there, but small")
 
 
+@pytest.mark.parametrize(("force", "small"), [(0.25, True), (0.6, False)])
+def test_what_takes_less_than_the_random_torque_beside_it_is_small(force, small):
+    judge = axis(2, lambda q, v: force + 0.0 * v, seconds=60.0)
+    drive = judge.drive[0]
+    assert 0.003 * drive < 0.25 < SIZE < 0.01 * drive  # so that the random torque decides
+    found = judge.judge([hypothesis(one)])
+    assert found.net > 12.0 and found.share > 0.05 and found.small == small
+    assert small or not found.refused
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_disturbance_with_a_memory_is_no_effect(seed):
     judge = axis(seed, lambda q, v: 0.0 * v)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from jointscope.graphs.discovery.diagnosis_words import there_but_small
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.tools.presentation.candidate_numbers import share_text
 from jointscope.tools.presentation.model_answer import changes, discovery_answer, judged_error, unexplained_share
@@ -24,5 +25,7 @@ def discovery_verdict(result: Discovery) -> Section:
         (str(len(changes(result))), f"effects changed, {len(result.steps)} models calibrated"),
     ]
     told = [step.paragraph for step in result.steps if step.paragraph]
+    if last.diagnosis is not None and last.diagnosis.small:
+        told.append(there_but_small(last.diagnosis.small))
     told.append(f"Stopped: {result.stop_reason}")
     return answer_box("verdict", "Which effects did the model lack?", discovery_answer(result), figures, told)
