@@ -149,3 +149,8 @@ def beyond_gap(x: Any, half: Any) -> Any:
     """What is left of x beyond a dead zone from -half to half, corners rounded; exactly x at half = 0."""
     outer, inner = (x + half) / GAP_CORNER, (x - half) / GAP_CORNER
     return x - 0.5 * GAP_CORNER * (log_cosh(outer) - log_cosh(inner))
+
+
+def within_gap(x: Any, half: Any) -> Any:
+    """1 within such a dead zone, 0 beyond it, corners rounded."""
+    return 0.5 * (np.tanh((x + half) / GAP_CORNER) - np.tanh((x - half) / GAP_CORNER))

@@ -6,18 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
-from jointscope.robots.effect_kinds.joint_torque import GAP_CORNER, JointSignals, JointTorque, beyond_gap
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, beyond_gap, within_gap
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
     """K (dz(deflection, g) - deflection) - D rate within the gap [N m], corners rounded; exactly zero at g = 0."""
-    outer, inner = (s.deflection + p["half_gap"]) / GAP_CORNER, (s.deflection - p["half_gap"]) / GAP_CORNER
-    within = 0.5 * (np.tanh(outer) - np.tanh(inner))
-    damper = s.tau_spring - s.stiffness * s.deflection
-    return s.stiffness * (beyond_gap(s.deflection, p["half_gap"]) - s.deflection) - damper * within
+    d, half = s.deflection, p["half_gap"]
+    damper = s.tau_spring - s.stiffness * d
+    return s.stiffness * (beyond_gap(d, half) - d) - damper * within_gap(d, half)
 
 
 EFFECT = JointTorque(

@@ -2,8 +2,8 @@
 """A dead zone in front of a spring that has a curve of its own.
 
 The curve's free terms bend until they look like the dead zone, and its derivative at null, the slope of that curve, has
-nothing left to explain. What a polynomial cannot follow is the corner: so the torque of a spring that begins beyond a
-gap is tried, for gaps on a grid over the deflections that occur.
+nothing left to explain. What a polynomial cannot follow is the corner: so the torques of a spring and of a damper that
+begin beyond a gap are tried, for gaps on a grid over the deflections that occur.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, beyond_gap, within_gap
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import cannot_be_added
 from jointscope.robots.model.robot import Robot
@@ -25,7 +25,7 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 TRIED = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # of the largest deflection
-BEYOND = "stiffness"  # the size of such a hypothesis: of the spring that begins beyond the gap
+BEYOND = ("stiffness", "damping")  # sizes of such a hypothesis: of the spring and of the damper beyond the gap
 
 
 def gap_hypotheses(segments: Sequence[ScoreSignals]) -> list[EffectHypothesis]:
@@ -40,10 +40,20 @@ def gap_hypotheses(segments: Sequence[ScoreSignals]) -> list[EffectHypothesis]:
                 continue
             j = robot.joints.index(owner)
             largest = max(float(np.max(np.abs(deflection(s, j)))) for s in segments)
-            known = robot.parameters[f"{owner}.stiffness"]
-            size = EffectParameter(BEYOND, known.unit, known.prior, known.prior_sigma or known.prior, sign="+")
-            found += [EffectHypothesis(here, (size,), {effect.gap: share * largest}) for share in TRIED]
+            known = [robot.parameters[f"{owner}.{name}"] for name in BEYOND]
+            sizes = tuple(
+                EffectParameter(name, p.unit, p.prior, p.prior_sigma or p.prior, sign="+")
+                for name, p in zip(BEYOND, known, strict=True)
+            )
+            found += [EffectHypothesis(here, sizes, {effect.gap: share * largest}) for share in TRIED]
     return found
+
+
+def torque_beyond(signals: JointSignals, name: str, half: float) -> Array:
+    """Torque of a spring or a damper that begins beyond a gap, by its stiffness or its damping, shape (m + 1,)."""
+    if name == BEYOND[0]:
+        return np.asarray(beyond_gap(signals.deflection, half))
+    return np.asarray(signals.deflection_rate * (1.0 - within_gap(signals.deflection, half)))
 
 
 def curves_of(robot: Robot, gap: EffectAt) -> list[EffectAt]:

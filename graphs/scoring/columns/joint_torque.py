@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.column import STEP, Column, null_values
-from jointscope.graphs.scoring.columns.gap import curves_of
+from jointscope.graphs.scoring.columns.gap import curves_of, torque_beyond
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.dynamics.transmission import is_behind
-from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, beyond_gap
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     found = []
     for size in hypothesis.sizes:
         if effect.gap in hypothesis.shapes:
-            slope = beyond_gap(signals.deflection, hypothesis.shapes[effect.gap])
+            slope = torque_beyond(signals, size.name, hypothesis.shapes[effect.gap])
         else:
             slope = np.imag(effect.law(signals, {**p, size.name: p[size.name] + 1j * STEP})) / STEP
         if size.name == effect.gap:
