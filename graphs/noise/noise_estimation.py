@@ -24,7 +24,6 @@ from jointscope.factors.factor import Linearization
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.batch_solver import (
-    LAMBDA_START,
     NewtonStep,
     Progress,
     Solution,
@@ -33,7 +32,7 @@ from jointscope.graphs.solving.batch_solver import (
     solve,
     total_cost,
 )
-from jointscope.graphs.solving.convergence import measured_rows, short_step
+from jointscope.graphs.solving.convergence import LAMBDA_START, measured_rows, short_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts

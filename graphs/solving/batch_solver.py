@@ -20,6 +20,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.convergence import (
+    LAMBDA_START,
     Iteration,
     has_converged,
     is_crawling,
@@ -39,7 +40,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
-LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
