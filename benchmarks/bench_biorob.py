@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of the BioRob beside what is measured, on recordings that another program simulated.
 
-Usage: python benchmarks/bench_biorob.py [clean | nothing | deadzone | idler | hall ...]; the recordings lie in ../shared/data/biorob.
+Usage: python benchmarks/bench_biorob.py [clean | nothing | deadzone | idler | hall ...]; the recordings lie in
+../shared/data/biorob.
 """
 
 from __future__ import annotations
