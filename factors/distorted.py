@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block
 from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import GyroFactor
+from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
@@ -36,7 +37,7 @@ class DistortedFactor:
         fixed: parameters that calibration leaves alone, by full name.
     """
 
-    inner: GyroFactor | MotorEncoderFactor
+    inner: GyroFactor | LinkEncoderFactor | MotorEncoderFactor
     effects: tuple[tuple[EffectAt, NDArray[np.intp]], ...]
     times: Array
     fixed: Mapping[str, float]

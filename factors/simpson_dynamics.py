@@ -29,7 +29,7 @@ class SimpsonDynamics(DynamicsFactor):
         u, steps = self.command(parameters), self.steps
         a0 = self.model.accelerations(x0, u, parameters, steps.begins)
         a1 = self.model.accelerations(x1, u, parameters, steps.ends)
-        a_mid = self.model.accelerations(self._middle(x0, x1, a0, a1), u, parameters, steps.throughout)
+        a_mid = self.model.accelerations(self.middle(x0, x1, a0, a1), u, parameters, steps.throughout)
         return self._defects(x0, x1, a0, a_mid, a1)
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
@@ -50,7 +50,8 @@ class SimpsonDynamics(DynamicsFactor):
         a0, a1, rigid = self.model.at_ticks(x, self.command(values), values, self.steps.at_ticks)
         return self._linearize(x[:-1], x[1:], a0, a1, calibration, rigid)
 
-    def _middle(self, x0: Array, x1: Array, a0: Array, a1: Array) -> Array:
+    def middle(self, x0: Array, x1: Array, a0: Array, a1: Array) -> Array:
+        """States in the middle of m steps, from states and accelerations at both ends, shape (m, d)."""
         h, layout = self.steps.h[:, None], self.model.layout
         middle = 0.5 * (x0 + x1)
         middle[:, layout.positions] += h / 8.0 * (x0 - x1)[:, layout.velocities]
@@ -76,7 +77,7 @@ class SimpsonDynamics(DynamicsFactor):
         from jointscope.factors.step_kernel import step_derivatives  # numba takes half a second to import
 
         layout, values = self.model.layout, calibration.values
-        middle = self._middle(x0, x1, a0.value, a1.value)
+        middle = self.middle(x0, x1, a0.value, a1.value)
         mid = self.model.with_derivatives(middle, self.command(values), values, rigid, self.steps.throughout)
         m, r, d = mid.by_state.shape
         k, p = len(layout.positions), mid.by_parameter.shape[2]

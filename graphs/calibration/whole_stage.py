@@ -45,6 +45,7 @@ SIGMA_AGREES = 0.05  # the same for the sigma of an encoder
 NOISE_PASSES = 10  # at the most; where the noise of the windows was right, one does
 MOST_ITERATIONS = 100  # models that contradict the recording converge slowly
 FEW_ITERATIONS = 12
+NEAR = 0.5  # [sigma] a last step that is short enough for a start
 NUISANCE = 0.3  # [sigma] biases need no more where the parameters are held
 SMALL_STEP = 0.1  # [sigma] a last step that changes no value
 BLUNT = (20.0, 60.0)  # [s/rad] friction sharpness on the way to that of the robot
@@ -223,7 +224,7 @@ def approach(
     now = [p.with_noise(loose) for p in problems]
     start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
     found = first_step(now, start, hold)
-    return found or solve(now, start, max_iterations=FEW_ITERATIONS, hold=hold).estimate
+    return found or solve(now, start, max_iterations=FEW_ITERATIONS, step_tolerance=NEAR, hold=hold).estimate
 
 
 def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:

@@ -31,7 +31,7 @@ from jointscope.robots.errors import SolveError
 Array = NDArray[np.float64]
 
 PIECE = 0.5  # [s] of filtered states from each run
-SETTLED, ROUNDS = 1e-6, 10  # [sigma] largest change of the last round; rounds of linear steps at the most
+SETTLED, ROUNDS = 1e-4, 10  # [sigma] largest change of the last round, the next is a tenth; rounds at the most
 SHRINKS, ROUNDING = 0.5, 0.02  # of the round before; [sigma] changes that no longer do so and are rounding
 BURN_IN = 0.5  # [s] that each run starts earlier; a state is forgotten within a few tenths of a second
 

@@ -20,7 +20,6 @@ from jointscope.graphs.calibration.external_torque import external_torques_of
 from jointscope.graphs.calibration.whole_stage import approach
 from jointscope.graphs.comparison.causal_filter import filter_states
 from jointscope.graphs.comparison.comparison_result import (
-    OPEN_LOOP,
     ChannelComparison,
     ComparisonResult,
     ModelComparison,
@@ -29,6 +28,7 @@ from jointscope.graphs.comparison.comparison_result import (
 )
 from jointscope.graphs.comparison.free_run import FreeRun, free_run
 from jointscope.graphs.comparison.noise_floor import SETTLING, channel_floors
+from jointscope.graphs.comparison.open_loop import Horizons, OpenLoop
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -89,7 +89,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
     predictor = Predictor(robot, problem.timeline)
     causal = filter_states(problem, states, calibration)
     ahead = {h: predict_ahead(problem, calibration, predictor, causal, h) for h in HORIZONS}
-    open_loop = predict_open_loop(problem, calibration, predictor, states[0])
+    open_loop = OpenLoop(lambda: predict_open_loop(problem, calibration, predictor, states[0]))
     sensors = {
         name: _sensor_prediction(recording.streams[name], robot.sensors[name], ahead, open_loop)
         for name in robot.sensors
@@ -151,7 +151,7 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
 
 
 def _sensor_prediction(
-    stream: Stream, sensor: Sensor, ahead: dict[float, dict[str, Ahead]], open_loop: dict[str, Array]
+    stream: Stream, sensor: Sensor, ahead: dict[float, dict[str, Ahead]], open_loop: OpenLoop
 ) -> SensorPrediction:
     at_samples = {}
     for horizon in (HORIZONS[0], HORIZON):
@@ -163,7 +163,7 @@ def _sensor_prediction(
         sensor.sigmas,
         stream.times,
         stream.values,
-        np.where(np.isfinite(open_loop[sensor.name]), open_loop[sensor.name], np.nan),
+        open_loop.of(sensor.name),
         at_samples[HORIZON],
         at_samples[HORIZONS[0]],
     )
@@ -179,17 +179,17 @@ def _predicted_motion(robot: Robot, recording: Recording, ahead: dict[str, Ahead
 
 
 def _channels(
-    robot: Robot, recording: Recording, ahead: dict[float, dict[str, Ahead]], open_loop: dict[str, Array]
+    robot: Robot, recording: Recording, ahead: dict[float, dict[str, Ahead]], open_loop: OpenLoop
 ) -> dict[str, ChannelComparison]:
     found = {}
     for name, sensor in robot.sensors.items():
         measured = recording.streams[name].measured
         for j, channel in enumerate(sensor.channels):
-            horizons = {}
+            known = {}
             for horizon, predictions in ahead.items():
                 p = predictions[name]
-                horizons[str(horizon)] = _rms(measured[p.sample, j] - p.predicted[:, j])
-            horizons[OPEN_LOOP] = _rms(measured[:, j] - open_loop[name][:, j])
+                known[str(horizon)] = _rms(measured[p.sample, j] - p.predicted[:, j])
+            horizons = Horizons(known, _open_loop_error(open_loop, name, measured[:, j], j))
             p = ahead[HORIZON][name]
             seen = ~np.isnan(p.predicted[:, j])
             y, predicted = measured[p.sample[seen], j], p.predicted[seen, j]
@@ -197,6 +197,11 @@ def _channels(
             fit = 100.0 * (1.0 - float(np.linalg.norm(y - predicted)) / spread) if spread > 0 else float("nan")
             found[channel] = ChannelComparison(horizons, fit, float(sensor.sigmas[j]), sensor.units[j])
     return found
+
+
+def _open_loop_error(open_loop: OpenLoop, sensor: str, measured: Array, column: int) -> Callable[[], float]:
+    """Finds the error of one channel."""
+    return lambda: _rms(measured - open_loop.sensors[sensor][:, column])
 
 
 def _rms(error: Array) -> float:

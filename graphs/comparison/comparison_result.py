@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +18,6 @@ from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 
-OPEN_LOOP = "open_loop"
 AHEAD, LOOP = "0.1 s ahead", "of the loop simulated from its goals"  # what a model is judged by ...
 BETWEEN = "of each sensor from the others"  # ... and where links are free
 SENSOR_NOISE = 1.0  # [sigma]
@@ -35,7 +34,7 @@ class ChannelComparison:
         unit: SI unit of rmse and sigma.
     """
 
-    horizons: dict[str, float]
+    horizons: Mapping[str, float]
     fit_percent: float
     noise_sigma: float
     unit: str
@@ -67,7 +66,7 @@ class SensorPrediction:
         sigmas: standard deviation of the sensor's noise, shape (c,).
         times: sample times, shape (m,) [s].
         measured: shape (m, c).
-        open_loop: predicted from the first state with the recorded commands alone, shape (m, c).
+        free: finds `open_loop`, or is it.
         ahead: predicted 0.1 s ahead from the causal state, shape (m, c); NaN where no prediction ends.
         soon: the same 0.01 s ahead, ends 0.01 s apart; None where it was not kept.
     """
@@ -77,9 +76,14 @@ class SensorPrediction:
     sigmas: Array
     times: Array
     measured: Array
-    open_loop: Array
+    free: Array | Callable[[], Array]
     ahead: Array
     soon: Array | None = None
+
+    @property
+    def open_loop(self) -> Array:
+        """Predicted from the first state with the recorded commands alone, shape (m, c)."""
+        return self.free() if callable(self.free) else self.free
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ def _model_json(model: ModelComparison) -> dict[str, Any]:
         "error": model.error,
         "floor": model.floor,
         "channels": {
-            name: {"horizons": c.horizons, "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
+            name: {"horizons": dict(c.horizons), "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
             for name, c in model.channels.items()
         },
         "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in model.worst],

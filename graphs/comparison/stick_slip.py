@@ -92,4 +92,4 @@ class StickSlip:
         """Acceleration of the motors by friction against a direction, shape (s, n)."""
         x = x.copy()
         x[:, self._v] = np.where(x[:, self._v] * direction > 0.0, x[:, self._v], CREEP * direction)
-        return self._dry.of_motors(x) - self._smooth.of_motors(x)
+        return self._dry.by_friction(x) - self._smooth.by_friction(x)

@@ -15,6 +15,7 @@ from scipy.special import chdtrc
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.noise.noise_estimation import scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.gap import gap_hypotheses
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
@@ -87,7 +88,8 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
     segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
     test, scan = ScoreTest(segments), scan_orders(segments)
     best, tried = dict[str, HypothesisScore](), Counter[str]()
-    for score in test.each(hypotheses_of(base.robot, scan.orders)):
+    hidden = gap_hypotheses([segment.signals for segment in segments])
+    for score in test.each([*hypotheses_of(base.robot, scan.orders), *hidden]):
         label = score.hypothesis.label
         tried[label] += scan.searched.get(label, 1)
         if label not in best or score.plausible[0] > best[label].plausible[0]:

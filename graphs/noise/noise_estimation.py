@@ -32,7 +32,7 @@ from jointscope.graphs.solving.batch_solver import (
     solve,
     total_cost,
 )
-from jointscope.graphs.solving.convergence import measured_rows, short_step
+from jointscope.graphs.solving.convergence import LAMBDA_START, measured_rows, short_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts
@@ -175,11 +175,11 @@ def estimate_noise(
         The noise, and the estimate that belongs to it.
     """
     noise = problems[0].dynamics.steps.noise
-    iteration = FixedPoint()
+    iteration, damping = FixedPoint(), LAMBDA_START
     for cycle in range(cycles):
         if progress:
             progress("process noise", cycle / cycles)
-        evidence, estimate = _cycle([p.with_noise(noise) for p in problems], estimate, hold)
+        evidence, estimate, damping = _cycle([p.with_noise(noise) for p in problems], estimate, hold, damping)
         before, noise = noise, iteration.update(noise, evidence.factors)
         if settled(before, noise):
             break
@@ -187,9 +187,12 @@ def estimate_noise(
 
 
 def _cycle(
-    problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str], damped: bool = False
-) -> tuple[NoiseEvidence, Estimate]:
-    """Evidence and estimate one Gauss-Newton step further, from one linearization."""
+    problems: Sequence[BagProblem], estimate: Estimate, hold: Sequence[str], damping: float, damped: bool = False
+) -> tuple[NoiseEvidence, Estimate, float]:
+    """Evidence and estimate one Gauss-Newton step further, from one linearization.
+
+    Checked steps, where they have to be taken, begin with a damping; the last result is that for those of next time.
+    """
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
@@ -202,7 +205,8 @@ def _cycle(
     if far or total_cost(problems, step.estimate) > cost_at(problems, here):
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
-            return _cycle(problems, solve(problems, estimate, max_iterations=2, hold=hold).estimate, hold, damped=True)
+            near = solve(problems, estimate, max_iterations=2, hold=hold, damping=damping)
+            return _cycle(problems, near.estimate, hold, near.next_damping, damped=True)
         step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
     found, _ = posteriors(problems, here, hold, eliminations)
     evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
@@ -213,7 +217,7 @@ def _cycle(
         moved = [(factor, ticks, after_step(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
         for part in residual_parts(moved, estimate.calibrations[i], posterior):
             evidence.add(part)
-    return evidence, step.estimate
+    return evidence, step.estimate, damping
 
 
 def after_step(

@@ -27,6 +27,7 @@ from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.problem.coarse_encoder import shared_error
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.spring_torques import SpringTorques
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
@@ -185,9 +186,7 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
         times: stamps since the start of the recording, shape (m,) [s].
     """
     sensor = robot.sensors[name]
-    inner: GyroFactor | MotorEncoderFactor
-    if isinstance(sensor, LinkEncoder):
-        return LinkEncoderFactor(sensor, values, robot.layout)
+    inner: GyroFactor | LinkEncoderFactor | MotorEncoderFactor
     if isinstance(sensor, Accelerometer):
         body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
         seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
@@ -197,6 +196,9 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     if isinstance(sensor, MotorEncoder):
         inner = MotorEncoderFactor(sensor, values, robot.layout)
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
+    elif isinstance(sensor, LinkEncoder):
+        inner = LinkEncoderFactor(sensor, values, robot.layout)
+        seats = {f"{joint}{LINK_SIDE}": np.array([j]) for j, joint in enumerate(robot.joints)}
     else:
         inner = GyroFactor(sensor, values, robot.kinematic_tree, robot.layout)
         seats = {name: np.arange(len(sensor.channels))}

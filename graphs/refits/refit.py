@@ -17,6 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.refits.gap_start import with_hidden_gap
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -69,7 +70,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
     """
     robot = base.robot
     if score is not None:
-        robot = add_effect(robot, score.hypothesis.label, start_of(score, robot))
+        robot = with_hidden_gap(add_effect(robot, score.hypothesis.label, start_of(score, robot)), base, score)
     elif label and not robot.has_effect(*label.split("@")):
         robot = add_effect(robot, label)
     # noise that is next to nothing holds the states where the model without the effect has them
@@ -106,7 +107,7 @@ def start_of(score: HypothesisScore, robot: Robot) -> dict[str, float]:
     for size, value in zip(score.hypothesis.sizes, score.estimate, strict=True):
         start[size.name] = max(float(value), SMALLEST_START * size.start) if size.logarithmic else float(value)
     known = {p.name for p in here.effect.parameters_at(robot, here.owner)}
-    start |= {name: value for name, value in score.hypothesis.shapes.items() if name in known}
+    start = {name: value for name, value in (start | dict(score.hypothesis.shapes)).items() if name in known}
     if isinstance(here.effect, Structure) and here.effect.form == "bearing":
         start |= _bearing_start(score, robot)
     return start

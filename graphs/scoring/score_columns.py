@@ -10,6 +10,8 @@ passed through a resonance; gyros see its rate, the joints its inertia. How each
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from jointscope.graphs.scoring.columns.bearing import bearing_columns
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.command import command_columns
@@ -21,6 +23,7 @@ from jointscope.graphs.scoring.columns.reading import late_column, reading_colum
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.columns.transmission import transmission_columns
+from jointscope.graphs.scoring.score_system import Segment
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
@@ -29,6 +32,15 @@ from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.effect_kinds.transmission_elements import TransmissionElements
+
+
+def regressors_of(hypothesis: EffectHypothesis, segment: Segment) -> list[Column]:
+    """One column for each size of a hypothesis, looked at wherever the rule of integration looks."""
+    found = columns_of(hypothesis, segment.signals)
+    if segment.middle is None or all(column.at_ticks is None for column in found):
+        return found
+    between = columns_of(hypothesis, segment.middle[0])
+    return [replace(column, between=b.at_ticks) for column, b in zip(found, between, strict=True)]
 
 
 def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:

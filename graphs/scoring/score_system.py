@@ -68,6 +68,13 @@ class Segment:
         return Segment(problem, calibration, ScoreSignals.of(problem, x, calibration), linearized, stamps, elimination)
 
     @cached_property
+    def middle(self) -> tuple[ScoreSignals, Array] | None:
+        """As `ScoreSignals.between`; None for other rules than Simpson's, which do not look there."""
+        if not isinstance(self.problem.dynamics, SimpsonDynamics):
+            return None
+        return ScoreSignals.between(self.problem, self.signals.x, self.calibration)
+
+    @cached_property
     def whitened(self) -> list[Whitened]:
         """Residual and derivatives of every piece of `linearized`, whitened; the same for every batch of hypotheses."""
         return [whitened(factor, linear) for factor, _, linear in self.linearized]
@@ -108,6 +115,7 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[ScoreRows]:
         for kind in ("at_ticks", "in_steps", "reading")
     )
     stacked = _stacked([columns[i].at_ticks for i in at_ticks]), _stacked([columns[i].in_steps for i in in_steps])
+    between = _stacked([columns[i].between for i in at_ticks])
     found = []
     pieces = zip(segment.linearized, segment.whitened, segment.stamps, strict=True)
     for (factor, ticks, linear), (r, J, by_block), stamps in pieces:
@@ -116,7 +124,11 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[ScoreRows]:
         if isinstance(factor, DynamicsFactor):
             by_size = np.zeros((*r.shape, len(columns)))
             if at_ticks:
-                by_size[:, :, at_ticks] = _defects(factor.steps, stacked[0][ticks], stacked[0][ticks + 1])
+                ends = stacked[0][ticks], stacked[0][ticks + 1]
+                if segment.middle is not None and between.shape[2] == len(at_ticks):
+                    by_size[:, :, at_ticks] = _simpson(factor.steps, *ends, between[ticks], segment.middle[1][ticks])
+                else:
+                    by_size[:, :, at_ticks] = _defects(factor.steps, *ends)
             for i, column in enumerate(columns):
                 if column.better_integrator:
                     by_size[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
@@ -186,6 +198,22 @@ def _defects(steps: Steps, first: Array, last: Array) -> Array:
     return steps.combine(-0.5 * h * (first + last), d_q)
 
 
+def _simpson(steps: Steps, first: Array, last: Array, middle: Array, by_rates: Array) -> Array:
+    """The same by Simpson's rule, whose middle moves along; shape (s, rows, k).
+
+    Args:
+        steps: their lengths and noise.
+        first: accelerations where each step begins, shape (s, r, k).
+        last: the same where it ends.
+        middle: the same between.
+        by_rates: derivative of all accelerations by the rates in the middle, shape (s, r, r).
+    """
+    h = steps.h[:, None, None]
+    moved = middle + by_rates @ (h / 8.0 * (first - last))
+    d_q = -(h**2) / 12.0 * (first - last)[:, : len(steps.layout.positions)]
+    return steps.combine(-h / 6.0 * (first + 4.0 * moved + last), d_q)
+
+
 def _what_simpson_adds(
     segment: Segment, factor: DynamicsFactor, ticks: NDArray[np.intp], linear: Linearization
 ) -> Array:
@@ -196,7 +224,8 @@ def _what_simpson_adds(
 
 
 def _stacked(parts: list[Array | None]) -> Array:
-    return np.stack([part for part in parts if part is not None], axis=2) if parts else np.zeros((0, 0, 0))
+    there = [part for part in parts if part is not None]
+    return np.stack(there, axis=2) if there else np.zeros((0, 0, 0))
 
 
 def _sensor_part(

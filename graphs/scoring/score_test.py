@@ -21,7 +21,7 @@ from jointscope.factors.priors import shared_priors
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep, JointScores, fit
-from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
@@ -96,7 +96,7 @@ class ScoreTest:
             columns.append(slice(k, k + len(hypothesis.sizes)))
             k += len(hypothesis.sizes)
         for segment in self._segments:
-            regressors = [column for hypothesis in hypotheses for column in columns_of(hypothesis, segment.signals)]
+            regressors = [column for hypothesis in hypotheses for column in regressors_of(hypothesis, segment)]
             parts.append(rows_of(segment, regressors))
         H, g, W = self._assembled(parts, k)
         S, s, response = self._profile(H, g, k)

@@ -20,6 +20,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.convergence import (
+    LAMBDA_START,
     Iteration,
     has_converged,
     is_crawling,
@@ -39,7 +40,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
-LAMBDA_START = 1e-9
 LAMBDA_FACTOR = 30.0
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
@@ -65,6 +65,12 @@ class Solution:
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
+
+    @property
+    def next_damping(self) -> float:
+        """The one to begin with where another solve goes on from here."""
+        last = self.iterations[-1].damping if self.iterations else LAMBDA_START
+        return max(last / LAMBDA_FACTOR, LAMBDA_START)
 
 
 class Solver(Protocol):
@@ -92,6 +98,7 @@ def solve(
     progress: Progress | None = None,
     first: First | None = None,
     length: int = 0,
+    damping: float = LAMBDA_START,
 ) -> Solution:
     """Minimises the cost of all recordings together.
 
@@ -104,6 +111,7 @@ def solve(
         progress: called with a text and the share done.
         first: finds values to go on from; where it finds none, or they cost more than the start, the start is taken.
         length: steps in one condensed factor; chosen by the number of samples if 0.
+        damping: the first one that is tried.
 
     Raises:
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
@@ -123,7 +131,7 @@ def solve(
     descent = _Descent(graph, values, cost, graph.costs, bends)
     if not np.isfinite(descent.cost):
         raise SolveError("the cost at the start is not finite; check start values and recording")
-    descent.run(max_iterations, step_tolerance, measured_rows(problems), progress)
+    descent.run(max_iterations, step_tolerance, measured_rows(problems), progress, damping)
     graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
     estimate = graph.estimate(descent.values)
     return Solution(
@@ -150,9 +158,8 @@ class _Descent:
     converged: bool = False
     flat: bool = False
 
-    def run(self, most: int, tolerance: float, measured: int, progress: Progress | None) -> None:
+    def run(self, most: int, tolerance: float, measured: int, progress: Progress | None, damping: float) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
-        damping = LAMBDA_START
         for i in range(most):
             if progress:
                 progress(f"iteration {i + 1}, cost {self.cost:.6g}", i / most)
@@ -178,7 +185,9 @@ class _Descent:
                 return damping
             if self.bends.raised(self.costs, costs):
                 continue
-            if 0.0 < step.in_sigmas < short_step(self.cost, tolerance, measured) and damping <= LAMBDA_START:
+            # a start says nothing yet about how well the model can fit
+            short = short_step(self.cost, tolerance, measured) if self.iterations else tolerance
+            if 0.0 < step.in_sigmas < short and damping <= LAMBDA_START:
                 # there already: only states at a kink of the friction keep the cost from falling
                 self.converged = True
                 return None

@@ -19,6 +19,8 @@ SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
 COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 CONTRADICTS = 2.0  # [sigma] root mean square residual from which a model contradicts its recording
 FLAT, FLAT_STEPS = 1e-5, 3  # relative fall of such a model's cost, so many times in a row, that ends the search
+LAMBDA_START = 1e-9  # damping of a step that is as good as undamped
+NEAR = 0.5  # [sigma] steps of a solution whose cost has kinks, as long as which it may end
 
 
 @dataclass(frozen=True)
@@ -69,10 +71,15 @@ def has_converged(iterations: Sequence[Iteration], tolerance: float, measured: i
 
 
 def is_flat(iterations: Sequence[Iteration], measured: int) -> bool:
-    """Whether a model that contradicts its recording gains nothing any more, although its values still move."""
+    """Whether a model that contradicts its recording gains nothing any more, although its values still move.
+
+    The contradiction may hide in a large process noise. It shows where kinks of a friction that fits nowhere let only
+    short, damped steps lower the cost.
+    """
     last = iterations[-FLAT_STEPS:]
     contradicts = misfit(last[-1].cost_after, measured) > CONTRADICTS
-    return contradicts and len(last) == FLAT_STEPS and all(i.fall < FLAT for i in last)
+    kinked = all(i.damping > LAMBDA_START and i.step_in_sigmas < NEAR for i in last)
+    return (contradicts or kinked) and len(last) == FLAT_STEPS and all(i.fall < FLAT for i in last)
 
 
 def is_crawling(iterations: Sequence[Iteration], measured: int) -> bool:

@@ -15,13 +15,13 @@ from jointscope.factors.calibration import DYNAMICS, rotation_block
 from jointscope.graphs.calibration.calibrate import check_recordings
 from jointscope.graphs.comparison.compare import compared, worst_windows
 from jointscope.graphs.comparison.comparison_result import (
-    OPEN_LOOP,
     SENSOR_NOISE,
     ChannelComparison,
     ComparisonResult,
     ModelComparison,
     SensorPrediction,
 )
+from jointscope.graphs.comparison.open_loop import OPEN_LOOP
 from jointscope.graphs.comparison.predictions_ahead import HORIZONS
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context

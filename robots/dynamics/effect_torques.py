@@ -50,7 +50,9 @@ class EffectTorques:
     ):
         self._layout, self._names, self._joints, self._sharpness = layout, names, joints, sharpness
         self._local = [
-            _LocalLaw(here, joints, layout, names, weight) for here in effects if isinstance(here.effect, JointTorque)
+            _LocalLaw(here, joints, layout, names, weight, here.effect.behind(effects, here.owner))
+            for here in effects
+            if isinstance(here.effect, JointTorque)
         ]
         self._global = [here for here in effects if isinstance(here.effect, RobotTorque)]
         self._weight = weight if any(law.on_weight for law in self._local) else None
@@ -178,9 +180,11 @@ class _LocalLaw:
         layout: StateLayout,
         names: tuple[str, ...],
         weight: CarriedWeight,
+        gap: str,
     ):
         assert isinstance(here.effect, JointTorque)
-        self.here, self.effect = here, here.effect
+        self.here, self.effect, self._gap = here, here.effect, gap
+        self._gap_index = names.index(gap) if gap in names else None
         j = self.joint = joints.index(here.owner)
         some = {p.name: p.start for p in here.effect.parameters}
         self.on_weight = weight.on(here.owner, here.effect, some) is not None
@@ -219,7 +223,7 @@ class _LocalLaw:
         carried = carried if self.on_weight else None
         load = springs.torque[:, j] if carried is None else carried.torque[:, j]
         motion |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
-        signals = JointSignals(**motion, sharpness=sharpness)
+        signals = JointSignals(**motion, sharpness=sharpness, gap=values[self._gap] if self._gap else None)
         p = self.here.own(values)
         self._add_law(terms, self.effect.law, self._rows, signals, p, springs, carried)
         if self.effect.memory is not None:
@@ -259,6 +263,10 @@ class _LocalLaw:
             slope = np.imag(law(replace(signals, sharpness=signals.sharpness + 1j * STEP), p)) / STEP
             for row, sign in rows:
                 terms.by_parameter[:, row, self._sharpness] += sign * slope
+        if self._gap_index is not None:
+            slope = np.imag(law(replace(signals, gap=signals.gap + 1j * STEP), p)) / STEP
+            for row, sign in rows:
+                terms.by_parameter[:, row, self._gap_index] += sign * slope
         for name, index in self._names.items():
             slope = np.imag(law(signals, {**p, name: p[name] + 1j * STEP})) / STEP
             for row, sign in rows:

@@ -51,6 +51,8 @@ class JointLawAtOneState:
         assert isinstance(here.effect, JointTorque)
         layout, j = robot.layout, robot.joints.index(here.owner)
         self._p, self._sharpness = here.own(values), robot.sharpness_of(here.owner, values)
+        gap = here.effect.behind(robot.effects, here.owner)
+        self._gap = values[gap] if gap else None
         columns = [layout.joint_q[j], layout.joint_v[j], layout.motor_q[j], layout.motor_v[j]]
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
@@ -89,6 +91,7 @@ class JointLawAtOneState:
             stiffness=self._stiffness,
             sharpness=self._sharpness,
             memory=signals[4] if len(signals) > 5 else 0.0,
+            gap=self._gap,
         )
         for law, rows in self._laws:
             found = np.broadcast_to(law(at, self._p), signals.shape[1:])

@@ -7,7 +7,7 @@ to the next is found when it is built. A test holds it against `ElasticJoints`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import StructuredTree
 
 Array = NDArray[np.float64]
+
+SILENT = 1e-4  # of its torque with friction that is a sign: less than that is nothing
 
 
 class RatesOfMany:
@@ -60,7 +62,8 @@ class RatesOfMany:
         laws = [_LawOfMany(h, robot, at_rest, values, weight, sharpness) for h in robot.effects if _is_law(h)]
         for law in laws:
             self._linear = self._linear + law.linear
-        self._laws = [law for law in laws if not law.is_linear]
+        self._laws = [law for law in laws if not (law.is_linear or law.is_silent)]
+        self._dry = [law for law in self._laws if law.is_dry]
         self._weight = weight if any(law.needs_weight for law in self._laws) else None
         self._values = values
 
@@ -92,14 +95,24 @@ class RatesOfMany:
         command = np.zeros((1, len(self._gain))) if command_torque is None else command_torque
         return self._torques(x, command)[:, self._motors] / self._inertia
 
+    def by_friction(self, x: Array) -> Array:
+        """The part of `of_motors` that depends on the sharpness of friction, shape (m, n_motor)."""
+        tau = np.zeros((len(x), self.layout.n_rates))
+        self._add_dry(x, tau, self._dry)
+        return tau[:, self._motors] / self._inertia
+
     def _torques(self, x: Array, command_torque: Array) -> Array:
         tau = x @ self._linear
-        dry = self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
-        tau[:, self.layout.motor_row] += command_torque - dry
-        load = None if self._weight is None else self._weight.torque(x, self._values)
-        for law in self._laws:
-            law.add(x, tau, load)
+        tau[:, self.layout.motor_row] += command_torque
+        self._add_dry(x, tau, self._laws)
         return tau
+
+    def _add_dry(self, x: Array, tau: Array, laws: Sequence[_LawOfMany]) -> None:
+        """Adds dry friction and the torques of some laws."""
+        tau[:, self.layout.motor_row] -= self._coulomb * np.tanh(self._sharpness * x[:, self._friction])
+        load = None if self._weight is None else self._weight.torque(x, self._values)
+        for law in laws:
+            law.add(x, tau, load)
 
     def _acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         """Of the links, with the share of the Coriolis terms that the model has, shape (m, n_link)."""
@@ -117,6 +130,8 @@ class _LawOfMany:
         needs_weight: whether it asks for what its gear carries.
         is_linear: whether it is linear in the state, as viscous friction is.
         linear: its torques per state if it is linear, else zero, shape (d, r).
+        is_dry: whether it depends on the sharpness of friction, where that is not the robot's.
+        is_silent: whether nothing is left of it with a sharpness that is none.
     """
 
     def __init__(
@@ -136,13 +151,17 @@ class _LawOfMany:
         self._joints, self._springs, self._sharpness = robot.joints, springs, robot.friction_sharpness(values)
         if sharpness is not None and isinstance(effect, JointTorque) and effect.side == "motor":
             self._sharpness = np.full(robot.n, sharpness)
-        self.needs_weight = False
+        self.needs_weight = self.is_dry = self.is_silent = False
         if isinstance(effect, JointTorque):
             link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
             rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
             self._rows = rows[effect.side]
             self._memory = layout.memories.index(here.label) if effect.memory is not None else -1
+            gap = effect.behind(robot.effects, here.owner)
+            self._gap = values[gap] if gap else None
             self.needs_weight = weight.on(here.owner, effect, self._p) is not None
+            if sharpness is not None and effect.side == "motor":
+                self._compare(sharpness)
         self.linear = self._slopes()
         self.is_linear = bool(np.any(self.linear))
 
@@ -197,6 +216,7 @@ class _LawOfMany:
             springs.stiffness[j],
             sharpness=float(self._sharpness[j]),
             memory=memory,
+            gap=self._gap,
         )
 
     def _of_robot(self, x: Array) -> RobotSignals:
@@ -212,6 +232,20 @@ class _LawOfMany:
             owner=self._joint,
             sharpness=self._sharpness,
         )
+
+    def _compare(self, sharpness: float) -> None:
+        """Finds out what the sharpness does to the law, at states of every size."""
+        layout, of_friction = self._layout, self._sharpness
+        rng, sizes = np.random.default_rng(2), 10.0 ** np.arange(-4.0, 4.0)[:, None]
+        x, load = rng.normal(size=(8, layout.size)) * sizes, rng.normal(size=(8, len(self._joints))) * sizes
+        found = np.zeros((2, 8, layout.n_rates))
+        for torque, k in zip(found, (sharpness, 1.0 / sharpness), strict=True):
+            self._sharpness = np.full(len(self._joints), k)
+            self.add(x, torque, load)
+        self._sharpness = of_friction
+        own, other = np.abs(found)
+        self.is_dry = not np.array_equal(*found)
+        self.is_silent = bool(np.any(other)) and bool(np.all(own <= SILENT * other))
 
     def _slopes(self) -> Array:
         """Torques per unit of each state; zero for a law that is not linear."""

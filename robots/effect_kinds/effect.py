@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
-OWNER_KINDS = ("joint", "gyro", "link_encoder", "robot")
+OWNER_KINDS = ("joint", "joint_link", "gyro", "link_encoder", "robot")
+LINK_SIDE = ".link"  # behind a joint's name: its encoder on the link
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,8 @@ class Effect(ABC):
         id: short name, as in ID@OWNER.
         card: what a user reads.
         parameters: of every instance; kinds whose parameters depend on the owner override `parameters_of`.
-        owners: kinds of owners: some of "joint", "gyro", "link_encoder", "robot".
+        owners: kinds of owners: some of "joint", "joint_link" (a joint's encoder on the link, JOINT.link), "gyro",
+            "link_encoder" (all of those together), "robot".
         turning: whether it can act only on joints that turn, not on prismatic ones.
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
     """
@@ -109,7 +111,8 @@ class Effect(ABC):
         on_links = () if robot.link_encoder is None else (robot.link_encoder.name,)
         gyros = tuple(g.name for g in robot.gyros)
         joints = tuple(joint for joint in robot.joints if not (self.turning and joint in robot.tree.slides))
-        by_kind = {"joint": joints, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
+        links = tuple(f"{joint}{LINK_SIDE}" for joint in joints) if on_links else ()
+        by_kind = {"joint": joints, "joint_link": links, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
         return tuple(owner for kind in self.owners for owner in by_kind[kind])
 
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:

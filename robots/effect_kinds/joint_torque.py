@@ -7,14 +7,18 @@ The law is written for complex numbers, so that its derivatives come exact from 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Effect
 
+if TYPE_CHECKING:
+    from jointscope.robots.effect_kinds.effect_at import EffectAt
+
+GAP_CORNER = 5e-4  # [rad] over which the corners of a dead zone are rounded
 SIDES = ("motor", "link", "spring")
 LOADS = ("transmitted", "weight")
 SHARPNESS = 200.0  # [s/rad] of tanh(k v) where the robot file does not say otherwise
@@ -32,6 +36,7 @@ class JointSignals:
         stiffness: K [N m/rad].
         sharpness: k of the base model's friction law [s/rad]; complex while a derivative by it is wanted.
         memory: the effect's own state, if its kind has one.
+        gap: half of the dead zone in front of the spring, which its laws do not see [rad]; None for none.
     """
 
     q_link: Any
@@ -42,11 +47,13 @@ class JointSignals:
     stiffness: Any
     sharpness: Any = SHARPNESS
     memory: Any = 0.0
+    gap: Any = None
 
     @property
     def deflection(self) -> Any:
-        """q_link - q_motor [rad]."""
-        return self.q_link - self.q_motor
+        """q_link - q_motor, what the spring feels of it [rad]."""
+        whole = self.q_link - self.q_motor
+        return whole if self.gap is None else beyond_gap(whole, self.gap)
 
     @property
     def deflection_rate(self) -> Any:
@@ -83,12 +90,24 @@ class JointTorque(Effect):
         load: what `tau_spring` of an elastic joint is: the torque that the spring transmits, or the weight behind it,
             in motor coordinates; a law on the weight does not depend on the link.
         memory: the effect's own state; None for a law without memory.
+        gap: name of the size that is half of a dead zone in front of the spring: other laws of the spring feel the
+            deflection beyond it; empty for none.
     """
 
     side: str
     law: Law = field(repr=False)
     load: str = "transmitted"
     memory: Memory | None = None
+    gap: str = ""
+
+    def behind(self, effects: Sequence[EffectAt], owner: str) -> str:
+        """Full name of the size of the dead zone that lies before this law at an owner; empty for none."""
+        if self.side != "spring" or self.gap:
+            return ""
+        for here in effects:
+            if here.owner == owner and isinstance(here.effect, JointTorque) and here.effect.gap:
+                return here.parameter(here.effect.gap)
+        return ""
 
 
 SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "stiffness", "memory")
@@ -124,3 +143,14 @@ def log_cosh(x: Any) -> Any:
     """log(cosh(x)) without overflow; its derivative is tanh(x)."""
     y = np.where(np.real(x) < 0, -x, x)
     return y + np.log1p(np.exp(-2.0 * y)) - np.log(2.0)
+
+
+def beyond_gap(x: Any, half: Any) -> Any:
+    """What is left of x beyond a dead zone from -half to half, corners rounded; exactly x at half = 0."""
+    outer, inner = (x + half) / GAP_CORNER, (x - half) / GAP_CORNER
+    return x - 0.5 * GAP_CORNER * (log_cosh(outer) - log_cosh(inner))
+
+
+def within_gap(x: Any, half: Any) -> Any:
+    """1 within such a dead zone, 0 beyond it, corners rounded."""
+    return 0.5 * (np.tanh((x + half) / GAP_CORNER) - np.tanh((x - half) / GAP_CORNER))

@@ -6,32 +6,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
-from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, log_cosh
-
-WIDTH = 5e-4  # [rad] over which the corners of the dead zone are rounded
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, beyond_gap, within_gap
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
     """K (dz(deflection, g) - deflection) - D rate within the gap [N m], corners rounded; exactly zero at g = 0."""
-    outer, inner = (s.deflection + p["half_gap"]) / WIDTH, (s.deflection - p["half_gap"]) / WIDTH
-    within = 0.5 * (np.tanh(outer) - np.tanh(inner))
-    damper = s.tau_spring - s.stiffness * s.deflection
-    return -s.stiffness * 0.5 * WIDTH * (log_cosh(outer) - log_cosh(inner)) - damper * within
+    d, half = s.deflection, p["half_gap"]
+    damper = s.tau_spring - s.stiffness * d
+    return s.stiffness * (beyond_gap(d, half) - d) - damper * within_gap(d, half)
 
 
 EFFECT = JointTorque(
     id="backlash",
     side="spring",
     law=law,
+    gap="half_gap",
     parameters=(EffectParameter("half_gap", "rad", start=0.005, prior_sigma=0.015, sign="+", logarithmic=True),),
     example={"half_gap": 0.01},
     card=Card(
         title="play of the transmission",
         law="tau_c = K dz(q_link - q_motor, g) + D (v_link - v_motor) beyond the gap, 0 within it; dz(x, g) = x - g "
-        "above g, x + g below -g; g = half_gap",
+        "above g, x + g below -g; g = half_gap; a curve of the spring's own starts beyond the gap, too",
         explanation="Teeth do not fill each other's gaps: after a reversal the motor turns through the gap before the "
         "link feels it.",
         source="Nordin, Gutman (2002), Controlling mechanical systems with backlash - a survey, Automatica 38(10); "

@@ -18,9 +18,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Accelerometer, Gyro, MotorEncoder, Sensor
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 STEP = 1e-30  # [unit of the signal] of complex derivatives
@@ -151,6 +152,8 @@ def _errors_of(
         seats = {sensor.name: np.arange(len(sensor.channels))}
     elif isinstance(sensor, MotorEncoder):
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
+    elif isinstance(sensor, LinkEncoder):
+        seats = {f"{joint}{LINK_SIDE}": np.array([j]) for j, joint in enumerate(robot.joints)}
     else:
         seats = {}
     return [

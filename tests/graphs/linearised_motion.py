@@ -16,7 +16,7 @@ import numpy as np
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
-from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.solving.normal_equations import states_of
 from jointscope.robots.bodies.rigid_tree import RigidTree
@@ -136,7 +136,7 @@ def residuals(problem, x, calibration):
 def regressors(segment, hypothesis):
     """Columns of a hypothesis by equation or channel, in the order of `residuals`, one for each size."""
     found = {}
-    rows = rows_of(segment, columns_of(hypothesis, segment.signals))
+    rows = rows_of(segment, regressors_of(hypothesis, segment))
     touched = [(f, s) for (f, _, _), s in zip(segment.linearized, segment.stamps, strict=True) if f.states]
     touched = [(f, s) for f, s in touched if f.name != "initial_state"]
     touched = touched if len(rows) == len(touched) else [(f, s) for f, s in touched if f.name == "dynamics"]

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from jointscope.graphs.comparison.comparison_result import OPEN_LOOP, ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.comparison_result import ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.open_loop import OPEN_LOOP
 from jointscope.tools.presentation.numbers import prefixed, significant
 from jointscope.tools.terminal.text_table import text_table
 

@@ -42,6 +42,7 @@ class Column:
 
     Attributes:
         at_ticks: accelerations at the ticks, shape (m + 1, r); None for none.
+        between: the same in the middle of each step, shape (m, r); None where it was not looked at.
         in_steps: accelerations held over the steps, shape (m, r); None for none.
         reading: error of readings, shape (s, r) for a SensorPart; None for none.
         better_integrator: whether the column is what Simpson's rule adds to the defects of the model's own.
@@ -51,6 +52,7 @@ class Column:
     in_steps: Array | None = None
     reading: SensorColumn | None = field(default=None, repr=False)
     better_integrator: bool = False
+    between: Array | None = None
 
 
 def null_values(hypothesis: EffectHypothesis) -> dict[str, float]:

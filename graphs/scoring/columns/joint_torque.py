@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.column import STEP, Column, null_values
+from jointscope.graphs.scoring.columns.gap import curves_of, torque_beyond
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.dynamics.transmission import is_behind
@@ -25,6 +26,8 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     j = s.robot.joints.index(hypothesis.here.owner)
     x = s.seen if is_behind(hypothesis.here, s.robot) else s.x
     signals = joint_signals(s, j, x)
+    gap = effect.behind(s.robot.effects, hypothesis.here.owner)
+    signals = replace(signals, gap=s.values[gap]) if gap else signals
     if effect.load == "weight":
         signals = replace(signals, tau_spring=s.weight[:, j])
     p = null_values(hypothesis)
@@ -35,12 +38,26 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}[effect.side]
     found = []
     for size in hypothesis.sizes:
-        slope = np.imag(effect.law(signals, {**p, size.name: p[size.name] + 1j * STEP})) / STEP
+        if effect.gap in hypothesis.shapes:
+            slope = torque_beyond(signals, size.name, hypothesis.shapes[effect.gap])
+        else:
+            slope = np.imag(effect.law(signals, {**p, size.name: p[size.name] + 1j * STEP})) / STEP
+        if size.name == effect.gap:
+            slope = slope + _of_curves(hypothesis, s, signals)
         tau = np.zeros((len(s.ticks), layout.n_rates))
         for row, sign in rows:
             tau[:, row] = sign * slope
         found.append(Column(at_ticks=s.accelerations(s.in_equations(tau, hypothesis.here))))
     return found
+
+
+def _of_curves(hypothesis: EffectHypothesis, s: ScoreSignals, signals: JointSignals) -> Array:
+    """What a gap does to laws that would lie beyond it, shape (m + 1,)."""
+    change = np.zeros(len(s.ticks))
+    for here in curves_of(s.robot, hypothesis.here):
+        assert isinstance(here.effect, JointTorque)
+        change += np.imag(here.effect.law(replace(signals, gap=1j * STEP), here.own(s.values))) / STEP
+    return change
 
 
 def joint_signals(s: ScoreSignals, j: int, x: Array) -> JointSignals:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.scoring.columns.column import STEP, SensorColumn, SensorPart, null_values
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.model.lateness import shifts
@@ -22,7 +23,9 @@ def reading_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> 
     assert isinstance(effect, ReadingEffect)
     p = null_values(hypothesis)
     moved = {**p, size: p[size] + 1j * STEP}
-    encoder = s.robot.motor_encoder.name
+    sides = {s.robot.motor_encoder.name: s.robot.joints}
+    if s.robot.link_encoder is not None:
+        sides[s.robot.link_encoder.name] = tuple(f"{joint}{LINK_SIDE}" for joint in s.robot.joints)
 
     def column(part: SensorPart) -> Array:
         error: Array = np.zeros(part.reading.shape)
@@ -30,8 +33,8 @@ def reading_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> 
             every = np.zeros((len(part.stamps), len(s.robot.sensors[owner].channels)))
             every[:, part.channels] = part.reading
             error[:] = (np.imag(effect.law(every, part.stamps, moved)) / STEP)[:, part.channels]
-        elif part.name == encoder and owner in s.robot.joints:
-            row = np.flatnonzero(part.channels == s.robot.joints.index(owner))
+        elif owner in sides.get(part.name, ()):
+            row = np.flatnonzero(part.channels == sides[part.name].index(owner))
             if len(row):
                 error[:, row] = np.imag(effect.law(part.reading[:, row], part.stamps, moved)) / STEP
         return error

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
+from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
@@ -68,10 +69,28 @@ class ScoreSignals:
     @staticmethod
     def of(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
         """From a solved recording."""
-        model = problem.dynamics.model
-        parameters, ticks = calibration.values, problem.timeline.ticks
+        u = problem.dynamics.command(calibration.values)
+        return ScoreSignals._at(problem, problem.timeline.ticks, x, u, calibration)
+
+    @staticmethod
+    def between(problem: BagProblem, x: Array, calibration: Calibration) -> tuple[ScoreSignals, Array]:
+        """The same in the middle of each step of Simpson's rule, and how accelerations depend on rates there.
+
+        Returns:
+            Motion at m middles, and derivatives, shape (m, r, r).
+        """
+        model, ticks, dynamics = problem.dynamics.model, problem.timeline.ticks, problem.dynamics
+        u = dynamics.command(calibration.values)
+        ends = [model.accelerations(part, u, calibration.values) for part in (x[:-1], x[1:])]
+        assert isinstance(dynamics, SimpsonDynamics)
+        middle = dynamics.middle(x[:-1], x[1:], *ends)
+        found = model.with_derivatives(middle, u, calibration.values).by_state[:, :, model.layout.rates]
+        return ScoreSignals._at(problem, 0.5 * (ticks[:-1] + ticks[1:]), middle, u[:-1], calibration), found
+
+    @staticmethod
+    def _at(problem: BagProblem, ticks: Array, x: Array, u: Array, calibration: Calibration) -> ScoreSignals:
+        model, parameters = problem.dynamics.model, calibration.values
         values, layout = model.named(parameters), model.layout
-        u = problem.dynamics.command(parameters)
         both = np.vstack([u, u[-1:]])
         here = model.with_derivatives(x, both, parameters)
         springs, transmission = model.springs(x, values), Transmission.of(problem.robot)

@@ -12,7 +12,7 @@ from jointscope.factors.priors import shared_priors
 from jointscope.graphs.discovery.scored_candidates import _placebos
 from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
 from jointscope.graphs.scoring.order_scan import scan_orders
-from jointscope.graphs.scoring.score_columns import columns_of
+from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.solving.banded_solver import eliminate
@@ -41,7 +41,7 @@ def dense(segment, x, hypothesis):
     d, k = x.shape[1], len(hypothesis.sizes)
     columns = segment.calibration.columns
     p = max(c.stop for c in columns.values())
-    rows = rows_of(segment, columns_of(hypothesis, segment.signals))
+    rows = rows_of(segment, regressors_of(hypothesis, segment))
     touched = [f for f, _, _ in segment.linearized if f.states and f.name != "initial_state"]
     touched = touched if len(rows) == len(touched) else [f for f in touched if isinstance(f, DynamicsFactor)]
     by_size = {id(f): part.by_size for f, part in zip(touched, rows, strict=True)}
@@ -119,7 +119,7 @@ def test_the_evidence_of_two_segments_is_added(long):
 
 def with_residual_of(segment, x, hypothesis, amount):
     """The segment as if the recording held `amount` of a hypothesis: its regressor is taken off every residual."""
-    rows = rows_of(segment, columns_of(hypothesis, segment.signals))
+    rows = rows_of(segment, regressors_of(hypothesis, segment))
     touched = [i for i, (f, _, _) in enumerate(segment.linearized) if isinstance(f, DynamicsFactor)]
     linearized = []
     for i, (factor, ticks, linear) in enumerate(segment.linearized):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
@@ -100,6 +101,32 @@ def test_backlash_leaves_the_gap_free_and_spring_and_damper_beyond_it():
     total = base + catalogue()["backlash"].law(s, {"half_gap": 0.01})
     beyond = 150.0 * np.array([-0.04, 0.0, 0.0, 0.04]) + 2.0 * np.array([0.3, 0.0, 0.0, -0.6])
     np.testing.assert_allclose(total, beyond, atol=1e-6)
+
+
+def test_a_curve_of_the_spring_begins_beyond_the_gap_and_is_asked_for_by_the_size_of_the_gap():
+    q, gap = np.array([-0.3, -0.05, 0.0, 0.05, 0.3]), 0.1
+    still = np.zeros(5)
+    s = JointSignals(q_link=q, v_link=still, q_motor=still, v_motor=still, tau_spring=150.0 * q, stiffness=150.0)
+    play, curve = catalogue()["backlash"], catalogue()["spring_curve"]
+    effects = [EffectAt(curve, "joint1"), EffectAt(play, "joint1"), EffectAt(play, "joint2")]
+    assert curve.behind(effects, "joint1") == "joint1.backlash.half_gap"
+    assert curve.behind(effects, "joint3") == play.behind(effects, "joint1") == ""
+    p = {"quadratic": 40.0, "cubic": 900.0}
+    total = 150.0 * q + play.law(s, {"half_gap": gap}) + curve.law(replace(s, gap=gap), p)
+    z = np.array([-0.2, 0.0, 0.0, 0.0, 0.2])
+    np.testing.assert_allclose(total, 150.0 * z + 40.0 * z**2 + 900.0 * z**3, atol=1e-6)
+
+
+def test_an_encoder_on_the_link_has_two_harmonics_and_one_on_the_motor_its_order():
+    effect, arm = catalogue()["encoder_eccentricity"], load_robot("biorob")
+    assert "joint3.link" in effect.owners_of(arm) and "joint3.link" not in effect.owners_of(load_robot("doggy"))
+    assert [p.name for p in effect.parameters_at(arm, "joint3.link")] == ["cos", "sin", "cos2", "sin2"]
+    assert [p.name for p in effect.parameters_at(arm, "joint3")] == ["cos", "sin", "order"]
+    q = np.linspace(-3.0, 3.0, 7)
+    wave = 0.035 * np.sin(q + 0.6) + 0.017 * np.sin(2.0 * q - 1.1)
+    p = {"cos": 0.035 * np.sin(0.6), "sin": 0.035 * np.cos(0.6)}
+    p |= {"cos2": 0.017 * np.sin(-1.1), "sin2": 0.017 * np.cos(1.1)}
+    np.testing.assert_allclose(effect.law(q, 0.0 * q, p), wave, atol=1e-15)
 
 
 def test_hysteresis_takes_another_way_back():

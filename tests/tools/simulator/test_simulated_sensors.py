@@ -6,6 +6,7 @@ import pytest
 
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.simulator import simulate
+from jointscope.tools.simulator.effects import make_effect
 from jointscope.tools.simulator.loop.controller import GAIN
 from jointscope.tools.simulator.world.engine import TICK
 from jointscope.tools.simulator.world.trajectory import Trajectory
@@ -96,6 +97,17 @@ def test_an_eccentric_disc_shows_the_catalogue_law_to_first_order_and_more():
     rest = (error - first).std()
     assert rest < 1.2 * np.hypot(e**2 / 20 / np.sqrt(2), DOGGY.motor_encoder.sigmas[0])
     assert np.corrcoef(error, first)[0, 1] > 0.99
+
+
+def test_a_hall_sensor_on_the_link_shows_two_harmonics_to_first_order_and_nothing_on_other_joints():
+    arm = load_robot("biorob")
+    effect = make_effect("encoder_eccentricity@joint3.link:cos=0.02,sin=-0.01,cos2=0.015,sin2=0.005", arm)
+    q = np.linspace(-3.0, 3.0, 601)[:, None] * np.ones(4)
+    error = effect.reading(arm.link_encoder, q[:, 0], q) - q
+    first = 0.02 * np.cos(q) - 0.01 * np.sin(q) + 0.015 * np.cos(2 * q) + 0.005 * np.sin(2 * q)
+    np.testing.assert_array_equal(error[:, [0, 1, 3]], 0.0)
+    assert 1e-4 < np.abs(error - first)[:, 2].max() < 2e-3
+    np.testing.assert_array_equal(effect.reading(arm.motor_encoder, q[:, 0], q), q)
 
 
 def test_mistakes_change_the_bag_and_nothing_else():

@@ -17,9 +17,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.errors import EffectError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import MotorEncoder, Sensor
+from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 
@@ -171,7 +172,13 @@ class SimulatedEffect:
         return self.owner in ("robot", sensor.name)
 
     def encoder_channels(self, sensor: Sensor) -> list[int]:
-        """Channels of the motor encoders that belong to the joints concerned; none of another sensor."""
+        """Channels of the motor encoders that belong to the joints concerned; none of another sensor.
+
+        The owner JOINT.link concerns the joint's encoder on the link instead.
+        """
+        if self.owner.endswith(LINK_SIDE):
+            own = self.owner.removesuffix(LINK_SIDE)
+            return [sensor.joints.index(own)] if isinstance(sensor, LinkEncoder) else []
         if not isinstance(sensor, MotorEncoder):
             return []
         return [sensor.joints.index(joint) for joint in self.joints]
@@ -192,5 +199,7 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
     elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
     upright = ("robot",) if robot.tree.gravity[2] < 0.0 and not robot.tree.gravity[:2].any() else ()
     joints = {"joint": robot.joints, "elastic joint": elastic, "last joint": robot.joints[-1:]}
+    seen = robot.joints if robot.link_encoder is not None else ()
+    joints["joint seen on the link"] = tuple(f"{joint}{LINK_SIDE}" for joint in seen)
     joints["weighed elastic joint"] = elastic if robot.tree.gravity.any() else ()
     return {**joints, "robot": ("robot",), "upright robot": upright}[kind]

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointscope.graphs.comparison.comparison_result import OPEN_LOOP, ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.comparison_result import ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.open_loop import OPEN_LOOP
 from jointscope.tools.report.page.page import Section, figure
 from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
 from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from html import escape
 
-from jointscope.graphs.comparison.comparison_result import OPEN_LOOP, ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.comparison_result import ComparisonResult, ModelComparison
+from jointscope.graphs.comparison.open_loop import OPEN_LOOP
 from jointscope.tools.presentation.numbers import prefixed, significant
 from jointscope.tools.report.page.page import Section, table
 from jointscope.tools.report.sections.comparison.model_colours import model_colour
