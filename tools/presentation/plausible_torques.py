@@ -72,6 +72,8 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
         shares = mass.moved(result.found)
         if not shares:
             continue
+        if abs(mass.mass) < SURE * mass.sigma:
+            return "bad", _another_place(result, mass.joint)
         worst = max(shares, key=lambda name: abs(shares[name]))
         torques = mass.mass < 0.0 and constants and max(p.value for p in constants) < 1.0
         other = f" Or its commands are torques, and it carries more: {_again(result, ' --unit Nm')}." if torques else ""
@@ -83,6 +85,16 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
             f"{_again(result)}.{other}"
         )
     return None
+
+
+def _another_place(result: CalibrationResult, joint: str) -> str:
+    """First moments that are wrong where the mass may be right: weight in another direction does the same."""
+    file = result.start.path.name
+    return (
+        f"The recording asks for weight at another place behind {joint}, as a load would that "
+        f"{result.robot.tree.urdf.name} lacks, or a base that is not level. If that may be: `jointscope add {file} "
+        f"gravity_direction@robot -o {file}`, then calibrate again; else mend the masses and their places in the URDF."
+    )
 
 
 def _torques(result: CalibrationResult) -> tuple[str, str] | None:

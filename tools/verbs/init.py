@@ -109,7 +109,8 @@ def run(args: argparse.Namespace) -> int:
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
             f"{', '.join(poor)} (table above): names, units, signs, gravity or masses are wrong there, or a spring is "
-            "missing; look at it first"
+            "missing; look at it first (a base that is not level: jointscope add "
+            f"{args.output} gravity_direction@robot -o {args.output})"
         )
     else:
         print(f"\nWrote {args.output}; the recording can be used with it")

@@ -167,6 +167,32 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
         assert "elbow.torque_constant would be +5 %" in text and "jointscope init other.urdf" in text
 
 
+@pytest.mark.parametrize(
+    ("value", "mass", "said"),
+    [
+        (0.6, -0.9, "Add the load .*own.yaml`. Or its commands are torques, .* -o own.yaml --unit Nm`"),
+        (0.6, 0.9, "another mass behind elbow, by +0.9 ± 0.03 kg.*-o own.yaml`.$"),
+        (8.0, -0.9, "another mass behind elbow, by -0.9 ± 0.03 kg.*-o own.yaml`.$"),
+        (
+            8.0,
+            0.05,
+            "weight at another place behind elbow.*`jointscope add own.yaml gravity_direction@robot -o own.yaml`",
+        ),
+    ],
+)
+def test_weight_has_other_reasons_than_a_load(arm, tmp_path, value, mass, said):
+    robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
+    result = dataclasses.replace(
+        fake_calibration(0.2),
+        robot=robot,
+        start=robot,
+        parameters=(ParameterEstimate("elbow.torque_constant", value, 1e-3, "N m/A", value, value, value),),
+        masses=(WrongMass("elbow", mass, 0.03, 1e-9, {"elbow.torque_constant": 0.05 * value}),),
+    )
+    level, text = plausible_torques(result)
+    assert level == "bad" and re.search(said.replace("+", r"\+"), text), text
+
+
 def test_masses_beside_free_torque_constants_have_no_scale(arm, tmp_path):
     robot = add_effects(begun(arm, tmp_path, 1.0, None, "--unit", "A"), ["link_mass@elbow"]).robot
     level, text = asked(robot, (8.0, 12.0))
