@@ -36,7 +36,7 @@ from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
-from jointscope.graphs.starts.second_opinion import regressed_values
+from jointscope.graphs.starts.second_opinion import on_their_word, regressed_values
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -151,7 +151,9 @@ def _calibrated(
             if lasting is not solved:
                 other = summarize(robot, lasting, tuple(history.records), notices, hold)
                 result = replace(other, timing=result.timing, masses=result.masses)
-        result = replace(result, regressed=regressed_values(result.robot, recordings))
+        regressed = regressed_values(result.robot, recordings)
+        said = (*result.findings, *on_their_word(result.robot, regressed))
+        result = replace(result, regressed=regressed, findings=said)
     if any(recording.sticking for recording in told):
         factors = _standing(solved.problems[0].dynamics.steps.noise, noise, result.noise.n_lasting)
         result = replace(result, robot=replace(result.robot, noise=scaled(result.noise, factors)))

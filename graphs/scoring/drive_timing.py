@@ -6,7 +6,8 @@ A torque that acts a time d after its stamp looks like friction and springs that
     tau(t - d) = tau(t) - d tau'(t),        tau' holds M a' = -M omega^2 v for a motion with frequency omega,
 
 and process noise takes what is left, so no residual tells. One linear step with a delay does: how long it would be, and
-by how much it would change the values. Nothing is estimated anew.
+by how much it would change the values. Nothing is estimated anew. An encoder that is read later than those of the other
+joints does the same to its joint alone, and is asked for, too.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 EFFECT, OWNER = "command_delay", "robot"
+ENCODER = "encoder_delay"
+USUAL = 0.8  # of the sigmas of a late drive signal of one joint, with which a late encoder of another is named
+CLEARER = 1.5  # times the sigmas of a late drive that one late encoder must have, to be named instead
 EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
 MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 
@@ -44,16 +48,28 @@ class DriveTiming:
         delay: of the torque after its stamp; below zero where the signal was late [s].
         sigma: its standard deviation, from blocks of the recording where these scatter more [s].
         changes: what the delay would add to each parameter, in the parameter's unit.
+        joint: whose encoder is late against those of the others, or whose drive signal is where `delay` is below zero;
+            empty where it is the drive signal of all.
     """
 
     delay: float
     sigma: float
     changes: dict[str, float]
+    joint: str = ""
 
     @property
-    def label(self) -> str:
-        """The effect that calibrates it, ID@OWNER."""
-        return f"{EFFECT}@{OWNER}"
+    def what(self) -> str:
+        """Which stamps are not those of the others, in words."""
+        if self.joint:
+            late = f"encoder of {self.joint} seems to be read"
+            return late if self.delay > 0.0 else f"drive signal of {self.joint} seems to act"
+        return "drive signal seems to act"
+
+    def cure(self, file: str) -> str:
+        """What to do about it, in words; `file` is the robot file."""
+        if self.joint:
+            return f"correct its stamps where they are made, or record {self.joint} with the others' clock and filter"
+        return f"`jointscope add {file} {EFFECT}@{OWNER} -o OUT.yaml`, then calibrate again"
 
     def moved(self, found: Mapping[str, Value]) -> list[str]:
         """Names of the values that the delay would change by much; none where it may be chance.
@@ -63,7 +79,8 @@ class DriveTiming:
         """
         if abs(self.delay) < EARLY_OR_LATE * self.sigma:
             return []
-        (sigmas, share), changes = MOVES, {n: abs(self.changes[n]) for n in found if n in self.changes}
+        (sigmas, share), values = MOVES, [n for n in found if n in self.changes and not n.endswith(".delay")]
+        changes = {n: abs(self.changes[n]) for n in values}
         return [n for n, d in changes.items() if d > sigmas * found[n].sigma and d > share * abs(found[n].value)]
 
 
@@ -78,20 +95,43 @@ def drive_timing(
         calibrations: the values found, with the biases of each recording.
     """
     robot = problems[0].robot
-    if robot.choices.link_dynamics != "model" or _has_times(robot):
+    if robot.choices.link_dynamics != "model" or _has(robot, TimeShift):
         return None
-    effect = catalogue()[EFFECT]
-    hypothesis = EffectHypothesis(EffectAt(effect, OWNER), effect.parameters_at(robot, OWNER))
+    asked = [] if _has(robot, CommandEffect) else [(EFFECT, OWNER)]
+    if robot.n > 1 and robot.link_encoder is None and not robot.gyros:
+        asked += [(ENCODER, joint) for joint in robot.joints]
+    here = [EffectAt(catalogue()[effect], owner) for effect, owner in asked]
+    hypotheses = [EffectHypothesis(at, at.effect.parameters_at(robot, at.owner)) for at in here]
     segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
-    (step,) = ScoreTest(segments).steps([hypothesis])
-    delay, sigma = float(step.sizes[0]), float(step.sigmas[0])
+    found = [
+        _timing(step.sizes, step.sigmas, step.response, owner, calibrations[0])
+        for step, (_, owner) in zip(ScoreTest(segments).steps(hypotheses), asked, strict=True)
+    ]
+    drive = next((timing for timing in found if timing is not None and not timing.joint), None)
+    encoders = [timing for timing in found if timing is not None and timing.joint]
+    late = max(encoders, key=_clearness, default=None)
+    for encoder in encoders:  # of two that say nearly the same, a late encoder is the usual one
+        if late is not None and encoder.delay > 0.0 > late.delay and _clearness(encoder) > USUAL * _clearness(late):
+            late = encoder
+    if drive is None or (late is not None and _clearness(late) > CLEARER * _clearness(drive)):
+        return late or drive
+    return drive
+
+
+def _timing(sizes: Array, sigmas: Array, response: Array, owner: str, found: Calibration) -> DriveTiming | None:
+    """What one step says; None where it tells nothing."""
+    delay, sigma = float(sizes[0]), float(sigmas[0])
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
-    found = calibrations[0]
-    moved = found.retract({DYNAMICS: step.response[: len(found.names), 0] * delay})
+    moved = found.retract({DYNAMICS: response[: len(found.names), 0] * delay})
     changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
-    return DriveTiming(delay, sigma, changes)
+    return DriveTiming(delay, sigma, changes, "" if owner == OWNER else owner)
 
 
-def _has_times(robot: Robot) -> bool:
-    return any(isinstance(here.effect, CommandEffect | TimeShift) for here in robot.effects)
+def _clearness(timing: DriveTiming) -> float:
+    """By how many sigmas it differs from none."""
+    return abs(timing.delay) / timing.sigma if timing.sigma > 0.0 else 0.0
+
+
+def _has(robot: Robot, kind: type) -> bool:
+    return any(isinstance(here.effect, kind) for here in robot.effects)

@@ -7,7 +7,7 @@ where little of the torque is explained, it says nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from jointscope.graphs.starts.drive_regression import GAIN, VISCOUS, DriveEquation, Value
 from jointscope.graphs.starts.drive_starts import PLAIN, equations_of, parts_of
@@ -15,6 +15,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
 DELAY = "command_delay@robot"
+TOLD = 0.15  # relative sigma of a constant that tells something
 EXPLAINED = 0.99  # of the mean square of the driving torque, below which the model of the regression is another one
 
 
@@ -36,6 +37,25 @@ def regressed_values(robot: Robot, recordings: Sequence[Recording]) -> dict[str,
     for joint, equation in zip(robot.joints, equations_of(robot, recordings, delay), strict=True):
         found |= _of_joint(robot, joint, equation) | _made_by_one(robot, joint, equation)
     return found
+
+
+def on_their_word(robot: Robot, found: Mapping[str, Value]) -> list[str]:
+    """A sentence about commands that are torques, on joints where no weight tells it; nothing if the user said so.
+
+    Args:
+        robot: the calibrated robot.
+        found: what the regression said, see `regressed_values`.
+    """
+    if not found or robot.drive_gain is not None or robot.command.confirmed:
+        return []
+    made = {joint: found.get(f"{joint}.torque_constant") for joint in robot.joints}
+    untold = [joint for joint, one in made.items() if one is None or one.sigma > TOLD * abs(one.value)]
+    if not untold or not any(f"{joint}.inertia" in found for joint in untold):
+        return []
+    return [
+        f"nothing in the recording tells that the commands of {', '.join(untold)} are torques in their unit (no weight "
+        "changes there): the values are in proportion to them"
+    ]
 
 
 def _of_joint(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:

@@ -29,6 +29,7 @@ INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
+FAR = 0.02  # share of a value by which a delay that is not in the model may change it
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -220,19 +221,19 @@ def _same_time(result: CalibrationResult) -> Check:
     if timing is None:
         return Check("info", name, "The model has times of its own, or this was not looked at.")
     delay, sigma = abs(timing.delay), timing.sigma
-    names = timing.moved(result.found)
-    if not names:
+    if not (names := timing.moved(result.found)):
         text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
         return Check("good", name, text)
     worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
     other = worst.value + timing.changes[worst.name]
+    side = "after" if timing.delay > 0.0 and not timing.joint else "before"
+    level = "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn"
     return Check(
-        "warn",
+        level,
         name,
-        f"The drive signal seems to act {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms "
-        f"{'after' if timing.delay > 0.0 else 'before'} its stamp, with which {worst.name} would be "
-        f"{significant(other)} instead of {significant(worst.value)} {worst.unit}: `jointscope add "
-        f"{result.start.path.name} {timing.label} -o OUT.yaml`, then calibrate again.",
+        f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
+        f"with which {worst.name} would be {significant(other)} instead of {significant(worst.value)} {worst.unit}: "
+        f"{timing.cure(result.start.path.name)}.",
     )
 
 

@@ -76,7 +76,7 @@ def test_a_current_of_another_time_than_the_positions_is_not_called_good(tmp_pat
     # the torque acts before its stamp where the current is old
     assert result.timing.delay == pytest.approx(-late, rel=0.1)
     check = same_time(result)
-    assert check.level == "warn" and judge(result).level != "good"
+    assert check.level in ("warn", "bad") and judge(result).level != "good"
     assert ("before" if late > 0.0 else "after") in check.text
     assert "`jointscope add pendulum.yaml command_delay@robot -o OUT.yaml`" in check.text
 
@@ -102,4 +102,4 @@ def test_commands_that_act_late_are_not_called_good(tmp_path, held):
     result = calibrate(pendulum(tmp_path, SIGMA), [commanded(held, 2e-3)])
     assert not is_right(result)
     assert result.timing.delay == pytest.approx(2e-3, rel=0.2)
-    assert same_time(result).level == "warn"
+    assert same_time(result).level in ("warn", "bad")

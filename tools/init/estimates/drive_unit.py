@@ -56,7 +56,7 @@ def drive_unit(
     if len(one) == len(told) and (not small or len(told) > 1 or _near(next(iter(told.values())), ONE_DRIVE)):
         return (
             "N m",
-            f"with the masses of the URDF one unit is {_range(list(told.values()))} N m on every joint{_off(told)}",
+            f"with the masses of the URDF one unit is {_range(list(told.values()))} N m on {_of(joints, told)}{_off(told)}",
         )
     if small:
         return "duty", f"{size}, and one unit makes {constants} N m; volts cannot be told from it"
@@ -66,6 +66,12 @@ def drive_unit(
     below = all(LOADED < gain.value < 1.0 for gain in told.values()) and not (one or alike)
     others += "; or N m, if it carries a load that the URDF lacks: --unit Nm" if below else ""
     return "A", f"with the masses of the URDF one unit makes {constants} N m, not 1{others}"
+
+
+def _of(joints: Sequence[str], told: dict[str, Value]) -> str:
+    """Joints whose constant is told."""
+    others = [joint for joint in joints if joint not in told]
+    return "every joint" if not others else f"{', '.join(told)}; of {', '.join(others)} nothing tells it"
 
 
 def _is_one(gain: Value) -> bool:
