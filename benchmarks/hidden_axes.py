@@ -45,7 +45,8 @@ HIDDEN: dict[str, dict[str, float]] = {
     "joint_stop": {"stop": 0.3},
     "": {},
 }
-OUTSIDE = ("position_dependent_friction", "warming_friction", "joint_stop")
+# not in the catalogue, or not for a rigid joint: of these friction grows with the weight alone
+OUTSIDE = ("position_dependent_friction", "warming_friction", "joint_stop", "load_dependent_friction")
 AROUND = {  # random torque and ripple in the same parts, share of a Stribeck effect and an offset beside it
     "quiet": (0.002, 0.0, 0.0),
     "coloured": (0.015, 0.002, 0.0),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,6 +79,7 @@ def diagnose(
     leaders: int = LEADERS,
     missing_torque: bool = True,
     side_by_side: SideBySide | None = None,
+    barred: Collection[str] = (),
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Ranks the effects that a model lacks.
@@ -93,6 +94,7 @@ def diagnose(
         leaders: number of candidates to refit; up to twice as many where none of them helps.
         missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
         side_by_side: who fits the candidates, if not this process alone.
+        barred: ID@OWNER of candidates that did not hold when calibrated; those after them by torque take their place.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -114,7 +116,7 @@ def diagnose(
     fit, spans = fit_and_judge(base)
     before = validation or judged_error(base, base.robot, base.calibrations, spans)
     trials = SpringTrials(base, (fit, spans), before, holdout)
-    torques, elastic = _by_torques(base, scored, trials)
+    torques, elastic = _by_torques(base, scored, trials, barred)
     clock.stage("missing torque")
     percent: Mapping[str, float] = {}
     if torques is None:
@@ -162,15 +164,15 @@ def diagnose(
 
 
 def _by_torques(
-    base: BaseModel, scored: ScoredCandidates, trials: SpringTrials
+    base: BaseModel, scored: ScoredCandidates, trials: SpringTrials, barred: Collection[str]
 ) -> tuple[TorqueVerdicts | None, dict[str, Robot]]:
     """Verdicts by the missing torque, if it tells any, and the robot with the spring that comes first, if one does."""
-    torques = torque_verdicts(base, scored)
+    torques = torque_verdicts(base, scored, barred)
     spring, elastic = trials.borne_out(torques, scored)
     if torques is None or spring is None:
         return torques, {}
     if not elastic:
-        return torque_verdicts(base, scored, barred=(spring.label,)), {}
+        return torque_verdicts(base, scored, (*barred, spring.label)), {}
     return replace(torques, candidates=[spring, *(c for c in torques.candidates if c.label != spring.label)]), elastic
 
 

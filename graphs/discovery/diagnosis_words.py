@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.model.robot import Robot
 
 MOST_UNTESTABLE = 5
 
@@ -91,3 +93,27 @@ def title(c: Candidate) -> str:
     """The effect's name with its owner."""
     effect = catalogue().get(c.effect)
     return f"{effect.card.title if effect else c.effect} ({c.label})"
+
+
+def did_not_hold(refused: Mapping[str, str]) -> str:
+    """Why a search stopped whose candidates did not hold: the reasons by their labels."""
+    why = "; ".join(f"{label} {reason}" for label, reason in refused.items())
+    return f"what helped on validation blocks did not hold when calibrated with all data: {why}"
+
+
+def why_it_stopped(diagnosis: Diagnosis) -> str:
+    """Why a search stopped with the last diagnosis."""
+    if diagnosis.adequate:
+        return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
+    part = part_in_words(diagnosis.unexplained_share)
+    return f"nothing in the catalogue explains the rest: {part} of the squared error above what noise alone would leave"
+
+
+def what_came_in(candidate: Candidate, robot: Robot, before: float, after: float) -> str:
+    """What an effect that was added is and does; training errors before and after."""
+    start = f"{candidate.owner}.{candidate.effect}."
+    own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
+    values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
+    what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
+    why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0].removeprefix('it ')}."
+    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"

@@ -15,7 +15,7 @@ from typing import Any
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, unexplained
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
-from jointscope.graphs.discovery.diagnosis_words import part_in_words
+from jointscope.graphs.discovery.diagnosis_words import did_not_hold, what_came_in, why_it_stopped
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep, with_lasting_floors
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
@@ -122,7 +122,8 @@ class _Search:
         while True:
             added = sum(step.added is not None for step in self.steps) - len(self._taken_back())
             share = added / self.max_steps
-            diagnosis = self.kind.diagnosed(base, self.steps[-1].comparison, self.last_errors, self._part(share))
+            barred, now = frozenset(refused), self.steps[-1].comparison
+            diagnosis = self.kind.diagnosed(base, now, self.last_errors, self._part(share), barred)
             self._attach(diagnosis)
             if trial is not None and _torque_fell(trial.diagnosis, diagnosis):
                 refused = {}
@@ -136,14 +137,16 @@ class _Search:
             there = {here.label for here in base.robot.effects}
             refused |= {label: NO_LESS for label in self._taken_back() if label not in there}
             chosen = [c for c in diagnosis.candidates if c.verdict == "missing" and c.label not in refused]
-            if not chosen:
-                return _did_not_hold(refused) if refused and not diagnosis.adequate else _why(diagnosis), diagnosis
-            if added >= self.max_steps:
+            if chosen and added >= self.max_steps:
                 return f"{self.max_steps} effects were added, the largest number allowed", diagnosis
             tries = ((c, g) for c in chosen if (g := self._try(base, c, diagnosis, refused)) is not None)
             candidate, grown = next(tries, (None, None))
+            if candidate is None and diagnosis.missing_torque_percent is not None and not refused.keys() <= barred:
+                trial = None  # what explains less than one that did not hold may be right
+                continue
             if candidate is None:
-                return _did_not_hold(refused), diagnosis
+                held = not refused or diagnosis.adequate
+                return why_it_stopped(diagnosis) if held else did_not_hold(refused), diagnosis
             trial = _Trial(candidate, base, diagnosis, self.steps[-2])
             base = self._without_idle(grown)
 
@@ -168,7 +171,7 @@ class _Search:
         if not (helps or diagnosis.missing_torque_percent is not None):
             refused[candidate.label] = f"leaves the training error at {errors.error:.3g} sigma ({before:.3g} before)"
             return None
-        paragraph = _added(candidate, grown.robot, before, errors.error)
+        paragraph = what_came_in(candidate, grown.robot, before, errors.error)
         self._add_step(candidate.label, None, grown, f"{paragraph}{HELD if held else ''}", errors)
         return grown
 
@@ -276,24 +279,3 @@ def _is_idle(robot: Robot, here: EffectAt) -> bool:
         not v.fixed and v.sigma is not None and abs(v.value - p.null) < SURE * v.sigma
         for p, v in zip(sizes, values, strict=True)
     )
-
-
-def _did_not_hold(refused: dict[str, str]) -> str:
-    why = "; ".join(f"{label} {reason}" for label, reason in refused.items())
-    return f"what helped on validation blocks did not hold when calibrated with all data: {why}"
-
-
-def _why(diagnosis: Diagnosis) -> str:
-    if diagnosis.adequate:
-        return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
-    part = part_in_words(diagnosis.unexplained_share)
-    return f"nothing in the catalogue explains the rest: {part} of the squared error above what noise alone would leave"
-
-
-def _added(candidate: Candidate, robot: Robot, before: float, after: float) -> str:
-    start = f"{candidate.owner}.{candidate.effect}."
-    own = [(name[len(start) :], p) for name, p in robot.parameters.items() if name.startswith(start)]
-    values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
-    what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
-    why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0].removeprefix('it ')}."
-    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -44,8 +45,10 @@ class Kind(Protocol):
     def compared(self, label: str, robot: Robot) -> ModelComparison:
         """A model against the held-out recording, else against the first training recording."""
 
-    def diagnosed(self, model: Any, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
-        """What a model lacks."""
+    def diagnosed(
+        self, model: Any, comparison: ModelComparison, errors: Any, report: Progress, barred: Collection[str] = ()
+    ) -> Diagnosis:
+        """What a model lacks; `barred`: candidates that did not hold, where others may take their place."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,9 @@ class Motion:
         """Predictions from causal states."""
         return compare_model(label, robot, self.holdout or self.recordings[0])
 
-    def diagnosed(self, model: BaseModel, comparison: ModelComparison, errors: Any, report: Progress) -> Diagnosis:
+    def diagnosed(
+        self, model: BaseModel, comparison: ModelComparison, errors: Any, report: Progress, barred: Collection[str] = ()
+    ) -> Diagnosis:
         """The catalogue, scored and refitted."""
         return diagnose(
             model.robot,
@@ -83,5 +88,6 @@ class Motion:
             validation=errors,
             missing_torque=self.missing_torque,
             side_by_side=self.side_by_side,
+            barred=barred,
             progress=report,
         )

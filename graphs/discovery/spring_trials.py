@@ -30,6 +30,7 @@ SPRING = "joint_elasticity"
 FAR = 10.0  # [%] of the drive's torque that is missing, [sigma] of the prediction, from which a joint is tried
 MOST_TRIED = 2  # joints, those first of which most is missing
 ALIKE = 1.5  # ratio of two compliances of the same spring, by missing torque and calibrated
+WORSE = 1.5  # times the error of the rigid model that one with a spring may have
 CLEAR = 0.5  # share of the squared error that a spring must explain to stand before torques
 
 
@@ -55,8 +56,9 @@ class SpringTrials:
         """The spring that explains most of the missing torque, calibrated, and the robot with it.
 
         What a rigid model lacks told of it on blocks left out; calibrated from its start values it must come out as the
-        same spring. Predictions a tenth of a second ahead do not decide: a torque that changes its sign within them
-        leaves less there than what random torques add up to.
+        same spring. Predictions a tenth of a second ahead do not have to be better: a torque that changes its sign
+        within them leaves less there than what random torques add up to. With a spring that is not there they are much
+        worse.
 
         Returns:
             The candidate, None where another one comes first; the robot by its label, none where it is no better.
@@ -71,7 +73,9 @@ class SpringTrials:
         seconds = judged_seconds(self.base, self.spans[1])
         judged = next(judge(c, self.before, fitted, seconds) for c in scored.candidates if c.label == first.label)
         spring = judged.parameters["compliance"]
-        if not spring.value > SURE * spring.sigma or abs(np.log(spring.value / start["compliance"])) > np.log(ALIKE):
+        alike = abs(np.log(spring.value / start["compliance"])) < np.log(ALIKE)
+        worse = fitted.validation.error > WORSE * self.before.error
+        if not spring.value > SURE * spring.sigma or not alike or worse:
             return first, {}
         found = replace(judged, verdict="missing", score=first.score, dof=first.dof, share=first.share)
         found = replace(found, reasons=(*first.reasons, judged.reasons[0]), look_alikes=first.look_alikes)

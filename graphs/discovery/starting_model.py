@@ -26,7 +26,7 @@ from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
-BANDS = (30.0, 15.0, 8.0)  # [Hz]
+BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FEWEST_ROWS = 100
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from jointscope.graphs.calibration.failures_with_notices import names_notices
@@ -50,9 +50,14 @@ class Links:
         return compare_links_model(label, robot, self.holdout or self.recordings[0])
 
     def diagnosed(
-        self, model: LinksModel, comparison: ModelComparison, errors: Errors | None, report: Progress
+        self,
+        model: LinksModel,
+        comparison: ModelComparison,
+        errors: Errors | None,
+        report: Progress,
+        barred: Collection[str] = (),
     ) -> Diagnosis:
-        """Effects that show without masses."""
+        """Effects that show without masses; predictions judge them, so `barred` changes nothing."""
         return diagnose_links(
             model.robot, self.recordings, self.holdout, base=model, comparison=comparison, progress=report
         )

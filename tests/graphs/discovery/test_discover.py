@@ -174,3 +174,22 @@ def test_progress_never_goes_beyond_the_whole(doggy, made_up):
     shares = []
     run(doggy, progress=lambda text, share: shares.append(share))
     assert np.all(np.array(shares) <= 1.0)
+
+
+def test_what_stood_second_is_asked_where_the_first_did_not_hold(doggy, made_up, monkeypatch):
+    machine, asked = made_up([SECOND], torque=True, runs_away=()), []
+    everything = machine.diagnose
+
+    def only_one_at_a_time(robot, recordings, holdout, **known):
+        asked.append(set(known["barred"]))
+        found = everything(robot, recordings, holdout, **known)
+        free = [c for c in found.candidates if c.label not in known["barred"]]
+        found.candidates = [replace(c, verdict="missing" if c in free[:1] else "possible") for c in found.candidates]
+        found.adequate = SECOND in machine.labels(robot)
+        return found
+
+    monkeypatch.setattr(search, "diagnose", only_one_at_a_time)
+    found, _ = run(doggy)
+    labels = [here.label for here in found.robot.effects]
+    assert SECOND in labels and FIRST not in labels
+    assert {FIRST} in asked
