@@ -32,7 +32,7 @@ from jointscope.graphs.solving.batch_solver import (
     solve,
     total_cost,
 )
-from jointscope.graphs.solving.convergence import LAMBDA_START, measured_rows, short_step
+from jointscope.graphs.solving.convergence import LAMBDA_START, measured_rows, next_damping, short_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts
@@ -206,7 +206,7 @@ def _cycle(
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
             near = solve(problems, estimate, max_iterations=2, hold=hold, damping=damping)
-            return _cycle(problems, near.estimate, hold, near.next_damping, damped=True)
+            return _cycle(problems, near.estimate, hold, next_damping(near.iterations), damped=True)
         step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
     found, _ = posteriors(problems, here, hold, eliminations)
     evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)

@@ -20,6 +20,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.convergence import (
+    LAMBDA_FACTOR,
     LAMBDA_START,
     Iteration,
     has_converged,
@@ -40,7 +41,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
-LAMBDA_FACTOR = 30.0
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
 
@@ -65,12 +65,6 @@ class Solution:
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
-
-    @property
-    def next_damping(self) -> float:
-        """The one to begin with where another solve goes on from here."""
-        last = self.iterations[-1].damping if self.iterations else LAMBDA_START
-        return max(last / LAMBDA_FACTOR, LAMBDA_START)
 
 
 class Solver(Protocol):

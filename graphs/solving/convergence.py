@@ -19,7 +19,7 @@ SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
 COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 CONTRADICTS = 2.0  # [sigma] root mean square residual from which a model contradicts its recording
 FLAT, FLAT_STEPS = 1e-5, 3  # relative fall of such a model's cost, so many times in a row, that ends the search
-LAMBDA_START = 1e-9  # damping of a step that is as good as undamped
+LAMBDA_START, LAMBDA_FACTOR = 1e-9, 30.0  # damping of a step that is as good as undamped; of the next that is tried
 NEAR = 0.5  # [sigma] steps of a solution whose cost has kinks, as long as which it may end
 
 
@@ -86,6 +86,11 @@ def is_crawling(iterations: Sequence[Iteration], measured: int) -> bool:
     """Whether such a model still gains, but so little that more iterations would not settle it."""
     last = iterations[-1]
     return misfit(last.cost_after, measured) > CONTRADICTS and last.fall < SMALL_FALL
+
+
+def next_damping(iterations: Sequence[Iteration]) -> float:
+    """The one to begin with where another solve goes on from these."""
+    return max(iterations[-1].damping / LAMBDA_FACTOR, LAMBDA_START) if iterations else LAMBDA_START
 
 
 def _remaining(iterations: Sequence[Iteration]) -> float:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from jointscope.graphs.comparison import compare as compare_module
 from jointscope.graphs.comparison.compare import compare
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta
@@ -142,6 +143,21 @@ def test_comparing_a_tiny_motor_inertia_ends_soon():
     model = compare({"tiny": robot}, recording).models[0]
     assert time.process_time() - began < 20.0  # not done after 240 s when the motor's own inertia counted
     assert np.isfinite(model.error)
+
+
+def test_the_open_loop_is_predicted_once_and_not_before_somebody_asks(monkeypatch):
+    robot, recording = of_case("measured_effort.yaml")
+    asked = []
+    predict = compare_module.predict_open_loop
+    monkeypatch.setattr(compare_module, "predict_open_loop", lambda *args: asked.append(1) or predict(*args))
+    model = compare({"arm": robot}, recording).models[0]
+    channel = model.channels["shoulder.motor_position"]
+    assert list(channel.horizons)[-1] == "open_loop" and channel.horizons["0.1"] > 0.0 and not asked
+    assert (
+        np.isfinite(channel.horizons["open_loop"])
+        and np.isfinite(model.sensors[robot.motor_encoder.name].open_loop).any()
+    )
+    assert asked == [1]
 
 
 def test_an_open_loop_that_runs_away_is_said_to_be_infinite():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from jointscope.graphs.calibration.findings import findings
-from jointscope.graphs.solving.convergence import Iteration, has_converged, is_flat, misfit, short_step
+from jointscope.graphs.solving.convergence import Iteration, has_converged, is_flat, misfit, next_damping, short_step
 
 
 def falls(cost, share, steps, in_sigmas=1.3):
@@ -36,6 +36,17 @@ def test_only_a_model_that_contradicts_its_recording_is_flat():
     assert not is_flat(falls(12_500.0, 1e-6, 2), 1000)
     assert not is_flat(falls(12_500.0, 1e-4, 3), 1000)
     assert not is_flat(falls(600.0, 1e-6, 3), 1000)
+
+
+def test_short_damped_steps_that_gain_nothing_end_at_kinks_and_undamped_or_long_ones_do_not():
+    assert is_flat(falls(600.0, 1e-6, 3, in_sigmas=0.2), 1000)
+    assert not is_flat(falls(600.0, 1e-4, 3, in_sigmas=0.2), 1000)
+    assert not is_flat([replace(i, damping=1e-9) for i in falls(600.0, 1e-6, 3, in_sigmas=0.2)], 1000)
+
+
+def test_a_solve_goes_on_with_the_damping_of_the_last():
+    assert next_damping([]) == 1e-9
+    assert next_damping(falls(600.0, 1e-6, 2)) == pytest.approx(0.7 / 30.0)
 
 
 def test_steps_that_shrink_slowly_have_not_arrived():
