@@ -54,10 +54,8 @@ def drive_unit(
     one = [joint for joint, gain in told.items() if _is_one(gain)]
     constants = ", ".join(f"{gain.value:.3g} ({joint})" for joint, gain in told.items())
     if len(one) == len(told) and (not small or len(told) > 1 or _near(next(iter(told.values())), ONE_DRIVE)):
-        return (
-            "N m",
-            f"with the masses of the URDF one unit is {_range(list(told.values()))} N m on {_of(joints, told)}{_off(told)}",
-        )
+        one_unit = f"one unit is {_range(list(told.values()))} N m on {_of(joints, told)}"
+        return "N m", f"with the masses of the URDF {one_unit}{_off(told)}"
     if small:
         return "duty", f"{size}, and one unit makes {constants} N m; volts cannot be told from it"
     mixed = f"; {', '.join(one)} could be N m: if so, check the masses beyond the others" if one else ""
