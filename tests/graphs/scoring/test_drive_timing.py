@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from simulated_arm import Arm, assert_right, moved, robot_file
 from slow_pendulum import TRUTH, pendulum, recorded, swing
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.judgement import judge
 
 SIGMA, EFFORT_NOISE = 1e-5, 0.002  # [rad], [1] of the largest current
@@ -103,3 +108,23 @@ def test_commands_that_act_late_are_not_called_good(tmp_path, held):
     assert not is_right(result)
     assert result.timing.delay == pytest.approx(2e-3, rel=0.2)
     assert same_time(result).level in ("warn", "bad")
+
+
+@pytest.mark.parametrize(
+    ("late", "joint", "what"),
+    [(0.0, "", ""), (4e-3, "j2", "The encoder of j2 seems to be read"), (-4e-3, "j2", "The drive signal of j2 seems")],
+)
+def test_one_joint_of_another_time_than_the_others_is_named(tmp_path, late, joint, what):
+    arm = Arm("yxy")
+    encoder, command = moved(arm, encoder_rate=200.0, command_rate=200.0)
+    values = encoder.values.copy()
+    values[:, 2] = np.interp(encoder.times - late, encoder.times, values[:, 2])
+    recording = Recording("late.mcap", "", 10**18, {"encoder": replace(encoder, values=values), "command": command})
+    result = calibrate(load_robot(robot_file(arm, tmp_path)), [recording])
+    check = same_time(result)
+    if not late:
+        assert_right(arm, result.parameters, rel=0.005)
+        assert check.level == "good" and judge(result).level == "good"
+        return
+    assert result.timing.joint == joint and result.timing.delay == pytest.approx(late, rel=0.3)
+    assert check.level == "bad" and check.text.startswith(what) and "correct its stamps" in check.text
