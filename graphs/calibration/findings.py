@@ -15,6 +15,7 @@ from jointscope.robots.recordings.recording import Notice
 
 CHI2_LOW, CHI2_HIGH = 0.6, 1.25  # mean squared residual in sigmas that agrees with the stated sensor noise
 COLOURED = 1.5  # block-robust over plain sigma from which a value counts as widened
+FELL = 0.5  # of a sigma, below which it is not believed that the noise is so small
 SAID = 0.2  # relative change of a sigma that is told
 SEVERAL = 0.25  # share of widened values from which residuals are called coloured; a few widen by chance
 
@@ -67,10 +68,14 @@ def _other_sigmas(result: CalibrationResult) -> list[str]:
             for channel, unit, old, new in zip(before.channels, before.units, before.sigmas, now, strict=True)
             if abs(np.log(new / old)) > np.log(1.0 + SAID)
         ]
+        fell = bool(np.any(now < FELL * before.sigmas))
+        far = (
+            " (so small, the states may follow the noise, as those of a model that lacks something do)" if fell else ""
+        )
         if changed:
             said.append(
-                f"its samples scatter by another size than stated, so these sigmas were found anew: "
-                f"{', '.join(changed)}; `estimate_sigma: false` in sensors.{name} keeps yours"
+                f"its residuals are of another size than stated, so these sigmas were found anew: "
+                f"{', '.join(changed)}; `estimate_sigma: false` in sensors.{name} keeps yours{far}"
             )
     return said
 

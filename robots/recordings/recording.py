@@ -18,7 +18,7 @@ from jointscope.robots.errors import RecordingError
 Array = NDArray[np.float64]
 
 GRID = 1000  # instants at which a recording is looked at
-TOLD_WITH_RESULTS = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase", "mimic")
+TOLD_WITH_RESULTS = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase", "mimic", "coarse")
 """Kinds of notices that whoever believes a result has to know: the reader took data away, changed their times, or the
 robot file contradicts them."""
 SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
@@ -76,7 +76,7 @@ class Notice:
     Attributes:
         stream: name of the stream.
         kind: one of "unit", "axes", "clock", "foreign", "glitch", "dropped", "gap", "staircase", "posture", "mimic",
-            "clipping", "end_stop", "out_of_order", "duplicate", "info", "jitter".
+            "coarse", "clipping", "end_stop", "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

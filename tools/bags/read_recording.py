@@ -40,7 +40,13 @@ from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.tidying.lone_samples import without_lone_samples
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
-from jointscope.tools.bags.tidying.stream_notices import by_importance, clipping_notices, said_once, timing_notices
+from jointscope.tools.bags.tidying.stream_notices import (
+    by_importance,
+    clipping_notices,
+    said_once,
+    step_notices,
+    timing_notices,
+)
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
 
 
@@ -90,6 +96,7 @@ def read_recording(
     for stream in streams.values():
         notices += timing_notices(stream.name, stream.times)
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
+    notices += step_notices("command", streams["command"].values, streams["command"].channels, streams["command"].unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
     recording = Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal, posture=posture)
     if seams := [(a, b) for a, b in seams if b > start_ns]:

@@ -108,12 +108,13 @@ def _torques(result: CalibrationResult) -> tuple[str, str] | None:
         return None
     worst = max(off, key=lambda joint: _factor(off[joint]))
     known = [v.value for v in found.values() if v is not None]
+    alike = _one_factor(known) if len(off) == len(known) else ""  # of one that is off the others say nothing
     far = all(_factor(value) > 1.0 + MASSES[1] for value in off.values())
     unit = f" Only if the command is no torque: {_again(result, ' --unit A')}." if far else ""
     text = (
         f"The command is in N m, but with the masses of {robot.tree.urdf.name} one moves as "
         f"{', '.join(f'{significant(v.value)} ({j})' for j, v in off.items())} N m would: masses or torques are wrong "
-        f"by that factor{_one_factor(known)}. Does it carry a load that the URDF lacks, or is it another robot's? Mend "
+        f"by that factor{alike}. Does it carry a load that the URDF lacks, or is it another robot's? Mend "
         f"the masses, then {_again(result)}.{unit}"
     )
     return ("bad" if _factor(off[worst]) > 1.0 + MASSES[1] else "warn"), text

@@ -7,7 +7,7 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing, timing_notices
+from jointscope.tools.bags.tidying.stream_notices import clipping_notices, step_notices, timing, timing_notices
 
 MILLISECOND = 1_000_000
 
@@ -140,3 +140,14 @@ def test_a_quantized_signal_that_turns_around_or_rests_does_not_clip():
     times = np.arange(5000) / 1000
     wave = np.round(np.where(times < 2.25, np.sin(2 * np.pi * times), 1.0), 3)
     assert clipping_notices("motor_encoder", wave[:, None], ("joint1.motor_position",), "rad") == []
+
+
+def test_commands_in_coarse_steps_are_told():
+    t = np.linspace(0.0, 9.0, 1800)
+    wave = 20.0 * np.sin(3.0 * t) + 9.0 * np.sin(11.0 * t)
+    names = ("fine", "cut", "cut_finely", "square")
+    values = np.column_stack([wave, 1.5 * np.trunc(wave / 1.5), 0.1 * np.rint(wave / 0.1), 5.0 * np.sign(wave)])
+    (notice,) = step_notices("command", values, tuple(f"{name}.command" for name in names), "N m")
+    assert notice.kind == "coarse" and notice.count == 1
+    assert notice.text.startswith("command: cut.command in steps of 1.5 N m, 10 % of its rms")
+    assert step_notices("command", values[:, [0]], ("fine.command",), "N m") == []

@@ -19,9 +19,12 @@ JITTER_SHARE = 0.02  # of the median period
 LONG_GAP = 3.5  # periods; shorter ones are a lost sample or two
 MISSING_SHARE = 0.02  # of the samples
 WORTH_SAYING = 0.2  # of the period: jitter that makes samples uneven
+COARSE_STEP = 0.03  # of the rms, from which a step matters
+FEWEST_LEVELS, MOST_LEVELS = 8, 400  # fewer are a test signal, more are no steps
+EVEN = 1e-3  # [steps]
 IMPORTANCE = (
-    "unit", "axes", "clock", "foreign", "glitch", "end_stop", "gap", "dropped", "posture", "staircase", "clipping",
-    "out_of_order", "duplicate", "info", "jitter",
+    "unit", "axes", "clock", "foreign", "glitch", "end_stop", "gap", "dropped", "mimic", "posture", "staircase",
+    "coarse", "clipping", "out_of_order", "duplicate", "info", "jitter",
 )  # fmt: skip
 CLIPPED_RUN = 3  # equal extreme samples in a row
 LIMIT_SHARE = 0.2  # of the largest value of all channels: below it an extreme is no limit
@@ -124,6 +127,32 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
     if name != "command" and unit != "1":
         meaning = " (beyond it nothing is measured: those samples are too small)"
     return [Notice(name, "clipping", total, f"{name} stays at a limit while it moves{meaning}: {'; '.join(parts)}")]
+
+
+def step_notices(name: str, values: Array, channels: tuple[str, ...], unit: str) -> list[Notice]:
+    """A notice about commands that come in coarse steps, as drivers that cut to whole numbers make them.
+
+    Args:
+        name: name of the stream.
+        values: samples, shape (n, m).
+        channels: name of each column.
+        unit: unit of the values.
+    """
+    parts = []
+    for column, channel in zip(values.T, channels, strict=True):
+        levels = np.unique(column[np.isfinite(column)])
+        if not FEWEST_LEVELS <= len(levels) <= MOST_LEVELS:
+            continue
+        apart = np.diff(levels)
+        step, rms = float(apart.min()), float(np.sqrt(np.nanmean(column**2)))
+        even = bool(np.all(np.abs(apart / step - np.rint(apart / step)) < EVEN))
+        if even and step > COARSE_STEP * rms:
+            said = f"{step:.3g}{'' if unit == '1' else ' ' + unit}"
+            parts.append(f"{channel} in steps of {said}, {100.0 * step / rms:.2g} % of its rms")
+    if not parts:
+        return []
+    text = f"{name}: {'; '.join(parts)}: what acted may lie between, and small torques are wrong by up to a step"
+    return [Notice(name, "coarse", len(parts), text)]
 
 
 def _clipped(column: Array, extreme: float) -> int:

@@ -46,7 +46,9 @@ def drive_table(guess: RobotGuess) -> list[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     if any(UNKNOWN in row for row in rows):
-        lines.append(f"{UNKNOWN}: the recording does not tell it; the robot file has a guess and says so")
+        lines.append(
+            f"{UNKNOWN}: the recording does not tell it; where the robot file has it, it is a guess and says so"
+        )
     return ["drives by regression with rigid joints, sigmas from blocks of the recording:", *(f"  {x}" for x in lines)]
 
 
