@@ -25,7 +25,8 @@ def write_section(text: str, part: str = "") -> None:
         part: of a benchmark that measures several things, as on its command line.
     """
     program = Path(sys.argv[0])
-    name = f"{program.stem} {part}".strip()
+    words = re.sub(r"\W+", " ", part)  # an option as it is typed is no name
+    name = f"{program.stem} {words}".strip()
     heading, _, body = text.strip().partition("\n")
     typed = f"python benchmarks/{program.name} {part}".strip()
     told = f"Measured {datetime.now(UTC):%Y-%m-%d} at commit {commit()} by `{typed}` on {environment()}."
