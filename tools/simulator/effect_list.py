@@ -14,6 +14,7 @@ HEADINGS = {
 }
 EXAMPLES = {
     "joint": "joint1",
+    "joint seen on the link": "joint1.link",
     "elastic joint": "joint1 (elastic)",
     "last joint": "the last joint",
     "imu": "imu1",
