@@ -63,7 +63,7 @@ def test_a_sticking_arm_is_right_and_good_and_nothing_is_named(robot, seed):
 def test_a_command_that_acts_late_on_a_sticking_arm_is_found(robot):
     result = calibrate(robot, [recorded(late=LATE)])
     assert result.timing.delay == pytest.approx(LATE, rel=0.15)
-    assert timing_check(result).level == "warn"
+    assert timing_check(result).level in ("warn", "bad")
 
 
 def test_a_push_on_a_sticking_arm_is_found_when_and_where_it_was(robot):
