@@ -38,6 +38,8 @@ def gap_hypotheses(segments: Sequence[ScoreSignals]) -> list[EffectHypothesis]:
             here = EffectAt(effect, owner)
             if robot.has_effect(effect.id, owner) or cannot_be_added(robot, here) or not curves_of(robot, here):
                 continue
+            if any(f"{owner}.{name}" not in robot.parameters for name in BEYOND):
+                continue  # a spring that came as an effect has a compliance: its gap is scored at null alone
             j = robot.joints.index(owner)
             largest = max(float(np.max(np.abs(deflection(s, j)))) for s in segments)
             known = [robot.parameters[f"{owner}.{name}"] for name in BEYOND]
