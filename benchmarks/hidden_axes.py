@@ -11,15 +11,13 @@ estimator: Heun's rule with stops at the events.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from arm_recording import Topic, write_topics
 from numba import njit
 from numpy.typing import NDArray
-from spring_axes import _coloured, _urdf, _wanted
+from spring_axes import axis_urdf, coloured_torque, moves_between_goals, write_axis
 
 Array = NDArray[np.float64]
 STEP = 1e-4  # [s] of the integration
@@ -124,10 +122,10 @@ def record_hidden(axis: HiddenAxis, folder: Path, seconds: float, occasion: int 
     """Writes axis.urdf, truth.json and a bag of one occasion into a folder; returns the path of the bag."""
     rng, body = np.random.default_rng([axis.seed, occasion]), np.random.default_rng([axis.seed, 77])
     fast = np.arange(int(seconds / PERIOD) * EVERY) * PERIOD / EVERY
-    wanted, ticks = np.column_stack(_wanted(axis, fast, rng))[::EVERY], fast[::EVERY]
+    wanted, ticks = np.column_stack(moves_between_goals(axis, fast, rng))[::EVERY], fast[::EVERY]
     random, ripple, small = AROUND[axis.around]
     waves = _waves(axis, ripple, body)
-    torque = _coloured(random * axis.force, len(fast), rng)[::EVERY]
+    torque = coloured_torque(random * axis.force, len(fast), rng)[::EVERY]
     read = axis.noise * rng.standard_normal(len(ticks))
     force, own = axis.force, dict.fromkeys(("offset", "backwards", "viscous_backwards", "stribeck", "load"), 0.0)
     own |= dict.fromkeys(("imbalance", "delay", "stretch", "warming", "stop"), 0.0) | axis.sizes
@@ -153,17 +151,8 @@ def record_hidden(axis: HiddenAxis, folder: Path, seconds: float, occasion: int 
     base = np.array([axis.inertia, axis.coulomb * force, axis.viscous * force / axis.speed])
     gains = np.array([STIFFNESS**2, 1.4 * STIFFNESS]) * axis.inertia
     u, q = _run(base, laws, waves, gains, wanted, torque, read, axis.noise, round(PERIOD / STEP))
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "axis.urdf").write_text(_urdf(axis), encoding="utf-8")
     truth = asdict(axis) | {"coulomb": base[1], "viscous": base[2], "true": true_sizes(axis)}
-    (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")
-    bag = folder / f"{'train' if occasion == 0 else f'test{occasion}'}.mcap"
-    topics = [
-        Topic("/joint_states", ticks + FIRST_SAMPLE, ("axis",), {"position": q[:, None]}),
-        Topic("/motor_command", ticks + FIRST_SAMPLE, ("axis",), {"effort": u[:, None]}),
-    ]
-    write_topics(bag, topics)
-    return bag
+    return write_axis(folder, axis_urdf(axis), truth, occasion, (ticks + FIRST_SAMPLE, q, u))
 
 
 def true_sizes(axis: HiddenAxis) -> dict[str, float]:

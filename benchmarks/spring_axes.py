@@ -11,8 +11,10 @@ Kutta's rule between the events; nothing is shared with the estimator.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from arm_recording import Topic, write_topics
@@ -126,9 +128,9 @@ def record_axis(axis: SpringAxis, folder: Path, seconds: float, occasion: int = 
     """Writes axis.urdf, truth.json and a bag of one occasion into a folder; returns the path of the bag."""
     rng = np.random.default_rng([axis.seed, occasion])
     ticks = np.arange(int(seconds * RATE)) / RATE
-    q_ref, v_ref, a_ref = _wanted(axis, ticks, rng)
+    q_ref, v_ref, a_ref = moves_between_goals(axis, ticks, rng)
     fine = round(1.0 / (RATE * STEP))
-    torque = _coloured(axis.random * axis.force, len(ticks), rng)
+    torque = coloured_torque(axis.random * axis.force, len(ticks), rng)
     read = axis.noise * rng.standard_normal(len(ticks))
     frictions = axis.coulomb * axis.force, axis.viscous * axis.force / axis.speed
     spring = np.array([axis.stiffness, 2.0 * axis.damping_ratio * np.sqrt(axis.stiffness * axis.load)])
@@ -143,20 +145,38 @@ def record_axis(axis: SpringAxis, folder: Path, seconds: float, occasion: int = 
         axis.noise,
         fine,
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "axis.urdf").write_text(_urdf(axis), encoding="utf-8")
     truth = asdict(axis) | {"compliance": axis.compliance if axis.frequency else 0.0, "damping": float(spring[1])}
+    return write_axis(folder, axis_urdf(axis), truth, occasion, (ticks + FIRST_SAMPLE, q, u))
+
+
+def write_axis(
+    folder: Path, urdf: str, truth: Mapping[str, Any], occasion: int, motion: tuple[Array, Array, Array]
+) -> Path:
+    """The URDF, the truth and the bag of one axis.
+
+    Args:
+        folder: for all of them; made where it is missing.
+        urdf: its text.
+        truth: what the simulation used.
+        occasion: 0 for the recording to learn from, others for those held out.
+        motion: stamps [s], positions and efforts, shape (m,) each.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "axis.urdf").write_text(urdf, encoding="utf-8")
     (folder / "truth.json").write_text(json.dumps(truth, indent=1), encoding="utf-8")
     bag = folder / f"{'train' if occasion == 0 else f'test{occasion}'}.mcap"
-    topics = [
-        Topic("/joint_states", ticks + FIRST_SAMPLE, ("axis",), {"position": q[:, None]}),
-        Topic("/motor_command", ticks + FIRST_SAMPLE, ("axis",), {"effort": u[:, None]}),
-    ]
-    write_topics(bag, topics)
+    stamps, q, u = motion
+    write_topics(
+        bag,
+        [
+            Topic("/joint_states", stamps, ("axis",), {"position": q[:, None]}),
+            Topic("/motor_command", stamps, ("axis",), {"effort": u[:, None]}),
+        ],
+    )
     return bag
 
 
-def _wanted(axis: SpringAxis, ticks: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+def moves_between_goals(axis: SpringAxis, ticks: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
     """Moves between random goals with bounded speed and acceleration, averaged over a short time; with rests."""
     h, a_ref = 1.0 / RATE, np.zeros(len(ticks))
     q, k = 0.0, int(0.3 * RATE)
@@ -178,7 +198,7 @@ def _wanted(axis: SpringAxis, ticks: Array, rng: np.random.Generator) -> tuple[A
     return np.cumsum(v) * h, v, a
 
 
-def _coloured(size: float, n: int, rng: np.random.Generator) -> Array:
+def coloured_torque(size: float, n: int, rng: np.random.Generator) -> Array:
     """A Gauss-Markov torque at the ticks, shape (n,)."""
     keep, torque, white = np.exp(-1.0 / (RATE * MEMORY)), np.empty(n), rng.standard_normal(n)
     torque[0] = size * white[0]
@@ -244,7 +264,7 @@ def _rates(x, inertia, spring, friction, drive, direction):
     return np.array([x[1], a, x[3], (tau - friction[2] * np.sin(x[2])) / inertia[1]])
 
 
-def _urdf(axis: SpringAxis) -> str:
+def axis_urdf(axis: SpringAxis) -> str:
     kind = "prismatic" if axis.slides else "revolute"
     arm = axis.weight * axis.force / GRAVITY  # m r
     mass = axis.load if axis.slides else max(1.0, 2.0 * arm**2 / axis.load)

@@ -100,6 +100,8 @@ def drive_timing(
     asked = [] if _has(robot, CommandEffect) else [(EFFECT, OWNER)]
     if robot.n > 1 and robot.link_encoder is None and not robot.gyros:
         asked += [(ENCODER, joint) for joint in robot.joints]
+    if not asked:
+        return None
     here = [EffectAt(catalogue()[effect], owner) for effect, owner in asked]
     hypotheses = [EffectHypothesis(at, at.effect.parameters_at(robot, at.owner)) for at in here]
     segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
@@ -109,10 +111,8 @@ def drive_timing(
     ]
     drive = next((timing for timing in found if timing is not None and not timing.joint), None)
     encoders = [timing for timing in found if timing is not None and timing.joint]
-    late = max(encoders, key=_clearness, default=None)
-    for encoder in encoders:  # of two that say nearly the same, a late encoder is the usual one
-        if late is not None and encoder.delay > 0.0 > late.delay and _clearness(encoder) > USUAL * _clearness(late):
-            late = encoder
+    # of two that say nearly the same, a late encoder is the usual one
+    late = max(encoders, key=lambda e: _clearness(e) / (USUAL if e.delay > 0.0 else 1.0), default=None)
     if drive is None or (late is not None and _clearness(late) > CLEARER * _clearness(drive)):
         return late or drive
     return drive

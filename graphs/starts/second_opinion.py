@@ -15,7 +15,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
 DELAY = "command_delay@robot"
-TOLD = 0.15  # relative sigma of a constant that tells something
+TOLD = 0.15  # relative sigma up to which a constant tells anything
 EXPLAINED = 0.99  # of the mean square of the driving torque, below which the model of the regression is another one
 
 

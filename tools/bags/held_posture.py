@@ -37,7 +37,9 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     """
     names = _other_names(found, robot)
     at_mean = robot.held_at_mean
-    ranges = {name: (_unit_of(robot, joint), _range(found, name, joint in at_mean)) for name, joint in names.items()}
+    ranges = {
+        name: (unit_of_other(robot, joint), _range(found, name, joint in at_mean)) for name, joint in names.items()
+    }
     ends = [
         robot.tree.posture({names[name]: spans[k] * si_factor(unit) for name, (unit, spans) in ranges.items() if spans})
         for k in range(3)
@@ -97,7 +99,7 @@ def _range(found: Sequence[MessageParts], name: str, mean: bool) -> tuple[float,
     return float(low), float(middle), float(high)
 
 
-def _unit_of(robot: Robot, joint: str) -> str:
+def unit_of_other(robot: Robot, joint: str) -> str:
     """Unit in the bag of a joint outside the robot: that of the robot's joints of its kind."""
     wanted = "m" if robot.tree.is_slide(joint) else "rad"
     units = robot.motor_encoder.source.bag_units(robot.n)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor
-from jointscope.tools.bags.held_posture import FEWEST, OUTLYING, STILL
+from jointscope.tools.bags.held_posture import FEWEST, OUTLYING, STILL, unit_of_other
 from jointscope.tools.bags.messages.message_parts import MessageParts
 from jointscope.tools.bags.tidying.not_finite import LARGEST
 
@@ -42,14 +42,10 @@ def mimic_notices(found: Sequence[MessageParts], robot: Robot) -> list[Notice]:
         pairs = _pairs(found, names[leader], prefix + joint)
         if pairs is None:
             continue
-        slide = robot.tree.is_slide(joint)
-        unit = next(
-            (units[name] for name in robot.joints if robot.tree.is_slide(name) == slide), "m" if slide else "rad"
-        )
-        q, p = scales[leader] * si_factor(units[leader]) * pairs[0], si_factor(unit) * pairs[1]
-        still = STILL["m" if slide else "rad"]
+        own, unit = unit_of_other(robot, joint), "m" if robot.tree.is_slide(joint) else "rad"
+        q, p = scales[leader] * si_factor(units[leader]) * pairs[0], si_factor(own) * pairs[1]
         off = np.abs(p - (follower.factor * q + follower.offset))
-        if _span(p) <= still or float(np.quantile(off, 1.0 - OUTLYING)) <= still:
+        if _span(p) <= STILL[unit] or float(np.quantile(off, 1.0 - OUTLYING)) <= STILL[unit]:
             continue
         factor, offset = np.round(np.polyfit(q, p, 1), DIGITS) + 0.0
         notices.append(
@@ -59,7 +55,7 @@ def mimic_notices(found: Sequence[MessageParts], robot: Robot) -> list[Notice]:
                 1,
                 f"{joint} follows {leader} in {robot.tree.urdf.name} with multiplier {follower.factor:g} and offset "
                 f"{follower.offset:g}, but in the bag with {factor:g} and {offset:g} (up to "
-                f"{float(np.max(off)):.2g} {'m' if slide else 'rad'} from there): what it carries is modelled where it "
+                f"{float(np.max(off)):.2g} {unit} from there): what it carries is modelled where it "
                 "is not; correct its <mimic> in the URDF, or the sign with which the driver publishes it",
             )
         )

@@ -148,19 +148,24 @@ def test_right_masses_are_not_doubted(three_joints):
     )
 
 
+def doubted(robot, value, sigma, mass):
+    """A calibration with one torque constant, and a link whose mass it doubts."""
+    return dataclasses.replace(
+        fake_calibration(0.2),
+        robot=robot,
+        start=robot,
+        parameters=(ParameterEstimate("elbow.torque_constant", value, sigma, "N m/A", value, value, value),),
+        masses=(mass,),
+    )
+
+
 @pytest.mark.parametrize(
     ("p_value", "change", "level"),
     [(1e-6, 0.05, "bad"), (1e-6, 0.015, "good"), (1e-3, 0.05, "good"), (1e-6, 1e-3, "good")],
 )
 def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, change, level):
     robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
-    result = dataclasses.replace(
-        fake_calibration(0.2),
-        robot=robot,
-        start=robot,
-        parameters=(ParameterEstimate("elbow.torque_constant", 8.0, 0.01, "N m/A", 8.0, 8.0, 8.0),),
-        masses=(WrongMass("elbow", 0.3, 0.02, p_value, {"elbow.torque_constant": 8.0 * change}),),
-    )
+    result = doubted(robot, 8.0, 0.01, WrongMass("elbow", 0.3, 0.02, p_value, {"elbow.torque_constant": 8.0 * change}))
     found, text = plausible_torques(result)
     assert found == level
     if level == "bad":
@@ -182,13 +187,7 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
 )
 def test_weight_has_other_reasons_than_a_load(arm, tmp_path, value, mass, said):
     robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
-    result = dataclasses.replace(
-        fake_calibration(0.2),
-        robot=robot,
-        start=robot,
-        parameters=(ParameterEstimate("elbow.torque_constant", value, 1e-3, "N m/A", value, value, value),),
-        masses=(WrongMass("elbow", mass, 0.03, 1e-9, {"elbow.torque_constant": 0.05 * value}),),
-    )
+    result = doubted(robot, value, 1e-3, WrongMass("elbow", mass, 0.03, 1e-9, {"elbow.torque_constant": 0.05 * value}))
     level, text = plausible_torques(result)
     assert level == "bad" and re.search(said.replace("+", r"\+"), text), text
 

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.graphs.starts.second_opinion import TOLD
 
 LARGEST_DUTY = 1.0 + 1e-6
 LARGEST_VOLTS = 60.0
-TOLD = 0.15  # relative sigma up to which a constant tells anything
 MASSES = 0.25  # relative; how far the masses of a URDF may be off
 ONE_DRIVE = 0.1  # relative; a single duty cycle may give about 1 N m by chance
 SURE = 3.5  # [sigma]

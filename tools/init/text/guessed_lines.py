@@ -7,16 +7,8 @@ from itertools import pairwise
 
 from jointscope.tools.init.text.robot_line import GUESS
 
-SHARED_KEYS = (
-    "names",
-    "unit",
-    "scale",
-    "sigma",
-    "field",
-    "wraps",
-    "kind",
-    "held",
-)  # in the section of the command and of each sensor
+# in the section of the command and of each sensor
+SHARED_KEYS = ("names", "unit", "scale", "sigma", "field", "wraps", "kind", "held")
 
 
 def guesses(text: str) -> list[str]:
