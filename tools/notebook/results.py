@@ -16,12 +16,12 @@ from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.errors import RobotError
 from jointscope.tools.notebook.shown import Row, Shown
-from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.model_answer import diagnosis_answer, discovery_answer
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.replay_judgement import judge_replay
 from jointscope.tools.verb_parts import result_files
 from jointscope.tools.verb_parts.result_files import ResultFiles
+from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.replay_judgement import judge_replay
 
 TOLD = 12  # candidates in a figure
 

@@ -15,11 +15,11 @@ from jointscope.graphs.poses.discover_poses import PoseDiscovery
 from jointscope.graphs.poses.tip_errors import parts_of, summary
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import significant, with_sigma
-from jointscope.tools.presentation.pose_judgement import judge_poses
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
 from jointscope.tools.terminal.pose_discovery_text import step_table
+from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 Array = NDArray[np.float64]
 BINS = 30

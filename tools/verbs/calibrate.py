@@ -89,9 +89,9 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.notebook.calls import calibrate
-    from jointscope.tools.presentation.judgement import judge
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look
+    from jointscope.tools.verdicts.judgement import judge
 
     load_user_effects(args.effects)
     robot, limits = load_robot(args.robot), limits_of(args)

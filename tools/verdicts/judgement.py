@@ -10,9 +10,9 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.plausible_torques import plausible_torques
-from jointscope.tools.presentation.torque_constants import suspicious_constants
-from jointscope.tools.presentation.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
+from jointscope.tools.verdicts.plausible_torques import plausible_torques
+from jointscope.tools.verdicts.torque_constants import suspicious_constants
+from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
