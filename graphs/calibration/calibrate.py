@@ -29,6 +29,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -77,7 +78,8 @@ def calibrate(
             slow motion are looked for; else what these moments say is left out.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
         sets: recordings of other kinds than motion, which share the robot's values.
-        memory: whether random torques may last, where the recordings say so; they are white otherwise.
+        memory: whether random torques may last, where the recordings say so, and effects that would change the values
+            are asked for; without, random torques are white, as a search for effects wants them.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -146,11 +148,12 @@ def _calibrated(
     if near is None and not biases_only:
         moving = solved.of_motions
         result = replace(result, timing=drive_timing(*moving), masses=wrong_masses(*moving))
+        result = replace(result, lacking=lacking_effects(*moving) if memory else ())
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
                 other = summarize(robot, lasting, tuple(history.records), notices, hold)
-                result = replace(other, timing=result.timing, masses=result.masses)
+                result = replace(other, timing=result.timing, masses=result.masses, lacking=result.lacking)
         regressed = regressed_values(result.robot, recordings)
         said = (*result.findings, *on_their_word(result.robot, regressed))
         result = replace(result, regressed=regressed, findings=said)

@@ -64,6 +64,7 @@ EFFECT = PwmDeadband(
         look_alikes={
             "motor_stribeck": "both take torque away where the command is small",
             "asymmetric_friction": "while accelerating, a lost command is more friction",
+            "truncated_command": "the same with the other sign",
         },
     ),
 )

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effects of the catalogue would change the values: a score test after every calibration.
+
+A model that lacks an effect has wrong values with small sigmas, and process noise takes what is left, so that residuals
+need not tell. One linear step with the effect does: how large it would be, whether that may be chance, and which values
+it would change. Nothing is estimated anew: `diagnose` and `discover` do that, with predictions of other moments.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep
+from jointscope.graphs.scoring.score_system import Segment
+from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+
+BY_CHANCE = 1e-3  # probability, over all effects that were asked for together, from which one may be chance
+MOST = 20  # effects whose scatter over blocks is looked at
+SURE = 3.5  # [sigma of a value] that an effect must move it, and ...
+MOVED = 0.02  # ... the share of the value
+MOST_SHAPES = 10  # beyond them, as for ripple of unknown order, one looks at a spectrum first; it moves values little
+SLOW_FORMS = ("integration", "bearing")  # changes of the whole model, of which one step tells little
+
+
+@dataclass(frozen=True)
+class LackingEffect:
+    """What one step with an effect says.
+
+    Attributes:
+        effect: its id in the catalogue.
+        owner: joint, link, sensor or robot.
+        p_value: that it is chance, over the blocks of the recording and all effects that were asked for.
+        with_it: each parameter with the effect beside it, in the parameter's unit.
+    """
+
+    effect: str
+    owner: str
+    p_value: float
+    with_it: dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """ID@OWNER."""
+        return f"{self.effect}@{self.owner}"
+
+    def moved(self, found: Mapping[str, Value]) -> dict[str, float]:
+        """Relative changes of the values that the effect would change by much, by name; none where it may be chance.
+
+        Args:
+            found: calibrated values with their sigmas, by name.
+        """
+        if self.p_value > BY_CHANCE:
+            return {}
+        told = {n: self.with_it[n] - v.value for n, v in found.items() if n in self.with_it and v.value}
+        told = {n: d for n, d in told.items() if not n.endswith(".delay") and abs(d) > SURE * found[n].sigma}
+        return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
+
+
+def lacking_effects(
+    problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
+) -> tuple[LackingEffect, ...]:
+    """Effects that a solved calibration asks for, surest first; few, or none.
+
+    Args:
+        problems: whole recordings with the noise used.
+        states: their solution.
+        calibrations: the values found, with the biases of each recording.
+    """
+    robot = problems[0].robot
+    hypotheses = _hypotheses(robot)
+    if robot.choices.link_dynamics != "model" or not hypotheses:
+        return ()
+    test = ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
+    best = dict[str, HypothesisScore]()
+    for score in test.each(hypotheses):
+        label = score.hypothesis.label
+        if label not in best or score.plausible[0] > best[label].plausible[0]:
+            best[label] = score
+    tried = len(hypotheses)
+    seen = [s for s in best.values() if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
+    seen = sorted(seen, key=lambda score: -score.score)[:MOST]
+    steps = [step for step in test.steps([score.hypothesis for score in seen]) if _is_possible(step)]
+    return tuple(_lacking(step, tried, calibrations[0]) for step in sorted(steps, key=lambda step: step.p_value))
+
+
+def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
+    """What is asked for: all that needs no model of its own, and no search among many shapes."""
+    asked = hypotheses_of(robot)
+    asked = [h for h in asked if not (isinstance(h.here.effect, Structure) and h.here.effect.form in SLOW_FORMS)]
+    shapes = Counter(h.label for h in asked)
+    return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
+
+
+def _is_possible(step: HypothesisStep) -> bool:
+    """Whether the step ends at a size that may be; beyond, one linear step tells nothing."""
+    usual = np.array([size.prior_sigma for size in step.hypothesis.sizes])
+    return bool(np.all(np.abs(step.sizes) <= usual) and np.isfinite(step.p_value))
+
+
+def _lacking(step: HypothesisStep, tried: int, start: Calibration) -> LackingEffect:
+    moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
+    here = step.hypothesis.here
+    with_it = dict(zip(start.names, moved.values.tolist(), strict=True))
+    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), with_it)
