@@ -157,7 +157,6 @@ def _plain(line: str) -> str:
 
 def _wish(joints: str, locked: str) -> Wish:
     """What the options say about joints."""
-    from jointscope.tools.init.robot_guess import RobotGuess
     from jointscope.tools.init.streams.named_signal import Wish
 
     given = [part.strip().partition("=") for part in joints.split(",") if part.strip()]
