@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.calibration.calibration_summary import summarize
+from jointscope.graphs.calibration.calibration_summary import Solved, summarize
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.friction_at_standstill import asked_at_standstill, sticking_joints
@@ -30,6 +30,7 @@ from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -146,9 +147,7 @@ def _calibrated(
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        moving = solved.of_motions
-        result = replace(result, timing=drive_timing(*moving), masses=wrong_masses(*moving))
-        result = replace(result, lacking=lacking_effects(*moving) if memory else ())
+        result = _asked_for_causes(result, solved, effects=memory)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -161,6 +160,13 @@ def _calibrated(
         factors = _standing(solved.problems[0].dynamics.steps.noise, noise, result.noise.n_lasting)
         result = replace(result, robot=replace(result.robot, noise=scaled(result.noise, factors)))
     return result
+
+
+def _asked_for_causes(result: CalibrationResult, solved: Solved, effects: bool) -> CalibrationResult:
+    """With what a linear step says of late signals, of masses and, where it is wanted, of the whole catalogue."""
+    test = ScoreTest.of(*solved.of_motions)
+    lacking = lacking_effects(test) if effects else ()
+    return replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

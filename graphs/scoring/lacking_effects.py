@@ -9,7 +9,7 @@ it would change. Nothing is estimated anew: `diagnose` and `discover` do that, w
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep
-from jointscope.graphs.scoring.score_system import Segment
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.structure import Structure
@@ -70,21 +68,16 @@ class LackingEffect:
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
 
-def lacking_effects(
-    problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
-) -> tuple[LackingEffect, ...]:
+def lacking_effects(test: ScoreTest) -> tuple[LackingEffect, ...]:
     """Effects that a solved calibration asks for, surest first; few, or none.
 
     Args:
-        problems: whole recordings with the noise used.
-        states: their solution.
-        calibrations: the values found, with the biases of each recording.
+        test: of the whole recordings, linearised at their solution with the noise used.
     """
-    robot = problems[0].robot
+    robot = test.robot
     hypotheses = _hypotheses(robot)
     if robot.choices.link_dynamics != "model" or not hypotheses:
         return ()
-    test = ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
     best = dict[str, HypothesisScore]()
     for score in test.each(hypotheses):
         label = score.hypothesis.label
@@ -94,7 +87,7 @@ def lacking_effects(
     seen = [s for s in best.values() if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
     seen = sorted(seen, key=lambda score: -score.score)[:MOST]
     steps = [step for step in test.steps([score.hypothesis for score in seen]) if _is_possible(step)]
-    return tuple(_lacking(step, tried, calibrations[0]) for step in sorted(steps, key=lambda step: step.p_value))
+    return tuple(_lacking(step, tried, test.calibration) for step in sorted(steps, key=lambda step: step.p_value))
 
 
 def _hypotheses(robot: Robot) -> list[EffectHypothesis]:

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import fdtrc
 
+from jointscope.factors.calibration import Calibration
 from jointscope.factors.priors import shared_priors
+from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep, JointScores, fit
@@ -25,6 +27,7 @@ from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -42,6 +45,27 @@ class ScoreTest:
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
         self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
+
+    @staticmethod
+    def of(problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]) -> ScoreTest:
+        """The test on whole recordings.
+
+        Args:
+            problems: their factors.
+            states: their solution.
+            calibrations: the values found, with the biases of each recording.
+        """
+        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the base model."""
+        return self._segments[0].problem.robot
+
+    @property
+    def calibration(self) -> Calibration:
+        """The values of the base model, with the biases of the first recording."""
+        return self._segments[0].calibration
 
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""
