@@ -68,7 +68,7 @@ def add_parser(subparsers: Any) -> None:
     add_poses_option(parser)
     add_rests_option(parser)
     add_frequency_option(parser)
-    parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
+    parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry found from poses")
     add_accept_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
