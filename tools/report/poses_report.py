@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 
@@ -26,20 +27,26 @@ BINS = 30
 MM, MICRO = 1e3, 1e6
 
 
-def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None, checked: AcceptedBy = NO_LIMITS) -> str:
+def poses_report(
+    result: PoseCalibration,
+    found: PoseDiscovery | None = None,
+    checked: AcceptedBy = NO_LIMITS,
+    more: Sequence[Section] = (),
+) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         found: the discovery whose last step it is.
         checked: limits that the user has declared, as they came out.
+        more: sections at the end.
     """
     paths = ", ".join(problem.poses.path for problem in result.problems)
     sections = pose_sections(result)
     if found is not None:
         sections.insert(1, _steps(found))
     sections[1:1] = acceptance(checked)
-    return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
+    return page(f"{result.robot.name}: geometry and sag from poses", paths, [*sections, *more])
 
 
 def pose_sections(result: PoseCalibration) -> list[Section]:
