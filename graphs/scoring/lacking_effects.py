@@ -9,7 +9,7 @@ it would change. Nothing is estimated anew: `diagnose` and `discover` do that, w
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,11 +26,14 @@ from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 
-BY_CHANCE = 1e-3  # probability, over all effects that were asked for together, from which one may be chance
+BY_CHANCE = 1e-2  # probability, over all effects that were asked for together, from which one may be chance
 MOST = 20  # effects whose scatter over blocks is looked at
-SURE = 3.5  # [sigma of a value] that an effect must move it, and ...
-MOVED = 0.02  # ... the share of the value
+AS_SURE = 100.0  # times the probability of the surest effect of an owner, up to which another explains as much
+INDEPENDENT = 0.1  # [s] stretches of this length count as samples where sizes are paid for
+SURE = 2.0  # [sigma of a value] that an effect must move it, and ...
+MOVED = 0.01  # ... the share of the value: what is called right is right within a percent
 MOST_SHAPES = 10  # beyond them, as for ripple of unknown order, one looks at a spectrum first; it moves values little
+ROBOT = "robot"
 SLOW_FORMS = ("integration", "bearing")  # changes of the whole model, of which one step tells little
 
 
@@ -42,12 +45,14 @@ class LackingEffect:
         effect: its id in the catalogue.
         owner: joint, link, sensor or robot.
         p_value: that it is chance, over the blocks of the recording and all effects that were asked for.
+        worth: score less what its sizes cost.
         with_it: each parameter with the effect beside it, in the parameter's unit.
     """
 
     effect: str
     owner: str
     p_value: float
+    worth: float
     with_it: dict[str, float]
 
     @property
@@ -55,16 +60,17 @@ class LackingEffect:
         """ID@OWNER."""
         return f"{self.effect}@{self.owner}"
 
-    def moved(self, found: Mapping[str, Value]) -> dict[str, float]:
+    def moved(self, found: Mapping[str, Value], sigmas: float = SURE) -> dict[str, float]:
         """Relative changes of the values that the effect would change by much, by name; none where it may be chance.
 
         Args:
             found: calibrated values with their sigmas, by name.
+            sigmas: of a value, that a change must be larger than.
         """
         if self.p_value > BY_CHANCE:
             return {}
         told = {n: self.with_it[n] - v.value for n, v in found.items() if n in self.with_it and v.value}
-        told = {n: d for n, d in told.items() if not n.endswith(".delay") and abs(d) > SURE * found[n].sigma}
+        told = {n: d for n, d in told.items() if not n.endswith(".delay") and abs(d) > sigmas * found[n].sigma}
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
 
@@ -86,8 +92,22 @@ def lacking_effects(test: ScoreTest) -> tuple[LackingEffect, ...]:
     tried = len(hypotheses)
     seen = [s for s in best.values() if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
     seen = sorted(seen, key=lambda score: -score.score)[:MOST]
-    steps = [step for step in test.steps([score.hypothesis for score in seen]) if _is_possible(step)]
-    return tuple(_lacking(step, tried, test.calibration) for step in sorted(steps, key=lambda step: step.p_value))
+    steps = test.steps([score.hypothesis for score in seen])
+    cost = float(np.log(test.seconds / INDEPENDENT))
+    worth = [score.score - score.dof * cost for score in seen]
+    pairs = zip(steps, worth, strict=True)
+    return _leaders([_lacking(step, tried, w, test.calibration) for step, w in pairs if _is_possible(step)])
+
+
+def _leaders(found: Sequence[LackingEffect]) -> tuple[LackingEffect, ...]:
+    """The surest of each owner with those that explain as much, simplest first; what another explains is no cause."""
+    surest: dict[str, float] = {}
+    for effect in found:
+        surest[effect.owner] = min(surest.get(effect.owner, 1.0), effect.p_value)
+    of_all = min(surest.values(), default=1.0)
+    groups = {owner: of_all if owner == ROBOT else p for owner, p in surest.items()}
+    kept = [effect for effect in found if effect.p_value <= AS_SURE * groups[effect.owner]]
+    return tuple(sorted(kept, key=lambda effect: (groups[effect.owner], -effect.worth)))
 
 
 def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
@@ -104,8 +124,8 @@ def _is_possible(step: HypothesisStep) -> bool:
     return bool(np.all(np.abs(step.sizes) <= usual) and np.isfinite(step.p_value))
 
 
-def _lacking(step: HypothesisStep, tried: int, start: Calibration) -> LackingEffect:
+def _lacking(step: HypothesisStep, tried: int, worth: float, start: Calibration) -> LackingEffect:
     moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
     here = step.hypothesis.here
     with_it = dict(zip(start.names, moved.values.tolist(), strict=True))
-    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), with_it)
+    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), worth, with_it)

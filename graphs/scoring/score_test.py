@@ -58,6 +58,11 @@ class ScoreTest:
         return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
 
     @property
+    def seconds(self) -> float:
+        """Length of all recordings together [s]."""
+        return sum(float(np.ptp(s.signals.ticks)) for s in self._segments)
+
+    @property
     def robot(self) -> Robot:
         """The robot of the base model."""
         return self._segments[0].problem.robot

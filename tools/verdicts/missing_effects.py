@@ -6,10 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.tools.presentation.numbers import significant
 
-MOST_NAMED = 3
+MOST_ALIKE = 2
+LONG = 0.5  # of a value, beyond which one linear step does not say where it ends
 
 
 def missing_effects(result: CalibrationResult) -> tuple[str, str]:
@@ -18,18 +20,27 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Without masses nothing tells."
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
-    if not asked:
+    within = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found, sigmas=0.0))]
+    if not within:
         return "good", "None of the catalogue, as far as one step with each can tell."
-    first, shares = asked[0]
+    first, shares = (asked or within)[0]
     worst = max(shares, key=lambda name: abs(first.with_it[name] - found[name].value) / found[name].sigma)
-    unit = next(p.unit for p in result.parameters if p.name == worst)
-    others = [effect.label for effect, _ in asked[1:MOST_NAMED]]
-    alike = f" (or {' or '.join(others)}, which may look alike)" if others else ""
+    others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
+    alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
+    covered = "" if asked else ", which its sigma covers"
     file = result.start.path.name
     bag = Path(result.bags[0].recording.path).name if result.bags else "BAG"
-    return "bad", (
-        f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it {worst} would "
-        f"be about {significant(first.with_it[worst])} instead of {significant(found[worst].value)} {unit}. "
-        f"Which it is, and whether it predicts better: `jointscope discover {file} {bag} --holdout-share 0.33 "
-        f"-o {result.start.path.stem}_better.yaml`."
+    return "bad" if asked else "warn", (
+        f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
+        f"{_change(result, first, worst)}{covered}. Which it is, and whether it predicts better: "
+        f"`jointscope discover {file} {bag} --holdout-share 0.33 -o {result.start.path.stem}_better.yaml`."
     )
+
+
+def _change(result: CalibrationResult, effect: LackingEffect, name: str) -> str:
+    """What a value would be; a step that is very long only says that it would be another."""
+    value, other = result.found[name].value, effect.with_it[name]
+    if abs(other - value) > LONG * abs(value):
+        return f"{name} would change by more than half"
+    unit = next(p.unit for p in result.parameters if p.name == name)
+    return f"{name} would be about {significant(other)} instead of {significant(value)} {unit}"
