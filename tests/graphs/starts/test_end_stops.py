@@ -69,6 +69,16 @@ def test_a_joint_that_merely_turns_over_has_none(robot, how, seed):
     assert end_stops(robot, recorded(seed=seed, **how)) == ()
 
 
+@pytest.mark.parametrize("seed", range(1, 7))
+@pytest.mark.parametrize("noise", [2e-5, 3e-4])
+def test_a_recording_that_ends_at_the_end_of_a_way_shows_no_stop(robot, seed, noise):
+    recording = recorded(seed=seed, noise=noise)
+    encoder = recording.streams["encoder"]
+    late = encoder.times > 4.0
+    last = float(encoder.times[late][np.argmax(encoder.values[late, 1])])
+    assert end_stops(robot, recording.between(0.0, last + 0.02)) == ()
+
+
 def test_a_command_of_another_unit_or_that_acts_late_is_no_stop(robot):
     recording = recorded()
     late = replace(recording.command, times=recording.command.times + 0.02)
