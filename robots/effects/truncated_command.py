@@ -50,7 +50,7 @@ EFFECT = TruncatedCommand(
     ),
     example={"lost": 0.01},
     card=Card(
-        title="command cut to whole numbers in the recording",
+        title="command cut to whole numbers",
         law="u_acting = u + sign(u) w, with w = lost in the unit of the command: half of a step",
         explanation="A driver that casts to whole numbers cuts toward zero: what acted was larger than what was "
         "recorded, by half a step on average. It looks like less dry friction wherever the command leads the motion.",
