@@ -82,8 +82,8 @@ def lacking_effects(test: ScoreTest) -> tuple[LackingEffect, ...]:
     """
     robot = test.robot
     hypotheses = _hypotheses(robot)
-    if robot.choices.link_dynamics != "model" or not hypotheses or robot.tree.massless:
-        return ()  # of links without inertia some effects have no columns
+    if robot.choices.link_dynamics != "model" or not hypotheses:
+        return ()
     best = dict[str, HypothesisScore]()
     for score in test.each(hypotheses):
         label = score.hypothesis.label
