@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.hypothesis_score import HypothesisStep
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
@@ -88,7 +88,7 @@ def drive_timing(test: ScoreTest) -> DriveTiming | None:
     Args:
         test: of the whole recordings, linearised at their solution with the noise used.
     """
-    robot, start = test.robot, test.calibration
+    robot = test.robot
     if robot.choices.link_dynamics != "model" or _has(robot, TimeShift):
         return None
     asked = [] if _has(robot, CommandEffect) else [(EFFECT, OWNER)]
@@ -98,10 +98,7 @@ def drive_timing(test: ScoreTest) -> DriveTiming | None:
         return None
     here = [EffectAt(catalogue()[effect], owner) for effect, owner in asked]
     hypotheses = [EffectHypothesis(at, at.effect.parameters_at(robot, at.owner)) for at in here]
-    found = [
-        _timing(step.sizes, step.sigmas, step.response, owner, start)
-        for step, (_, owner) in zip(test.steps(hypotheses), asked, strict=True)
-    ]
+    found = [_timing(test, step) for step in test.steps(hypotheses)]
     drive = next((timing for timing in found if timing is not None and not timing.joint), None)
     encoders = [timing for timing in found if timing is not None and timing.joint]
     # of two that say nearly the same, a late encoder is the usual one
@@ -111,13 +108,14 @@ def drive_timing(test: ScoreTest) -> DriveTiming | None:
     return drive
 
 
-def _timing(sizes: Array, sigmas: Array, response: Array, owner: str, found: Calibration) -> DriveTiming | None:
+def _timing(test: ScoreTest, step: HypothesisStep) -> DriveTiming | None:
     """What one step says; None where it tells nothing."""
-    delay, sigma = float(sizes[0]), float(sigmas[0])
+    delay, sigma = float(step.sizes[0]), float(step.sigmas[0])
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
-    moved = found.retract({DYNAMICS: response[: len(found.names), 0] * delay})
-    changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
+    start, owner = test.calibration, step.hypothesis.here.owner
+    before = dict(zip(start.names, start.values.tolist(), strict=True))
+    changes = {name: value - before[name] for name, value in test.values_with(step).items()}
     return DriveTiming(delay, sigma, changes, "" if owner == OWNER else owner)
 
 

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
-from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep
+from jointscope.graphs.scoring.hypothesis_score import HypothesisStep, best_shapes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.structure import Structure
@@ -29,7 +28,6 @@ Array = NDArray[np.float64]
 BY_CHANCE = 1e-2  # probability, over all effects that were asked for together, from which one may be chance
 MOST = 20  # effects whose scatter over blocks is looked at
 AS_SURE = 100.0  # times the probability of the surest effect of an owner, up to which another explains as much
-INDEPENDENT = 0.1  # [s] stretches of this length count as samples where sizes are paid for
 SURE = 2.0  # [sigma of a value] that an effect must move it, and ...
 MOVED = 0.01  # ... the share of the value: what is called right is right within a percent
 MOST_SHAPES = 10  # beyond them, as for ripple of unknown order, one looks at a spectrum first; it moves values little
@@ -84,19 +82,11 @@ def lacking_effects(test: ScoreTest) -> tuple[LackingEffect, ...]:
     hypotheses = _hypotheses(robot)
     if robot.choices.link_dynamics != "model" or not hypotheses:
         return ()
-    best = dict[str, HypothesisScore]()
-    for score in test.each(hypotheses):
-        label = score.hypothesis.label
-        if label not in best or score.plausible[0] > best[label].plausible[0]:
-            best[label] = score
-    tried = len(hypotheses)
-    seen = [s for s in best.values() if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
+    best, tried = best_shapes(test.each(hypotheses)).values(), len(hypotheses)
+    seen = [s for s in best if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
     seen = sorted(seen, key=lambda score: -score.score)[:MOST]
-    steps = test.steps([score.hypothesis for score in seen])
-    cost = float(np.log(test.seconds / INDEPENDENT))
-    worth = [score.score - score.dof * cost for score in seen]
-    pairs = zip(steps, worth, strict=True)
-    return _leaders([_lacking(step, tried, w, test.calibration) for step, w in pairs if _is_possible(step)])
+    steps = zip(test.steps([score.hypothesis for score in seen]), seen, strict=True)
+    return _leaders([_lacking(test, step, tried, s.worth(test.seconds)) for step, s in steps if _is_possible(step)])
 
 
 def _leaders(found: Sequence[LackingEffect]) -> tuple[LackingEffect, ...]:
@@ -124,8 +114,6 @@ def _is_possible(step: HypothesisStep) -> bool:
     return bool(np.all(np.abs(step.sizes) <= usual) and np.isfinite(step.p_value))
 
 
-def _lacking(step: HypothesisStep, tried: int, worth: float, start: Calibration) -> LackingEffect:
-    moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
+def _lacking(test: ScoreTest, step: HypothesisStep, tried: int, worth: float) -> LackingEffect:
     here = step.hypothesis.here
-    with_it = dict(zip(start.names, moved.values.tolist(), strict=True))
-    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), worth, with_it)
+    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), worth, test.values_with(step))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import fdtrc
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.priors import shared_priors
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
@@ -103,6 +103,12 @@ class ScoreTest:
             p_value = _robust_p(score, blocks[:, c], own)
             found.append(HypothesisStep(hypothesis, score.estimate, sigmas, response[:, c], p_value))
         return found
+
+    def values_with(self, step: HypothesisStep) -> dict[str, float]:
+        """Each shared value of the dynamics where a step with a hypothesis leads, by name."""
+        start = self.calibration
+        moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
+        return dict(zip(start.names, moved.values.tolist(), strict=True))
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
@@ -77,12 +76,11 @@ def wrong_masses(test: ScoreTest) -> tuple[WrongMass, ...]:
     hypotheses = [
         EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)
     ]
-    start, found = test.calibration, []
+    start, found = dict(zip(test.calibration.names, test.calibration.values.tolist(), strict=True)), []
     for step in test.steps(hypotheses):
         if not (np.all(np.isfinite(step.sizes)) and np.all(np.isfinite(step.sigmas))):
             continue
-        moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
-        changes = dict(zip(start.names, (moved.values - start.values).tolist(), strict=True))
+        changes = {name: value - start[name] for name, value in test.values_with(step).items()}
         found.append(
             WrongMass(step.hypothesis.here.owner, float(step.sizes[0]), float(step.sigmas[0]), step.p_value, changes)
         )
