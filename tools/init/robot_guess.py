@@ -26,7 +26,7 @@ from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
-from jointscope.tools.init.estimates.wiring_by_torques import Exchange, exchange_by_torques, signs_by_torques
+from jointscope.tools.init.estimates.wiring_by_torques import Exchange, wiring_by_torques
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
 from jointscope.tools.init.streams.sample_times import guess_sample_times
@@ -208,8 +208,7 @@ def _by_torques(robot: MeasuredRobot, encoder: Stream, drive: Drives) -> tuple[S
     if drive.gravity_reason and min(joint.explained for joint in drive.joints) > EXPLAINED:
         return None, None  # a base that hangs or stands otherwise explains it
     command = role_stream(robot.roles.command, robot.roles.joints)
-    signs = signs_by_torques(robot.tree, encoder, command, held=drive.held)
-    return signs, None if signs is not None else exchange_by_torques(robot.tree, encoder, command, held=drive.held)
+    return wiring_by_torques(robot.tree, encoder, command, held=drive.held)
 
 
 def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:

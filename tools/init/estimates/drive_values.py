@@ -76,12 +76,17 @@ class DriveValues:
     @property
     def is_impossible(self) -> bool:
         """Whether the regression says something that is surely below zero, as no inertia and no friction is."""
-        return any(v.value < -IMPOSSIBLE * v.sigma for law, v in self.found.items() if law in PLACES)
+        return is_impossible(self.found)
 
     def is_lost(self, name: str) -> bool:
         """Whether the regression cannot tell a value from zero."""
         value = self.found.get(name)
         return value is None or self.unknown_scale or value.value <= TOLD * value.sigma
+
+
+def is_impossible(found: Mapping[str, Value]) -> bool:
+    """Whether an inertia or a friction among the values of a drive is surely below zero."""
+    return any(v.value < -IMPOSSIBLE * v.sigma for law, v in found.items() if law in PLACES)
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.drive_regression import GAIN, PLACES, DriveEquation, Driven, drive_equations
-from jointscope.graphs.starts.drive_signal import open_torque
+from jointscope.graphs.starts.drive_regression import GAIN, DriveEquation
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream
-from jointscope.tools.init.estimates.drive_values import IMPOSSIBLE
+from jointscope.tools.init.estimates.drive_values import is_impossible
 from jointscope.tools.init.estimates.joint_signs import SignGuess, Signs
+from jointscope.tools.init.estimates.open_share import equations_of, open_share
 
 Array = NDArray[np.float64]
 
@@ -54,11 +53,13 @@ class Exchange:
         return f"{seen}; if that is so, exchange them in `names` of {where}"
 
 
-def signs_by_torques(tree: RigidTree, encoder: Stream, command: Stream, *, held: bool) -> SignGuess | None:
-    """Which way the encoders count, where the torques say otherwise than the URDF; None where they do not.
+def wiring_by_torques(
+    tree: RigidTree, encoder: Stream, command: Stream, *, held: bool
+) -> tuple[SignGuess | None, Exchange | None]:
+    """Which way the encoders count, or which joints are exchanged, where the torques say otherwise than URDF and names.
 
     Args:
-        tree: the robot, with masses and the gravity that was found.
+        tree: the robot, with masses.
         encoder: positions [rad or m].
         command: what drives the joints.
         held: whether a command acts until the next one.
@@ -66,30 +67,35 @@ def signs_by_torques(tree: RigidTree, encoder: Stream, command: Stream, *, held:
     wiring = _Wiring(tree, encoder, command, held)
     as_is = wiring.left()
     if as_is < POOR:
-        return None
-    most = tree.n if tree.n <= ALL_PATTERNS else MOST_TURNED
-    for count in range(1, most + 1):
-        patterns = [_turned(tree.n, which) for which in combinations(range(tree.n), count)]
-        found = [signs for signs in patterns if wiring.left(signs) < min(POOR, as_is / CLEARLY)]
+        return None, None
+    enough = min(POOR, as_is / CLEARLY)
+    signs = _signs(wiring, enough)
+    return signs, None if signs is not None else _exchange(wiring, enough)
+
+
+def _signs(wiring: _Wiring, enough: float) -> SignGuess | None:
+    """The fewest joints that, turned round, leave little enough."""
+    n = wiring.tree.n
+    for count in range(1, (n if n <= ALL_PATTERNS else MOST_TURNED) + 1):
+        patterns = [_turned(n, which) for which in combinations(range(n), count)]
+        found = [signs for signs in patterns if wiring.left(signs) < enough]
         if found:
             return SignGuess(found[0], tuple(found[1:]), by_torques=True)
     return None
 
 
-def exchange_by_torques(tree: RigidTree, encoder: Stream, command: Stream, *, held: bool) -> Exchange | None:
-    """Two joints with each other's names; None where nothing speaks for it. Arguments as of `signs_by_torques`."""
-    wiring = _Wiring(tree, encoder, command, held)
-    as_is = wiring.left()
-    if as_is < POOR or tree.n > MOST_JOINTS:
+def _exchange(wiring: _Wiring, enough: float) -> Exchange | None:
+    """The exchange that leaves least, if that is little enough."""
+    if wiring.tree.n > MOST_JOINTS:
         return None
-    tried = {exchange: wiring.left(exchanged=exchange) for exchange in _exchanges(tree)}
+    tried = {exchange: wiring.left(exchanged=exchange) for exchange in _exchanges(wiring.tree)}
     best = min(tried, key=lambda exchange: tried[exchange], default=None)
-    return best if best is not None and tried[best] < min(POOR, as_is / CLEARLY) else None
+    return best if best is not None and tried[best] < enough else None
 
 
 @dataclass(frozen=True)
 class _Wiring:
-    """A recording, asked how well other wirings explain it; arguments as of `signs_by_torques`."""
+    """A recording, asked how well other wirings explain it; arguments as of `wiring_by_torques`."""
 
     tree: RigidTree
     encoder: Stream
@@ -106,15 +112,9 @@ class _Wiring:
             q = q[:, order] if POSITIONS in exchanged.columns else q
             u = u[:, order] if COMMANDS in exchanged.columns else u
         q = q * np.array(signs) if signs else q
-        driven = Driven(replace(self.encoder, values=q), replace(self.command, values=u))
-        try:
-            equations = drive_equations(self.tree, [driven], np.zeros(self.tree.n), held=self.held)
-        except RecordingError:
-            return np.inf
-        if not all(_is_possible(equation) for equation in equations):
-            return np.inf
-        shares = [min(open_torque(equation)[1], 1.0) for equation in equations]
-        return float(np.sqrt(np.mean(np.square(shares))))
+        turned = replace(self.encoder, values=q), replace(self.command, values=u)
+        equations = equations_of(self.tree, *turned, self.held)
+        return open_share(equations) if all(map(_is_possible, equations)) else np.inf
 
 
 def _is_possible(equation: DriveEquation) -> bool:
@@ -122,7 +122,7 @@ def _is_possible(equation: DriveEquation) -> bool:
     values = equation.solve()
     given = {} if GAIN in values else {GAIN: np.sign(equation.direction().value) or 1.0}
     values = values or equation.solve(given)
-    return all(values[law].value > -IMPOSSIBLE * values[law].sigma for law in PLACES if law in values) and bool(values)
+    return bool(values) and not is_impossible(values)
 
 
 def _turned(n: int, which: Sequence[int]) -> Signs:
