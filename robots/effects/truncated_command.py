@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.command_effect import CommandEffect, in_command_unit
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 
 if TYPE_CHECKING:
@@ -34,12 +34,8 @@ class TruncatedCommand(CommandEffect):
 
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With unit and start of the robot's command."""
-        unit = robot.command.unit
-        if unit == "duty":
-            return self.parameters
-        start = SHARE_OF_FRICTION * robot.parameter(f"{owner}.coulomb_torque").value
         (lost,) = self.parameters
-        return (replace(lost, unit=unit, start=start, prior_sigma=USUAL * start),)
+        return (in_command_unit(lost, robot, owner, SHARE_OF_FRICTION),)
 
 
 EFFECT = TruncatedCommand(

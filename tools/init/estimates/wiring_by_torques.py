@@ -45,7 +45,8 @@ class Exchange:
     def sentence(self, urdf: str, bag: str, output: str, joints: Sequence[str]) -> str:
         """What was seen, and what to do; `joints` are those of the robot file."""
         a, b = self.joints
-        now = ",".join(f"{j}={ {a: b, b: a}[j] }" if j in (a, b) else j for j in joints).replace("= ", "=")
+        other = {a: b, b: a}
+        now = ",".join(f"{joint}={other[joint]}" if joint in other else joint for joint in joints)
         seen = f"{' and '.join(self.columns)} of {a} and {b} seem to be exchanged: so the regression explains them"
         if len(self.columns) == 2:
             return f"{seen}; if that is so: jointscope init {urdf} {bag} -o {output} --joints {now}"
