@@ -28,13 +28,19 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
     alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
     covered = "" if asked else ", which its sigma covers"
-    file = result.start.path.name
-    bag = Path(result.bags[0].recording.path).name if result.bags else "BAG"
     return "bad" if asked else "warn", (
         f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
         f"{_change(result, first, worst)}{covered}. Which it is, and whether it predicts better: "
-        f"`jointscope discover {file} {bag} --holdout-share 0.33 -o {result.start.path.stem}_better.yaml`."
+        f"`{_discover(result)}`."
     )
+
+
+def _discover(result: CalibrationResult) -> str:
+    """The command that looks for effects, with a part of one recording, or the last of several, held out."""
+    start, bags = result.start.path, [Path(bag.recording.path).name for bag in result.bags] or ["BAG"]
+    *learnt, last = bags
+    held = f"{' '.join(learnt)} --holdout {last}" if learnt else f"{last} --holdout-share 0.33"
+    return f"jointscope discover {start.name} {held} -o {start.stem}_better.yaml"
 
 
 def _change(result: CalibrationResult, effect: LackingEffect, name: str) -> str:
