@@ -50,7 +50,7 @@ def to_learn_from(
     model = robot_of(robot)
     learnt = recordings_of(recordings, model)
     held = None if holdout is None else recordings_of(holdout, model)[0]
-    if held is not None and held.sha256 and held.sha256 in {recording.sha256 for recording in learnt}:
+    if held is not None and any(held.shares_samples_with(recording) for recording in learnt):
         raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
     return model, learnt, held
 
