@@ -49,6 +49,8 @@ from jointscope.tools.bags.tidying.stream_notices import (
 )
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
 
+SHARED = 0.5  # of the rows of a stream that lack a channel, from which several drivers make it
+
 
 def read_recording(
     path: str | Path, robot: Robot, progress: Progress | None = None, decode_all: bool = False
@@ -94,7 +96,7 @@ def read_recording(
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
     for stream in streams.values():
-        notices += timing_notices(stream.name, stream.times)
+        notices += timing_notices(stream.name, _usual_times(stream))
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
     notices += step_notices("command", streams["command"].values, streams["command"].channels, streams["command"].unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
@@ -193,7 +195,15 @@ def _samples(
         whole = continued(values, need.source.wraps) if need.source.wraps else values
         values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)
         notices += found
-    return TimedSamples(stamps, received, values), notices
+    absent = None if columns.absent is None else columns.absent[:, order]
+    return TimedSamples(stamps, received, values, absent), notices
+
+
+def _usual_times(stream: Stream) -> NDArray[np.float64]:
+    """Times of the channel with most samples: those of several drivers together are none of any clock."""
+    if stream.filled is None or stream.filled.any(axis=1).mean() < SHARED:
+        return stream.times
+    return stream.times[~stream.filled[:, int(np.argmin(stream.filled.sum(axis=0)))]]
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:

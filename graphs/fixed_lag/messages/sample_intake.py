@@ -67,8 +67,13 @@ class SampleIntake:
         self._acting = values = np.where(np.isin(np.arange(len(values)), bad), self._acting, values)
         return values
 
-    def sample(self, name: str, t: float, values: ArrayLike, now: float | None) -> list[Observation]:
-        """The channels of a sample that can be used, in groups taken at the same time; now as in `command`."""
+    def sample(
+        self, name: str, t: float, values: ArrayLike, now: float | None, about: NDArray[np.bool_] | None = None
+    ) -> list[Observation]:
+        """The channels of a sample that can be used, in groups taken at the same time; now as in `command`.
+
+        A message may be `about` some channels only, shape (c,); nothing is said about the others.
+        """
         if name not in self._groups:
             known = ", ".join(["command", *self._groups])
             raise EstimatorError(f"no sensor {name!r}; robot {self._robot.name!r} has {known}")
@@ -80,8 +85,10 @@ class SampleIntake:
         bad = _useless(numbers)
         if bad:
             numbers = [math.nan if j in bad else number for j, number in enumerate(numbers)]
-            which = ", ".join(sensor.channels[j] for j in bad)
-            self._drop(name, t, "not_finite", f"{which}: no number, left out; the rest of the message is used")
+            lost = bad if about is None else [j for j in bad if about[j]]
+            if lost:
+                which = ", ".join(sensor.channels[j] for j in lost)
+                self._drop(name, t, "not_finite", f"{which}: no number, left out; the rest of the message is used")
         stuck = checks.stuck(numbers)
         if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")

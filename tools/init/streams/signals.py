@@ -91,7 +91,10 @@ class Signal:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)
-        filled = None if self.filled is None else self.filled[good][:, self._places(names)]
+        filled = None
+        if self.filled is not None:
+            good &= ~self.filled[:, self._places(names)].all(axis=1)  # messages about other joints
+            filled = self.filled[good][:, self._places(names)]
         return Stream(self.topic, self.times[good], values[good], names, "", filled=filled)
 
 
@@ -192,7 +195,7 @@ def _field(raw: RawTopic, kind: MessageType, known: KnownField) -> _Field | None
         return None
     received = columns.of(raw.received_ns)
     stamps = received if columns.stamps is None else columns.stamps
-    samples = TimedSamples(stamps, received, columns.values)
+    samples = TimedSamples(stamps, received, columns.values, columns.absent)
     return _Field(raw.name, kind, known, names, samples, columns.stamps is not None and not empty_stamps(samples))
 
 
