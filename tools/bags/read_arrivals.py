@@ -38,6 +38,7 @@ from jointscope.tools.bags.needed_streams import (
     needed_streams,
     wanted_of,
 )
+from jointscope.tools.bags.tidying.late_copies import late_copies
 
 Array = NDArray[np.float64]
 
@@ -206,7 +207,18 @@ class ArrivalReader:
             return None
         for part in columns.left_out:
             self._left_out[need.name, part.what] += part.count
-        return self._filled(need, self._on_time(need, topic, columns))
+        return self._own(need, topic, self._filled(need, self._on_time(need, topic, columns)))
+
+    def _own(self, need: StreamSource, topic: RawTopic, columns: Columns) -> Columns:
+        """The messages without those that a second node repeats later."""
+        stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
+        order = np.argsort(stamps, kind="stable")
+        copies = np.zeros(len(order), bool)
+        copies[order] = late_copies(stamps[order], columns.values[order])
+        if not copies.any():
+            return columns
+        self._left_out[need.name, "of a second node that repeats those of the driver later"] += int(copies.sum())
+        return columns.take(~copies)
 
     def _filled(self, need: StreamSource, columns: Columns) -> Columns:
         """The messages whose stamps are filled."""

@@ -37,6 +37,7 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.silences import with_silences_left_out
+from jointscope.tools.bags.tidying.late_copies import without_late_copies
 from jointscope.tools.bags.tidying.lone_samples import without_lone_samples
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
@@ -149,6 +150,8 @@ def _in_bag_order(
 def _cleaned(need: StreamSource, samples: TimedSamples, held: bool) -> tuple[TimedSamples, list[Notice]]:
     """The samples of one stream in the order of their stamps and in SI units, without those that are none."""
     samples, notices = in_time_order(need.name, samples)
+    samples, found = without_late_copies(need.name, samples)
+    notices += found
     samples, found = without_gibberish(need.name, need.channels, samples, need.source.wraps, held)
     notices += found
     if need.name != "command":  # commands jump and repeat themselves as they like

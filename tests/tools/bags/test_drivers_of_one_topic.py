@@ -100,3 +100,31 @@ def test_a_command_of_one_joint_leaves_those_of_the_others(arm, halves, tmp_path
             np.testing.assert_allclose(online[:, j], on_the_way, atol=1e-6)
             own_rows = np.isin(np.round(1e6 * stream.times), np.round(1e6 * times))
             np.testing.assert_array_equal(stream.values[own_rows, j], given)
+
+
+def test_a_list_that_is_shorter_than_its_names_is_said_with_both_lengths(arm, tmp_path, capsys):
+    _, urdf, motion, _ = arm
+    command = motion.commands(["shoulder", "elbow"])
+    command["effort"] = command["effort"][:, :1]
+    bag = write_arm_bag(tmp_path / "short.mcap", motion.times, {"/joint_states": motion.states(), "/cmd": command})
+    assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 1
+    assert (
+        "/cmd has 1 value in `effort` for 2 names (shoulder, elbow); expected one for each" in capsys.readouterr().err
+    )
+
+
+def test_a_relay_of_the_commands_changes_nothing(arm, tmp_path, capsys):
+    _, urdf, motion, _ = arm
+    every, late = np.arange(len(motion.times)), np.arange(0, len(motion.times) - 20, 2)
+    command = motion.commands(["shoulder", "elbow"])
+    relay = command | {"rows": late, "stamped": lambda stamp: stamp + 61_000_000}
+    topics = {"/joint_states": motion.states(), "/cmd": command | {"rows": every}, "/cmd#relay": relay}
+    bag = write_arm_bag(tmp_path / "relay.mcap", motion.times, topics)
+    assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert (
+        f"left out {len(late)} messages of a second node that repeats those of the driver 61" in capsys.readouterr().out
+    )
+    recording = read_recording(bag, load_robot(tmp_path / "arm.yaml"))
+    assert recording.streams["command"].values[:, 0].tolist() == motion.effort["shoulder"].tolist()
+    (block,) = list(ArrivalReader(bag, load_robot(tmp_path / "arm.yaml")))
+    assert len(block) == 2 * len(every)
