@@ -58,7 +58,7 @@ def late_copies(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> Flags
     known, before = _earlier(values)
     fresh = np.concatenate([[True], np.any(values[1:] != values[:-1], axis=1)])
     later = (stamps - stamps[before]) / 1e9
-    copies = known & fresh & (later < LATEST)
+    copies = known & fresh & (later < LATEST) & _sent_twice(values)
     if np.count_nonzero(copies) < max(FEWEST, SHARE * len(values)):
         return none
     usual = float(np.median(later[copies]))
@@ -81,6 +81,12 @@ def _earlier(values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.intp]]:
     before[order[0]] = order[0]
     known = (before < np.arange(n) - 1) & np.all(values == values[before], axis=1)
     return known, np.where(known, before, np.arange(n))
+
+
+def _sent_twice(values: NDArray[np.float64]) -> Flags:
+    """Whether a message is there exactly twice, shape (n,): one of a command at rest, in its last digits, is often."""
+    _, which, counts = np.unique(values, axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(counts[which.ravel()] == 2)
 
 
 def _likely(values: NDArray[np.float64]) -> bool:

@@ -58,3 +58,12 @@ def test_periodic_commands_squares_rests_and_staircases_are_kept():
     staircase = np.repeat(values[:100], 4, axis=0)
     for kept in (periodic, square, rests, staircase, np.zeros((400, 2))):
         assert not late_copies(stamps, kept).any()
+
+
+@pytest.mark.parametrize("resting", (20, 60, 150))
+def test_rests_that_change_in_their_last_digits_are_kept(resting):
+    """As a controller's command of three joints that hold still, to six digits."""
+    rng, stamps = np.random.default_rng(3), STEP * np.arange(400)
+    values = np.column_stack([np.sin(3 * stamps / 1e9), np.cos(5 * stamps / 1e9), np.sin(stamps / 1e9)])
+    values[:resting] = values[0] + 1e-6 * rng.integers(0, 3, (resting, 3))
+    assert not late_copies(stamps, values).any()
