@@ -30,7 +30,9 @@ def with_target(turn=0.3):
     doggy = load_robot("doggy")
     source = Topic("/camera", "geometry_msgs/msg/PointStamped", "point", "m")
     sensor = PositionTarget("marker", source, "link3", np.array([0.1, -0.2, 0.9]), None, POSE, "marker", 1e-3)
-    sizes = dict(zip(sensor.parameters, [0.01, -0.02, 0.03, 0.1, 0.2, -0.1, turn, -0.4 * turn, 0.6 * turn], strict=True))
+    sizes = dict(
+        zip(sensor.parameters, [0.01, -0.02, 0.03, 0.1, 0.2, -0.1, turn, -0.4 * turn, 0.6 * turn], strict=True)
+    )
     own = {n: Parameter(n, v, sensor.parameters[n], 0.0, 0.1, positive=False) for n, v in sizes.items()}
     return replace(doggy, sensors={**doggy.sensors, "marker": sensor}, parameters={**doggy.parameters, **own})
 

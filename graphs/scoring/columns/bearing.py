@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Columns of a soft bearing, by its compliance: a tilt rings, sensors see its motion, the joints its inertia.
 
-Gyros see its rate, accelerometers its acceleration and how gravity turns, targets its angle. Only the ringing depends on the
-resonance that is tried; the rest is worked out once for each bearing.
+Gyros see its rate, accelerometers its acceleration and how gravity turns, targets its angle. Only the ringing depends
+on the resonance that is tried; the rest is worked out once for each bearing.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class _Hinge:
     Attributes:
         reaction: torque that the bearing carries about it, shape (m + 1,) [N m].
         coupling: rows of the mass matrix between the links and it, shape (m + 1, n_link) [kg m2].
-        seen: what every gyro, accelerometer and target sees of a tilt, of its speed and of its acceleration, by name, shape
-            (m + 1, 3) each.
+        seen: what every gyro, accelerometer and target sees of a tilt, of its speed and of its acceleration, by name,
+            shape (m + 1, 3) each.
     """
 
     reaction: Array
