@@ -8,6 +8,7 @@ target. Springs make the two differ by millimetres; another link by a good part 
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.body_points import body_point
@@ -29,6 +30,7 @@ NOISE = 10.0  # [sigma] a motion that is smaller says nothing of links, a distan
 ODD = 0.3  # share of the motion that is left of a wrong link; springs leave less
 CLEARLY_BETTER = 0.3  # times what is left there may be left of the right one
 ELSEWHERE = 0.3  # of the motion: a tracker that is farther off has been moved
+IN_PRIOR = 3.0  # [sigma] how far a calibration goes without being told
 ARMS = 0.3  # [m] places of a target on its link to begin with
 
 
@@ -92,12 +94,22 @@ def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -
     if distance <= max(ELSEWHERE * size, noise):
         return []
     T, after, _ = base_from_tracker(body_point(tree, target.body, at, q).value, seen)
+    if _is_expected(robot, target, T, R, origin):
+        return []
     text = (
         f"{target.name} is {distance:.3g} m (rms) away from where {robot.path.name} expects it; its tracker may stand "
         f"elsewhere: with sensors.{target.tracker}.tracker_pose: {[[round(x, 5) for x in row] for row in T.tolist()]} "
         f"instead of what {place} says, {after:.3g} m are left"
     )
     return [Notice(target.name, "unit", 0, text)]
+
+
+def _is_expected(robot: Robot, target: PositionTarget, T: Array, R: Array, origin: Array) -> bool:
+    """Whether a calibration may well find the tracker in a pose: its parameters are free, and their priors wide."""
+    free = {n: p.prior_sigma for n, p in robot.parameters.items() if n in target.own and not p.fixed}
+    turn = pin.log3(R.T @ T[:3, :3])
+    away = zip((*target.place, *target.turn), (*(T[:3, 3] - origin), *turn), strict=True)
+    return all(abs(x) < IN_PRIOR * free.get(name, 0.0) for name, x in away)
 
 
 def _spread(points: Array) -> float:
