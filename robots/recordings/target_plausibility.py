@@ -28,7 +28,8 @@ FEWEST_POINTS = 20
 SAME_SIZE = 5.0  # a ratio of sizes up to this is a target elsewhere on its link, not a unit
 NOISE = 10.0  # [sigma] a motion that is smaller says nothing of links, a distance that is smaller nothing of places
 ODD = 0.3  # share of the motion that is left of a wrong link; springs leave less
-CLEARLY_BETTER = 0.3  # times what is left there may be left of the right one
+CLEARLY_BETTER = 0.5  # times what is left there may be left of the right one
+ALIKE = 4  # decimals [m] in which the fits of two links that one joint moves are the same
 ELSEWHERE = 0.3  # of the motion: a tracker that is farther off has been moved
 IN_PRIOR = 3.0  # [sigma] how far a calibration goes without being told
 ARMS = 0.3  # [m] places of a target on its link to begin with
@@ -139,7 +140,7 @@ def _wrong_link(tree: RigidTree, target: PositionTarget, q: Array, seen: Array, 
     )
     others = [body for body in tree.bodies if body != target.body and tree.joints_below(body)]
     fits = {body: fitted_tracker(tree, body, np.zeros(3), q, seen)[2] for body in others}
-    best = min(fits, key=fits.__getitem__, default=None)
+    best = min(fits, key=lambda body: round(fits[body], ALIKE), default=None)  # the first of those on one joint
     if best is not None and fits[best] < CLEARLY_BETTER * left:
         return (
             f"{text}, of {best} only {fits[best]:.3g} m: set `target` of sensors.{target.name} to {best}, and `at` to "
