@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.accelerometer_plausibility import check_accelerometers
 from jointscope.robots.recordings.encoder_gyro_scale import check_scales
-from jointscope.robots.recordings.gyro_plausibility import check_gyros
 from jointscope.robots.recordings.held_joints import about_bodies
+from jointscope.robots.recordings.imu_plausibility import check_accelerometers, check_gyros
 from jointscope.robots.recordings.joint_motion import JointMotion, joint_motion
 from jointscope.robots.recordings.motor_zero import with_motor_zero
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
@@ -26,6 +25,7 @@ from jointscope.robots.recordings.resting_joints import (
     what_it_cannot_tell,
 )
 from jointscope.robots.recordings.rests import OFTEN, standing_share
+from jointscope.robots.recordings.target_plausibility import check_targets
 from jointscope.robots.recordings.wrapped_counter import wrapping_jump
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
@@ -80,6 +80,7 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     notices += _check_limits(motion, robot)
     notices += _check_efforts(recording, robot, motion)
     notices += _check_motion(recording, robot, every_joint)
+    notices += check_targets(recording, robot, motion)
     odd = check_gyros(recording, robot, motion)
     return notices + odd + check_scales(recording, robot, suspected={notice.stream for notice in odd})
 

@@ -40,6 +40,7 @@ from jointscope.tools.bags.silences import with_silences_left_out
 from jointscope.tools.bags.tidying.late_copies import without_late_copies
 from jointscope.tools.bags.tidying.lone_samples import without_lone_samples
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
+from jointscope.tools.bags.tidying.lost_targets import without_lost
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
 from jointscope.tools.bags.tidying.stream_notices import (
     by_importance,
@@ -154,6 +155,9 @@ def _cleaned(need: StreamSource, samples: TimedSamples, held: bool) -> tuple[Tim
     notices += found
     samples, found = without_gibberish(need.name, need.channels, samples, need.source.wraps, held)
     notices += found
+    if need.of_target:
+        samples, found = without_lost(need.name, samples)
+        notices += found
     if need.name != "command":  # commands jump and repeat themselves as they like
         samples, found = cleaned_sensor(need.name, need.channels, samples, need.source.wraps)
         notices += found

@@ -18,11 +18,13 @@ from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.lateness import late_channels
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
 LONGEST_DOUBT = 6  # commands in a row of which some joint lacks its own: that joint's drive may do anything then
+NOISY = (Gyro, Accelerometer, PositionTarget)  # sensors that never repeat a sample, as coarse encoders do
 LARGEST = 1e6  # [SI] no angle, rate or command is larger; beyond it a number is as good as none
 
 
@@ -45,7 +47,7 @@ class SampleIntake:
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
         for name, sensor in robot.sensors.items():
-            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro | Accelerometer))
+            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
     def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one.
@@ -93,7 +95,7 @@ class SampleIntake:
         if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
         sigma = self._sigmas[name]
-        shared = None if isinstance(sensor, Gyro | Accelerometer) else checks.shared_error(t, numbers)
+        shared = None if isinstance(sensor, NOISY) else checks.shared_error(t, numbers)
         if shared is not None:
             sigma = sigma * np.array(shared)
         result = []
