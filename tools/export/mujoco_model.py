@@ -7,6 +7,7 @@ are the armature. Effects that the engine has no element for are named instead.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +30,8 @@ from jointscope.tools.simulator.world.specification import (
     transmission,
 )
 
+INERTIA = re.compile(r'diaginertia="([^"]*)"')
+DIGITS = 1e-5  # relative; what rounding to six digits does to three numbers at most
 TIMESTEP = 2e-4  # [s] dry friction holds as firmly as in the simulator; larger ones creep more
 NO_ELEMENT = "MuJoCo has no element for its law; add it as a passive force (mjcb_passive)"
 
@@ -69,7 +72,21 @@ def mujoco_model(robot: Robot) -> Exported:
         raise SimulationError(f"MuJoCo cannot build robot {robot.name!r}: {str(err).splitlines()[0]}") from err
     gone = {here.label: why_not(here.effect, NO_ELEMENT) for here, effect in kept if effect is None}
     held = [here.label for here in robot.effects if here.label not in gone]
-    return Exported(spec.to_xml(), (*_base_model(plain), *held), {**_choices(robot), **gone})
+    return Exported(_possible(spec.to_xml()), (*_base_model(plain), *held), {**_choices(robot), **gone})
+
+
+def _possible(text: str) -> str:
+    """The file with inertias that bodies can have: six digits round flat ones beyond A + B = C, which is refused."""
+
+    def rounded(found: re.Match[str]) -> str:
+        inertia = [float(number) for number in found[1].split()]
+        largest = int(np.argmax(inertia))
+        rest = sum(inertia) - inertia[largest]
+        if inertia[largest] > rest > (1.0 - DIGITS) * inertia[largest]:
+            inertia[largest] = (1.0 - DIGITS) * rest
+        return f'diaginertia="{" ".join(f"{number:.12g}" for number in inertia)}"'
+
+    return INERTIA.sub(rounded, text)
 
 
 def _simulated(here: EffectAt, robot: Robot) -> SimulatedEffect | None:

@@ -11,7 +11,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.export.mujoco_model import mujoco_model
+from jointscope.tools.export.mujoco_model import _possible, mujoco_model
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo models need the extra jointscope[sim]")
 
@@ -128,3 +128,17 @@ def test_what_the_engine_has_no_element_for_is_said_and_not_in_the_model():
 def test_a_robot_without_equations_of_motion_is_refused(name, words):
     with pytest.raises(RobotError, match=words):
         mujoco_model(load_robot(name))
+
+
+def test_a_flat_body_is_still_one_after_rounding_to_six_digits():
+    """A thin plate's inertias obey A + B = C exactly; as saved, C can be the larger."""
+    plate = np.array([0.0105193, 0.00853439, 0.0019849])
+    body = '<body><joint/><inertial pos="0 0 0" mass="2" diaginertia="{} {} {}"/></body>'
+    text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    saved = text.format(*plate)
+    with pytest.raises(ValueError, match="A \\+ B >= C"):
+        mujoco.MjModel.from_xml_string(saved)
+    found = mujoco.MjModel.from_xml_string(_possible(saved)).body_inertia[1]
+    np.testing.assert_allclose(np.sort(found), np.sort(plate), rtol=2 * SIX_DIGITS)
+    sound = text.format(0.3, 0.2, 0.15)
+    assert _possible(sound) == sound
