@@ -2,8 +2,9 @@
 """A second node that repeats the messages of the driver a little later, as a relay does that stamps them anew.
 
 Its sign: again and again a message is, to the last digit, one that was sent a moment before, while others in between
-were not; and what the driver sends is never the same twice, so that this cannot be chance. A joint at rest, a coarse
-encoder and a periodic command repeat themselves, too, but in long runs, or all the time, or after a long time.
+were not; all come about as late; they lie off the way that the others go; and what the driver sends is never the same
+twice, so that this cannot be chance. A joint at rest, a coarse encoder, a periodic command and one that turns round
+repeat themselves, too, but in long runs, all the time, after a long time, or on their way.
 """
 
 from __future__ import annotations
@@ -19,9 +20,13 @@ Flags = NDArray[np.bool_]
 
 FEWEST, SHARE = 5, 0.02  # copies, and share of the messages that they make
 LATEST = 1.0  # [s] after the message that is repeated
-ALIKE = 0.8  # share of the copies that come about as late as is usual
-TIMES_USUAL = 2.0  # how much later than usual copies may come
+ALIKE = 0.9  # share of the copies that come about as late as is usual
+SPREAD = 0.15  # of how late is usual; a signal that turns round repeats itself earlier and later, too
 LONGEST_RUN = 3.0  # copies between two messages of the driver, in the mean
+TYPICAL, OFF = (
+    0.9,
+    3.0,
+)  # quantile of how far messages lie off the line between their neighbours; how many of it a copy does
 NEVER_TWICE = 0.9  # share of the driver's different messages that no other one equals
 
 
@@ -62,13 +67,15 @@ def late_copies(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> Flags
     if np.count_nonzero(copies) < max(FEWEST, SHARE * len(values)):
         return none
     usual = float(np.median(later[copies]))
-    like = copies & (later < TIMES_USUAL * usual) & (later * TIMES_USUAL > usual)
+    like = copies & (np.abs(later - usual) < SPREAD * usual)
     runs = int(np.count_nonzero(np.diff(like.astype(np.int8), prepend=0) == 1))
     own = np.count_nonzero(fresh & ~copies)
     twice = np.count_nonzero(known & fresh & ~copies)
     if np.count_nonzero(like) < ALIKE * np.count_nonzero(copies) or like.sum() > LONGEST_RUN * runs:
         return none
-    return like if own and twice <= (1.0 - NEVER_TWICE) * own and not _likely(values[~like]) else none
+    if not own or twice > (1.0 - NEVER_TWICE) * own or _likely(values[~like]):
+        return none
+    return like if _out_of_the_way(stamps, values, like) else none
 
 
 def _earlier(values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.intp]]:
@@ -81,6 +88,19 @@ def _earlier(values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.intp]]:
     before[order[0]] = order[0]
     known = (before < np.arange(n) - 1) & np.all(values == values[before], axis=1)
     return known, np.where(known, before, np.arange(n))
+
+
+def _out_of_the_way(stamps: NDArray[np.int64], values: NDArray[np.float64], copies: Flags) -> bool:
+    """Whether most copies lie off the way that the other messages go, as what was sent long before does."""
+    at, own = (stamps - stamps[0]) / 1e9, values[~copies]
+    t = at[~copies]
+    if len(t) < FEWEST:
+        return False
+    share = ((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-9))[:, None]
+    usual = np.quantile(np.abs(own[1:-1] - own[:-2] - share * (own[2:] - own[:-2])), TYPICAL, axis=0)
+    between = np.column_stack([np.interp(at[copies], t, column) for column in own.T])
+    off = np.abs(values[copies] - between) / np.maximum(usual, np.finfo(float).tiny)
+    return float(np.median(np.max(np.where(usual > 0.0, off, 0.0), axis=1))) > OFF
 
 
 def _sent_twice(values: NDArray[np.float64]) -> Flags:

@@ -67,3 +67,15 @@ def test_rests_that_change_in_their_last_digits_are_kept(resting):
     values = np.column_stack([np.sin(3 * stamps / 1e9), np.cos(5 * stamps / 1e9), np.sin(stamps / 1e9)])
     values[:resting] = values[0] + 1e-6 * rng.integers(0, 3, (resting, 3))
     assert not late_copies(stamps, values).any()
+
+
+@pytest.mark.parametrize("digits", (1, 2, 3, 4))
+def test_a_signal_that_turns_round_in_coarse_steps_is_the_drivers(digits):
+    """Triangles and sines pass the same values on both sides of each turn."""
+    rng, t = np.random.default_rng(digits), np.arange(800) / 100.0
+    for _ in range(150):
+        frequency, size, phase = rng.uniform(0.05, 3.0), rng.uniform(0.2, 6.0), rng.uniform(0.0, 6.0)
+        sine = np.sin(2.0 * np.pi * frequency * t + phase)
+        for shape in (sine, np.arcsin(sine)):
+            values = np.round(size * shape, digits)[:, None]
+            assert not late_copies(np.round(1e9 * t).astype(np.int64), values).any()
