@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 HORIZON = 0.1  # [s] the horizon of `error`
 HORIZONS = (0.01, 0.1, 1.0)  # [s]
 SPACING = {0.01: 0.01, 0.1: 0.01, 1.0: 0.1}  # [s] between starts, by horizon
+PAUSES = 0.9  # quantile of the pauses between samples
 
 
 @dataclass(frozen=True)
@@ -139,10 +140,13 @@ def _sums(h: Array, horizon: float) -> Array:
 
 
 def _target_samples(taken: Array, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period."""
+    """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period.
+
+    Where two nodes speak just behind each other, the period is the pause after both.
+    """
     right = np.clip(np.searchsorted(taken, times), 1, len(taken) - 1)
     nearest = np.where(times - taken[right - 1] < taken[right] - times, right - 1, right)
-    period = float(np.median(np.diff(taken)))
+    period = float(np.quantile(np.diff(taken), PAUSES))
     return nearest, np.abs(taken[nearest] - times) <= 0.5 * period + 1e-9
 
 
