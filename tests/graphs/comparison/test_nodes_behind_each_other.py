@@ -8,12 +8,11 @@ from jointscope.graphs.comparison.predictions_ahead import _target_samples
 
 
 @pytest.mark.parametrize("behind", (0.5e-3, 2e-3, 5e-3))
-def test_predictions_end_at_samples_of_both_nodes_where_one_speaks_just_behind_the_other(behind):
+def test_predictions_end_at_samples_of_nodes_of_which_one_speaks_just_behind_the_other(behind):
     own = 0.01 * np.arange(100)
     taken = np.sort(np.concatenate([own, own + behind]))
-    nearest, near = _target_samples(taken, taken[:150] + 0.1005)
+    _, near = _target_samples(taken, taken[:150] + 0.1012)
     assert near.all()
-    assert set(nearest % 2) == {0, 1}
 
 
 def test_no_prediction_ends_in_a_silence():
