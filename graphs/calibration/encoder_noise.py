@@ -91,7 +91,7 @@ def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
 def _visible_noise(values: Array) -> Array:
     """White noise of each channel, shape (n,); zero where it cannot be told from motion. NaN was not measured."""
     found = []
-    for column in (column[np.isfinite(column)] for column in values.T):
+    for column in _measured(values):
         if len(column) < 4 * len(SIXTH_DIFFERENCE):
             found.append(0.0)
             continue
@@ -117,12 +117,16 @@ def _rounding(stream: Stream, sigmas: Array) -> Array:
 
 def _roughness(values: Array) -> Array:
     """Noise that would explain by how much neighbouring samples differ, shape (n,)."""
-    found = []
-    for column in (column[np.isfinite(column)] for column in values.T):
-        enough = len(column) >= 2 * len(FOURTH_DIFFERENCE)
-        rest = np.convolve(column, FOURTH_DIFFERENCE, mode="valid") if enough else np.zeros(1)
-        found.append(float(np.sqrt(np.mean(rest**2))))
-    return np.array(found)
+    found = np.zeros(values.shape[1])
+    for j, column in enumerate(_measured(values)):
+        if len(column) >= 2 * len(FOURTH_DIFFERENCE):
+            found[j] = np.sqrt(np.mean(np.convolve(column, FOURTH_DIFFERENCE, mode="valid") ** 2))
+    return found
+
+
+def _measured(values: Array) -> list[Array]:
+    """The samples of each channel that were measured."""
+    return [column[np.isfinite(column)] for column in values.T]
 
 
 def _is_white(residual: Array) -> bool:

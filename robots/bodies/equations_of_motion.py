@@ -95,7 +95,7 @@ class FreeEquations:
 
         table, tau = self._table, np.zeros((len(joints), *q.shape))
         motion = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, v, a))
-        body_torques(table.parents, table.rows, table.gravity, *table.with_bodies(joints, parameters), *motion, tau)
+        body_torques(table.parents, table.rows, table.gravity, *table.rows_of_bodies(joints, parameters), *motion, tau)
         return tau
 
     def gravity_derivatives(self, q: Array) -> Array:

@@ -58,7 +58,7 @@ class JointTable:
         parents = np.array(model.parents, dtype=np.intp)[1:] - 1
         return JointTable(parents, rows, np.array(model.gravity.linear), np.array(frames))
 
-    def with_bodies(self, joints: Sequence[int], parameters: Array) -> tuple[NDArray[np.intp], Array]:
+    def rows_of_bodies(self, joints: Sequence[int], parameters: Array) -> tuple[NDArray[np.intp], Array]:
         """Bodies alone: rows of their joints, shape (c,), and rows that hold nothing but them, shape (c, 27).
 
         Args:

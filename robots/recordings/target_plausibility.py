@@ -18,7 +18,7 @@ from jointscope.robots.geometry.tracker_fit import base_from_tracker, tracker_an
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.recordings.joint_motion import JointMotion
-from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
 Array = NDArray[np.float64]
@@ -46,14 +46,18 @@ def check_targets(recording: Recording, robot: Robot, motion: JointMotion) -> li
     """
     notices = []
     for target in robot.targets:
-        stream = recording.streams[target.name]
-        inside = np.flatnonzero((motion.times >= stream.times[0]) & (motion.times <= stream.times[-1]))
-        chosen = inside[:: max(len(inside) // MOST_POINTS, 1)]
-        if len(chosen) < FEWEST_POINTS:
-            continue
-        seen = np.column_stack([np.interp(motion.times[chosen], stream.times, column) for column in stream.values.T])
-        notices += _check_target(robot, target, motion.q[chosen], seen)
+        q, seen = seen_beside(motion, recording.streams[target.name])
+        if len(q) >= FEWEST_POINTS:
+            notices += _check_target(robot, target, q, seen)
     return notices
+
+
+def seen_beside(motion: JointMotion, stream: Stream) -> tuple[Array, Array]:
+    """Some hundred positions of the joints, shape (m, n), and of a target at the same instants, shape (m, 3)."""
+    inside = np.flatnonzero((motion.times >= stream.times[0]) & (motion.times <= stream.times[-1]))
+    chosen = inside[:: max(len(inside) // MOST_POINTS, 1)]
+    seen = [np.interp(motion.times[chosen], stream.times, column) for column in stream.values.T]
+    return motion.q[chosen], np.column_stack(seen)
 
 
 def fitted_tracker(tree: RigidTree, body: str, at: Array, q: Array, seen: Array) -> tuple[Array, Array, float]:

@@ -56,7 +56,7 @@ class FakeEstimator:
         alarms = ("imu1.x",) if self.alarmed else ()
         return EstimatorStatus(updates=self.updates, running=True, dropped=dropped, alarms=alarms, **counts)
 
-    def sample(self, name, t, values):
+    def sample(self, name, t, values, about=None):
         self.fed.append((name, t, np.array(values)))
         self.counts["received"][name] += 1
         newest = self.newest.get(name, -np.inf)

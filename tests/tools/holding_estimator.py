@@ -18,7 +18,7 @@ class HoldingEstimator:
         self.status = SimpleNamespace(dropped={"imu1": {"late": 2}}, restarts=0)
         self._mean, self._known = np.zeros(robot.layout.size), False
 
-    def sample(self, name, t, values):
+    def sample(self, name, t, values, about=None):
         self.samples.append((name, t, np.array(values)))
         if name == self.robot.motor_encoder.name:
             layout = self.robot.layout

@@ -136,16 +136,13 @@ class ArrivalReader:
             present.append(need)
             found.append(fitting)
             before = self._last.get(need.name)
-            columns.append(_in_si(need, topic, fitting, before))
-            about.append(_about(need, fitting))
-            if about[-1] is not None:
-                last = _newest(columns[-1][1], before)
-                if need.name == "command":
-                    columns[-1] = (columns[-1][0], _acting(*columns[-1], before, self._held))
-                    about[-1] = None
-                self._last[need.name] = last
-                continue
-            self._last[need.name] = columns[-1][1][-1]
+            stamps, values = _in_si(need, topic, fitting, before)
+            channels = _about(need, fitting)
+            self._last[need.name] = values[-1] if channels is None else _newest(values, before)
+            if channels is not None and need.name == "command":
+                values, channels = _acting(stamps, values, before, self._held), None
+            columns.append((stamps, values))
+            about.append(channels)
         if not present:
             return Arrivals.merged((), [], [])
         columns = self._on_one_clock(present, found, raw, columns)

@@ -125,7 +125,7 @@ def simulate_frequency(
         "session": session,
         "friction": shaking.friction,
         "parameters": values,
-        "effects": [{"effect": e.id, "owner": e.owner, "parameters": dict(e.parameters)} for e in effects],
+        "effects": [effect.truth for effect in effects],
         "poses": {r.name: np.asarray(pose).tolist() for r, pose in zip(found, poses, strict=True)},
     }
     return found, multisine, truth

@@ -87,7 +87,7 @@ def simulate_poses(
         "seed": seed,
         "session": session,
         "parameters": values,
-        "effects": [{"effect": e.id, "owner": e.owner, "parameters": dict(e.parameters)} for e in effects],
+        "effects": [effect.truth for effect in effects],
         "targets": targets.tolist(),
     }
     names = tuple(map(str, range(count)))

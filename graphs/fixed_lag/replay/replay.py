@@ -94,7 +94,7 @@ class _Run:
         sample, start, outside = self._estimator.sample, perf_counter(), self._outside
         for (_, name, stamp, values), about in zip(block, block.channels(), strict=True):
             self._begin = perf_counter()
-            sample(name, stamp, values) if about is None else sample(name, stamp, values, about)
+            sample(name, stamp, values, about)
             self._spent += perf_counter() - self._begin
         self._messages += len(block)
         self._wall += perf_counter() - start - (self._outside - outside)

@@ -23,10 +23,8 @@ LATEST = 1.0  # [s] after the message that is repeated
 ALIKE = 0.9  # share of the copies that come about as late as is usual
 SPREAD = 0.15  # of how late is usual; a signal that turns round repeats itself earlier and later, too
 LONGEST_RUN = 3.0  # copies between two messages of the driver, in the mean
-TYPICAL, OFF = (
-    0.9,
-    3.0,
-)  # quantile of how far messages lie off the line between their neighbours; how many of it a copy does
+TYPICAL = 0.9  # quantile of how far messages lie off the line between their neighbours
+OFF = 3.0  # times that far off are copies
 NEVER_TWICE = 0.9  # share of the driver's different messages that no other one equals
 
 
@@ -37,15 +35,13 @@ def without_late_copies(name: str, samples: TimedSamples) -> tuple[TimedSamples,
         name: of the stream.
         samples: in the order of their stamps.
     """
-    copies = late_copies(samples.stamps, samples.values)
+    copies, later = _found(samples.stamps, samples.values)
     count = int(np.count_nonzero(copies))
     if not count:
         return samples, []
-    _, before = _earlier(samples.values)
-    later = float(np.median((samples.stamps - samples.stamps[before])[copies])) / 1e9
     text = (
         f"{name}: left out {counted(count, 'message')} of a second node that repeats those of the driver "
-        f"{duration(later)} later; stop it: `ros2 topic info -v` names it"
+        f"{duration(float(np.median(later[copies])))} later; stop it: `ros2 topic info -v` names it"
     )
     return samples.take(~copies), [Notice(name, "foreign", count, text)]
 
@@ -57,11 +53,16 @@ def late_copies(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> Flags
         stamps: in order, shape (n,) [ns].
         values: shape (n, m).
     """
-    none = np.zeros(len(values), bool)
+    return _found(stamps, values)[0]
+
+
+def _found(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.float64]]:
+    """The same, and how long after the message that it repeats each comes, shape (n,) [s]."""
+    none = np.zeros(len(values), bool), np.zeros(len(values))
     if len(values) < FEWEST or not values.shape[1]:
         return none
     known, before = _earlier(values)
-    fresh = np.concatenate([[True], np.any(values[1:] != values[:-1], axis=1)])
+    fresh = _fresh(values)
     later = (stamps - stamps[before]) / 1e9
     copies = known & fresh & (later < LATEST) & _sent_twice(values)
     if np.count_nonzero(copies) < max(FEWEST, SHARE * len(values)):
@@ -75,7 +76,12 @@ def late_copies(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> Flags
         return none
     if not own or twice > (1.0 - NEVER_TWICE) * own or _likely(values[~like]):
         return none
-    return like if _out_of_the_way(stamps, values, like) else none
+    return (like, later) if _out_of_the_way(stamps, values, like) else none
+
+
+def _fresh(values: NDArray[np.float64]) -> Flags:
+    """Whether a message differs from the one before it, shape (n,)."""
+    return np.concatenate([[True], np.any(values[1:] != values[:-1], axis=1)])
 
 
 def _earlier(values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.intp]]:
@@ -111,5 +117,5 @@ def _sent_twice(values: NDArray[np.float64]) -> Flags:
 
 def _likely(values: NDArray[np.float64]) -> bool:
     """Whether messages of the driver are so coarse that some are the same by chance."""
-    fresh = values[np.concatenate([[True], np.any(values[1:] != values[:-1], axis=1)])]
+    fresh = values[_fresh(values)]
     return len(np.unique(fresh, axis=0)) < NEVER_TWICE * len(fresh)

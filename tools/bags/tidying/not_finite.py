@@ -53,7 +53,7 @@ def without_gibberish(
         RecordingError: too many are not.
     """
     values = numbers_only(samples.values)
-    bad, absent = np.isnan(values), _absent(samples)
+    bad, absent = np.isnan(values), absent_in(samples)
     bad &= ~absent
     rows = np.asarray(bad.any(axis=1))
     acts_on = name == COMMAND and held
@@ -82,7 +82,7 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
     bad = np.isnan(samples.values)
     if not bad.any():
         return samples
-    missing = bad & ~_absent(samples)
+    missing = bad & ~absent_in(samples)
     times, values = (samples.stamps - samples.stamps[0]) / 1e9, samples.values.copy()
     for j in range(values.shape[1]):
         good = np.flatnonzero(~bad[:, j])
@@ -100,7 +100,7 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
     return replace(samples, values=values, filled=bad & ~np.isnan(values))
 
 
-def _absent(samples: TimedSamples) -> Flags:
+def absent_in(samples: TimedSamples) -> Flags:
     """Where messages are not about a joint, shape (n, m)."""
     return np.zeros(samples.values.shape, bool) if samples.filled is None else samples.filled
 
@@ -119,7 +119,7 @@ def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
 def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, bad: Flags) -> None:
     counts = np.count_nonzero(bad, axis=0)
     worst = int(np.argmax(counts))
-    n = len(samples) - int(np.count_nonzero(_absent(samples)[:, worst]))
+    n = len(samples) - int(np.count_nonzero(absent_in(samples)[:, worst]))
     too_many, scattered = counts[worst] > MOST * n, False
     if name == COMMAND:
         rows = np.asarray(bad.any(axis=1))

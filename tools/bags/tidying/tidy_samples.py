@@ -12,7 +12,7 @@ from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.glitches import without_glitches
 from jointscope.tools.bags.tidying.late_copies import without_late_copies
-from jointscope.tools.bags.tidying.not_finite import MOST, filled_in, numbers_only
+from jointscope.tools.bags.tidying.not_finite import MOST, absent_in, filled_in, numbers_only
 from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
 from jointscope.tools.bags.tidying.staircase import without_repetitions
 
@@ -43,7 +43,7 @@ def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
     Raises:
         RecordingError: so much would be left out that something else is wrong.
     """
-    absent = np.zeros(samples.values.shape, bool) if samples.filled is None else samples.filled
+    absent = absent_in(samples)
     missing = np.count_nonzero(np.isnan(samples.values) & ~absent, axis=0)
     sound = missing <= MOST * np.count_nonzero(~absent, axis=0)
     if not sound.any():

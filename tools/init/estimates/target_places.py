@@ -19,8 +19,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.joint_motion import joint_motion
-from jointscope.robots.recordings.recording import Stream
-from jointscope.robots.recordings.target_plausibility import fitted_tracker
+from jointscope.robots.recordings.target_plausibility import fitted_tracker, seen_beside
 from jointscope.robots.units import si_factor
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.messages.open_bag import open_bag
@@ -36,7 +35,6 @@ FIELDS = {
     "geometry_msgs/msg/TransformStamped": "transform.translation",
 }
 """Types of messages with a position, and the field that holds it."""
-MOST_POINTS = 300
 LARGEST = 5.0  # [m] a target that is farther from its link is in millimetres
 
 
@@ -97,21 +95,14 @@ def _fitted(bag: Path, robot: Robot, source: Topic, link: str, taken: Sequence[s
     stream, encoder = recording.streams[name], robot.motor_encoder
     posed = robot.in_posture(recording.posture)
     motion = joint_motion(recording.streams[encoder.name], encoder.zero)
-    inside = np.flatnonzero((motion.times >= stream.times[0]) & (motion.times <= stream.times[-1]))
-    chosen = inside[:: max(len(inside) // MOST_POINTS, 1)]
-    q = joint_angles(posed, motion.q[chosen])
-    seen = np.column_stack([np.interp(motion.times[chosen], stream.times, column) for column in stream.values.T])
+    motors, seen = seen_beside(motion, stream)
+    q = joint_angles(posed, motors)
     for unit in ("m", "mm"):
         T, at, left = fitted_tracker(posed.tree, link, np.zeros(3), q, si_factor(unit) * seen)
         if np.linalg.norm(at) < LARGEST:
             break
-    return GuessedTarget(
-        replace(sensor, source=replace(source, unit=unit), at=at, tracker_pose=T), _noise(stream, unit), left
-    )
-
-
-def _noise(stream: Stream, unit: str) -> NoiseGuess:
-    return guess_noise(stream.times, stream.values, unit)
+    fitted = replace(sensor, source=replace(source, unit=unit), at=at, tracker_pose=T)
+    return GuessedTarget(fitted, guess_noise(stream.times, stream.values, unit), left)
 
 
 def _name(topic: str, taken: Sequence[str]) -> str:

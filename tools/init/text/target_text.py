@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from jointscope.tools.init.estimates.target_places import GuessedTarget
-from jointscope.tools.init.streams.sensor_noise import NoiseGuess
 from jointscope.tools.init.text.robot_line import as_list, line, number
 from jointscope.tools.init.text.source_text import sigma_line
 
@@ -28,7 +27,7 @@ def target_lines(target: GuessedTarget) -> list[str]:
         f"    target: {sensor.body}",
         line(f"at: {as_list(round(x, 5) for x in sensor.at.tolist())}", f"[m] on its link; {fitted}", False, 4),
         line(f"tracker_pose: [{', '.join(rows)}]", f"base from tracker; {fitted}", False, 4),
-        sigma_line(NoiseGuess(target.noise.sigma, target.noise.reason), sensor.source.unit),
+        sigma_line(target.noise, sensor.source.unit),
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from jointscope.robots.errors import EffectError
 from jointscope.tools.simulator.effects import parameters_in
@@ -32,6 +33,11 @@ class PoseEffect:
     id: str
     owner: str
     parameters: Mapping[str, float]
+
+    @property
+    def truth(self) -> dict[str, Any]:
+        """As the truth beside a recording names it, fit for JSON."""
+        return {"effect": self.id, "owner": self.owner, "parameters": dict(self.parameters)}
 
 
 def pose_effects(texts: Iterable[str], joints: Sequence[str]) -> list[PoseEffect]:
