@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 HORIZON = 0.1  # [s] the horizon of `error`
 HORIZONS = (0.01, 0.1, 1.0)  # [s]
 SPACING = {0.01: 0.01, 0.1: 0.01, 1.0: 0.1}  # [s] between starts, by horizon
-PAUSES = 0.9  # quantile of the pauses between samples
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,11 @@ def predict_ahead(
             for name, s in problem.robot.sensors.items()
         }
     judged = are_judged(problem, start, horizon)
-    wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
+    streams = problem.recording.streams
+    wanted = {
+        g.sensor: _target_samples(g.taken, float(np.min(streams[g.sensor].periods)), ticks[start] + horizon)
+        for g in reversed(groups)
+    }
     taken = [g.taken[wanted[g.sensor][0]] for g in groups]
     steps = [g.steps(timeline, times) for g, times in zip(groups, taken, strict=True)]
     d = causal.mean.shape[1]
@@ -139,14 +142,13 @@ def _sums(h: Array, horizon: float) -> Array:
     return total / count
 
 
-def _target_samples(taken: Array, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def _target_samples(taken: Array, period: float, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period.
 
-    Where two nodes speak just behind each other, the period is the pause after both.
+    The period is that of the fastest node, however soon others speak behind it.
     """
     right = np.clip(np.searchsorted(taken, times), 1, len(taken) - 1)
     nearest = np.where(times - taken[right - 1] < taken[right] - times, right - 1, right)
-    period = float(np.quantile(np.diff(taken), PAUSES))
     return nearest, np.abs(taken[nearest] - times) <= 0.5 * period + 1e-9
 
 

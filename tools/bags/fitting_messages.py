@@ -36,7 +36,6 @@ def read_columns(
     first: int = 0,
     wanted: Sequence[str] = (),
     width: int | None = None,
-    acts_on: bool = False,
 ) -> Columns:
     """One field of the messages of a topic that belong together.
 
@@ -48,21 +47,17 @@ def read_columns(
         first: number of the first message in its topic.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values of messages without names; None for what most have.
-        acts_on: whether values act until the next one, as those of commands.
     """
-    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width, acts_on)
+    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
 
 
-def fitting_messages(
-    found: MessageParts, wanted: Sequence[str] = (), width: int | None = None, acts_on: bool = False
-) -> Columns:
+def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int | None = None) -> Columns:
     """The messages that fit.
 
     Args:
         found: the messages in parts.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values that a message without names must have; None for what most messages have.
-        acts_on: whether values act until the next one, as those of commands; else they were measured.
 
     Returns:
         Their columns: the wanted names first, then others that all of them have. Without wanted names, those of all
@@ -79,11 +74,11 @@ def fitting_messages(
         chosen = [part for part in named if set(core) <= set(part.names or ())]
         if not chosen and wanted and all(any(name in (part.names or ()) for part in named) for name in core):
             others = [part for part in parts if not set(part.names or ()) & set(core)]
-            return woven(named, core, acts_on, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
+            return woven(named, core, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
     else:
         chosen = []
     if core and not wanted and (nodes := _nodes(named, core)):
-        return _of_nodes(found, nodes, acts_on)
+        return _of_nodes(found, nodes)
     if not chosen:
         return _with_broken(_unnamed(parts, width), found.broken)
     first = chosen[0].names or ()
@@ -127,7 +122,7 @@ def _nodes(named: Sequence[Columns], core: tuple[str, ...]) -> list[list[Columns
     return nodes if len(nodes) > 1 else []
 
 
-def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]], acts_on: bool) -> Columns:
+def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]]) -> Columns:
     """What several nodes tell, each of the joints that all of its messages name."""
     used = {id(part) for node in nodes for part in node}
     shared = [
@@ -136,7 +131,7 @@ def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]], acts_on: 
     names = tuple(name for own in shared for name in own)
     others = [part for part in found.parts if id(part) not in used]
     left_out = (*_kinds(others, set(names)), *_broken(found.broken))
-    return woven([part for node in nodes for part in node], names, acts_on, left_out)
+    return woven([part for node in nodes for part in node], names, left_out)
 
 
 def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:

@@ -41,7 +41,7 @@ class SampleIntake:
     def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
         self._robot, self._status, self._log, self._clock = robot, status, log, clock
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        self._acting: Array | None = None  # last command of all joints
+        self._acting = np.full(robot.n, np.nan)  # last command of each joint
         self._in_doubt = 0  # commands since then
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
@@ -49,24 +49,43 @@ class SampleIntake:
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
-    def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
+    @property
+    def waits_for_commands(self) -> bool:
+        """Whether commands of some joints have come, and none yet of the others."""
+        return bool(np.isnan(self._acting).any() and not np.isnan(self._acting).all())
+
+    def command(
+        self, t: float, u: ArrayLike, now: float | None, about: NDArray[np.bool_] | None = None
+    ) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one.
 
-        Joints whose value is no number keep the one before, for a while.
+        Joints whose value is no number keep the one before, for a while; those that the message is not `about`, shape
+        (n,), as long as their own driver is silent.
         """
         values = self._shaped("command", t, u, self._robot.n, now)
         if values is None:
             return None
-        bad = _useless(values.tolist())
-        if not bad:
+        useless = _useless(values.tolist())
+        if not useless:
             self._acting, self._in_doubt = values, 0
             return values
-        self._in_doubt += 1
-        joints = ", ".join(self._robot.joints[j] for j in bad)
-        self._drop("command", t, "not_finite", f"the command of {joints} is no number and is left out")
-        if self._acting is None or len(bad) == len(values) or self._in_doubt >= LONGEST_DOUBT:
+        bad = np.isin(np.arange(len(values)), useless)
+        lost = bad if about is None else bad & about
+        if not lost.any():
+            self._in_doubt = 0
+        else:
+            self._in_doubt += 1
+            joints = ", ".join(joint for joint, no_number in zip(self._robot.joints, lost, strict=True) if no_number)
+            self._drop("command", t, "not_finite", f"the command of {joints} is no number and is left out")
+            if lost.all() or self._in_doubt >= LONGEST_DOUBT:
+                return None
+        values = np.where(bad, self._acting, values)
+        self._acting = values
+        if np.isnan(values).any():
+            if not lost.any():
+                joints = ", ".join(joint for joint, u in zip(self._robot.joints, values, strict=True) if np.isnan(u))
+                self._drop("command", t, "incomplete", f"no command of {joints} has come yet")
             return None
-        self._acting = values = np.where(np.isin(np.arange(len(values)), bad), self._acting, values)
         return values
 
     def sample(
