@@ -66,14 +66,15 @@ def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int
     parts = found.parts
     if len(parts) == 1:
         return _with_broken(parts[0], found.broken)
-    named = [part for part in parts if _is_sound(part)]
+    named = _told_once([part for part in parts if _is_sound(part)])
     if not wanted and PLUS in found.topic:
         wanted = tuple(dict.fromkeys(name for part in named for name in part.names or ()))
     core = tuple(wanted) or _most_shared(named)
     if core:
         chosen = [part for part in named if set(core) <= set(part.names or ())]
         if not chosen and wanted and all(any(name in (part.names or ()) for part in named) for name in core):
-            others = [part for part in parts if not set(part.names or ()) & set(core)]
+            used = {id(part) for part in named}
+            others = [part for part in parts if id(part) not in used or not set(part.names or ()) & set(core)]
             return woven(named, core, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
     else:
         chosen = []
@@ -107,6 +108,20 @@ def _is_sound(part: Columns) -> bool:
     """Whether the messages have one name for every value."""
     names = part.names or ()
     return bool(names) and len(names) == part.values.shape[1] and len(set(names)) == len(names)
+
+
+def _told_once(named: Sequence[Columns]) -> list[Columns]:
+    """The parts without an aggregator, which repeats later what several nodes say; without these where it says more."""
+    left = list(named)
+    for whole in named:
+        own = set(whole.names or ())
+        pieces = [part for part in left if set(part.names or ()) < own]
+        names = [name for part in pieces for name in part.names or ()]
+        if len(pieces) > 1 and len(names) == len(set(names)) and set(names) == own:
+            rarest = min(len(part.values) for part in pieces)
+            spare = [whole] if rarest >= max(len(whole.values), FEWEST) else pieces
+            left = [part for part in left if all(part is not other for other in spare)]
+    return left
 
 
 def _nodes(named: Sequence[Columns], core: tuple[str, ...]) -> list[list[Columns]]:
@@ -196,6 +211,8 @@ def _kinds(others: Sequence[Columns], used: set[str]) -> list[LeftOut]:
             kind = "in which a joint stands twice"
         elif not names:
             kind = f"without names, of {width} value{'s' * (width != 1)}" if used else f"of {width} values"
+        elif used and used <= set(names):
+            kind = "of another node that repeats what those of the joints say"
         elif used & set(names):
             kind = "that lack some of the joints"
         else:

@@ -155,6 +155,33 @@ def test_nodes_may_speak_just_behind_each_other_begin_late_and_end_early(fast, t
         assert json.loads(told.read_text())["nis_mean"] < 1.5
 
 
+@pytest.mark.parametrize("aggregated", (40, 4))
+def test_an_aggregator_that_repeats_what_two_nodes_say_is_left_out_unless_it_says_more(
+    fast, tmp_path, capsys, aggregated
+):
+    urdf, motion = fast
+    every = np.arange(len(motion.times))
+    topics = {"/cmd": motion.commands(["shoulder", "elbow"]) | {"rows": every[::4]}}
+    for joint, own in (("shoulder", every[::10]), ("elbow", every[2::10])):
+        topics[f"/joint_states#{joint}"] = motion.states([joint]) | {"rows": own}
+    late = motion.states(["shoulder", "elbow"]) | {"rows": every[7:-60:aggregated]}
+    late |= {"stamped": lambda stamp: stamp + 50_000_000} if aggregated > 10 else {}
+    bag = write_arm_bag(tmp_path / "aggregator.mcap", motion.times, topics | {"/joint_states#all": late})
+    robot = tmp_path / "arm.yaml"
+    assert main(["init", str(urdf), str(bag), "-o", str(robot)]) == 0
+    out = capsys.readouterr().out
+    assert "the recording can be used with it" in out
+    repeated = f"left out {len(late['rows'])} messages of another node that repeats what those of the joints say"
+    assert (repeated in out) == (aggregated > 10)
+    stream = read_recording(bag, load_robot(robot)).streams["motor_encoder"]
+    (block,) = list(ArrivalReader(bag, load_robot(robot)))
+    arrived = block.values[block.names.index("motor_encoder")]
+    kept = [len(every[::10]), len(every[2::10])] if aggregated > 10 else 2 * [len(late["rows"])]
+    assert np.isfinite(stream.measured).sum(axis=0).tolist() == np.isfinite(arrived).sum(axis=0).tolist() == kept
+    for joint in ("shoulder", "elbow"):
+        assert load_robot(robot).parameters[f"{joint}.inertia"].value == pytest.approx(0.05, rel=0.05), joint
+
+
 def test_a_list_that_is_shorter_than_its_names_is_said_with_both_lengths(arm, tmp_path, capsys):
     _, urdf, motion, _ = arm
     command = motion.commands(["shoulder", "elbow"])
