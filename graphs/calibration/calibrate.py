@@ -19,8 +19,13 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import Solved, summarize
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
-from jointscope.graphs.calibration.friction_at_standstill import asked_at_standstill, sticking_joints
-from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
+from jointscope.graphs.calibration.held_back.encoder_filters import (
+    free_filters,
+    solved_with_filters,
+    with_filters,
+)
+from jointscope.graphs.calibration.held_back.friction_at_standstill import asked_at_standstill, sticking_joints
+from jointscope.graphs.calibration.held_back.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
 from jointscope.graphs.noise.lasting_noise import without_lasting
@@ -118,6 +123,8 @@ def _calibrated(
         robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
+    filters = free_filters(robot) if near is None and not biases_only else ()
+    seen = with_filters(seen, {name: robot.parameters[name].value for name in filters}, fixed=True)
     told = list(recordings)
     if not biases_only and not standstill:
         told = [leaving_standstill_out(seen, recording) for recording in recordings]
@@ -139,6 +146,7 @@ def _calibrated(
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
     solved = stage.solve(problems, noise, calibrations)
+    solved = solved_with_filters(stage, solved, filters) if filters else solved
     if not biases_only and not standstill:
         solved = asked_at_standstill(stage, solved)
         notices += sticking_joints(robot, solved.robot)
