@@ -38,7 +38,7 @@ def run_section(quick: bool) -> Section:
     """True parameters and matching noise; `quick` takes two short recordings."""
     seeds, seconds = ((1, 2), 3.0) if quick else (tuple(range(1, 6)), 6.0)
     section = Section(
-        "Accuracy",
+        "Estimator: accuracy",
         f"Root mean square error of the link velocities against the simulator's truth, {len(seeds)} recordings of "
         f"{seconds:g} s of moves with white random torques of 0.3 N m on links and rotors, without the first second. "
         "All estimators know the true parameters and the noise that belongs to the torques.",

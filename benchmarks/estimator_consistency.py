@@ -48,7 +48,7 @@ def run_section(quick: bool) -> Section:
     seeds, few = (range(1, 3), range(1, 2)) if quick else (range(1, 21), range(1, 6))
     seconds = 3.0 if quick else 6.0
     section = Section(
-        "Consistency",
+        "Estimator: consistency",
         f"Recordings of {seconds:g} s of moves, each with a seed of its own, random torques of {TORQUE:g} N m on links "
         "and rotors. NEES is the normalised error squared of positions and velocities of links and motors, NIS that of "
         "all innovations, both per degree of freedom; 1 is right.",

@@ -54,7 +54,7 @@ def run_section(quick: bool, minutes: float) -> Section:
     """One long run in repetitions of a recording; `quick` takes short ones, for which memory is not judged."""
     length = 12.0 if quick else 60.0
     section = Section(
-        "Latency",
+        "Estimator: time",
         f"1 kHz commands, encoders and two gyros; {LAG:g} s lag; one core, threads of the linear algebra limited to "
         "one. An update is one cycle of a controller: all messages of a tick fed, `state()` asked with its covariance. "
         "Python's garbage is collected and frozen once before the run.",

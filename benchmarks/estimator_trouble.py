@@ -44,7 +44,7 @@ def run_section(quick: bool) -> Section:
     name, since, until = SILENT
     seconds = until + 1.0
     section = Section(
-        "Trouble",
+        "Estimator: trouble",
         f"{len(seeds)} recordings of {seconds:g} s as above, true parameters and matching noise; {LOST:.0%} of all "
         f"messages lost, commands too, the others up to {1000 * LATEST:g} ms late and out of order (stamps exact), and "
         f"{name} silent from {since:g} s to {until:g} s. The controller asks for the state every millisecond.",

@@ -93,7 +93,7 @@ class ResidualSeries:
         channels: names of the columns.
         units: SI unit of each.
         times: shape (m,) [s].
-        measured, predicted: shape (m, c) [unit].
+        measured, predicted: shape (m, c) [unit]; the latter NaN where a sample is not about that channel.
         sigma: expected standard deviation of measured - predicted, shape (m, c) [unit].
         chi2: mean square of residual over sigma, corrected for the freedom of the states, shape (c,).
     """

@@ -186,7 +186,7 @@ def _channels(robot: Robot, bags: Sequence[BagFit]) -> dict[str, ChannelFit]:
             weights = np.array([len(s.times) for s in series], float)
             chi2 = float(np.average([s.chi2[j] for s in series], weights=weights))
             found[channel] = ChannelFit(
-                float(np.sqrt(np.mean(error**2))), float(sensor.sigmas[j]), chi2, sensor.units[j]
+                float(np.sqrt(np.nanmean(error**2))), float(sensor.sigmas[j]), chi2, sensor.units[j]
             )
     return found
 

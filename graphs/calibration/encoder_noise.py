@@ -58,7 +58,7 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
     weights = [len(fit.series.times) for fit in fits]
     chi2 = np.average([fit.series.chi2 for fit in fits], axis=0, weights=weights)
     lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
-    highest = np.max([_roughness(fit.stream.values) for fit in fits], axis=0)
+    highest = np.max([_roughness(fit.stream.measured) for fit in fits], axis=0)
     for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
         # a smaller sigma hides nothing, whatever colour is left
         if chi2[j] < AGREES[0] or all(
@@ -82,18 +82,19 @@ def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is None or not encoder.estimate_sigma:
             continue
-        seen = np.min([_visible_noise(r.streams[encoder.name].values) for r in recordings], axis=0)
+        seen = np.min([_visible_noise(r.streams[encoder.name].measured) for r in recordings], axis=0)
         sigmas = np.where(seen > TOO_SMALL * encoder.sigmas, seen, encoder.sigmas)
         changed[encoder.name] = replace(encoder, sigmas=sigmas)
     return robot.with_sensors(changed)
 
 
 def _visible_noise(values: Array) -> Array:
-    """White noise of each channel, shape (n,); zero where it cannot be told from motion."""
-    if len(values) < 4 * len(SIXTH_DIFFERENCE):
-        return np.zeros(values.shape[1])
+    """White noise of each channel, shape (n,); zero where it cannot be told from motion. NaN was not measured."""
     found = []
-    for column in values.T:
+    for column in (column[np.isfinite(column)] for column in values.T):
+        if len(column) < 4 * len(SIXTH_DIFFERENCE):
+            found.append(0.0)
+            continue
         parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
         fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
         alike = abs(fourth - sixth) < ALIKE * sixth and all(map(_alternates, parts))
@@ -116,14 +117,17 @@ def _rounding(stream: Stream, sigmas: Array) -> Array:
 
 def _roughness(values: Array) -> Array:
     """Noise that would explain by how much neighbouring samples differ, shape (n,)."""
-    if len(values) < 2 * len(FOURTH_DIFFERENCE):
-        return np.zeros(values.shape[1])
-    rest = [np.convolve(column, FOURTH_DIFFERENCE, mode="valid") for column in values.T]
-    return np.array([np.sqrt(np.mean(part**2)) for part in rest])
+    found = []
+    for column in (column[np.isfinite(column)] for column in values.T):
+        enough = len(column) >= 2 * len(FOURTH_DIFFERENCE)
+        rest = np.convolve(column, FOURTH_DIFFERENCE, mode="valid") if enough else np.zeros(1)
+        found.append(float(np.sqrt(np.mean(rest**2))))
+    return np.array(found)
 
 
 def _is_white(residual: Array) -> bool:
-    r = residual - residual.mean()
+    r = residual[np.isfinite(residual)]
+    r = r - r.mean()
     power = float(r @ r)
     if power == 0.0:
         return False

@@ -100,10 +100,14 @@ def _verdict(result: CalibrationResult) -> str:
     )
 
 
+AS_STATED = "every sensor channel is explained down to its stated noise"
+"""Said of residuals alone; beside a verdict of "No" it would say that the model were right."""
+
+
 def _sensor_noise(result: CalibrationResult) -> list[str]:
     odd = {name: fit.chi2 for name, fit in result.channels.items() if not CHI2_LOW < fit.chi2 < CHI2_HIGH}
     if not odd:
-        return ["every sensor channel is explained down to its stated noise"]
+        return [AS_STATED]
     listed = ", ".join(f"{name} ({np.sqrt(chi2):.2g} sigma)" for name, chi2 in odd.items())
     too_large = any(chi2 > CHI2_HIGH for chi2 in odd.values())
     reason = (

@@ -20,6 +20,8 @@ from jointscope.robots.parts.sensors import Sensor
 
 Array = NDArray[np.float64]
 
+WHOLE = 0.5  # of the samples of a channel that must have all others, else each counts by itself
+
 
 @dataclass(frozen=True)
 class SensorResiduals:
@@ -106,7 +108,10 @@ def collect(
 
 
 def series_of(problem: BagProblem, sensor: Sensor, parts: list[SensorResiduals]) -> ResidualSeries:
-    """Residuals of one sensor in the order of time."""
+    """Residuals of one sensor in the order of time.
+
+    Samples that lack a channel are left out; where several drivers tell of a joint each, NaN stands for the others.
+    """
     rows = parts[0].rows
     channels = sensor.channels if set(rows) <= set(sensor.channels) else rows
     units = dict(zip(sensor.channels, sensor.units, strict=True))
@@ -122,7 +127,12 @@ def series_of(problem: BagProblem, sensor: Sensor, parts: list[SensorResiduals])
         sums[1, columns] += part.freedom
         start += len(part.residual)
     table[2] = stream.values if len(channels) == stream.values.shape[1] else 0.0
-    seen = np.all(np.isfinite(table), axis=(0, 2))
+    each = np.all(np.isfinite(table), axis=0)
+    seen = each.all(axis=1)
+    if np.count_nonzero(seen) < WHOLE * np.count_nonzero(each, axis=0).max():
+        seen = each.any(axis=1)
+        typical = [np.median(table[1][each[:, j], j]) if each[:, j].any() else 1.0 for j in range(len(channels))]
+        table[1] = np.where(each, table[1], typical)
     residual, expected, measured = table[:, seen]
     return ResidualSeries(
         channels=channels,

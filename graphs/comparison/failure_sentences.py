@@ -17,6 +17,7 @@ from jointscope.graphs.calibration.motion_regimes import AROUND_REVERSAL, NEAR, 
 from jointscope.graphs.comparison.channel_errors import ChannelErrors
 from jointscope.graphs.comparison.error_concentration import EVERYWHERE, Concentration, shares
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder
 
 NEAR_FLOOR = 1.2  # times the floor; a channel below has nothing to say
@@ -29,6 +30,7 @@ COLOURED = 1e-3  # p-value below which errors are called coloured
 KINDS: Mapping[type, str] = {
     Gyro: "Gyro",
     Accelerometer: "Accelerometer",
+    PositionTarget: "Target",
     MotorEncoder: "The motor encoder of",
     LinkEncoder: "The link encoder of",
 }
@@ -112,9 +114,9 @@ def _size(group: Sequence[Finding], robot: Robot) -> str:
     highest = f"up to {abs(worst.error[peak]):.2g} at {worst.times[peak]:.2f} s"
     allowed = f"where noise and state uncertainty allow {_listed([f'{e.floor:.2g}' for e in errors])} {unit}"
     sensor = robot.sensors[errors[0].sensor]
-    of_axes = isinstance(sensor, Gyro | Accelerometer)
+    of_axes = isinstance(sensor, Gyro | Accelerometer | PositionTarget)
     labels = _listed([e.channel.rsplit(".", 1)[1] if of_axes else e.channel.rsplit(".", 1)[0] for e in errors])
-    way = "along" if isinstance(sensor, Accelerometer) else "about"
+    way = "about" if isinstance(sensor, Gyro) else "along"
     axes = f" {way} its {labels} {'axes' if len(errors) > 1 else 'axis'}" if of_axes else ""
     name = f"{KINDS[type(sensor)]} {errors[0].sensor if of_axes else labels}"
     if group[0].unpredicted:

@@ -125,13 +125,15 @@ class FixedLagEstimator(WindowAccess):
         """Rate of a gyro with stamp t [s] in its own frame, shape (3,) [rad/s]."""
         self.sample(name, t, w)
 
-    def sample(self, name: str, t: float, values: ArrayLike) -> None:
+    def sample(self, name: str, t: float, values: ArrayLike, about: NDArray[np.bool_] | None = None) -> None:
         """A message of any stream.
 
         Args:
             name: "command", or a sensor of the robot.
             t: stamp [s].
             values: shape (c,), SI.
+            about: channels that a message of a sensor is about, shape (c,), where drivers send one for each joint; the
+                others count as neither measured nor lost. None for all.
 
         Raises:
             EstimatorError: unknown stream or wrong shape.
@@ -139,7 +141,7 @@ class FixedLagEstimator(WindowAccess):
         if name == "command":
             self.command(t, values)
             return
-        observations = self._books.intake.sample(name, t, values, self._now)
+        observations = self._books.intake.sample(name, t, values, self._now, about)
         if self._books.clock.was_set:
             self._go_to(t)
         if not observations:

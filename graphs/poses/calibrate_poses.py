@@ -19,7 +19,7 @@ from jointscope.graphs.poses.determined import Determined, determined
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
-from jointscope.graphs.poses.tracker_start import base_from_tracker, tracker_and_target
+from jointscope.graphs.poses.tracker_start import tracker_and_target
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
@@ -27,6 +27,7 @@ from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_names
+from jointscope.robots.geometry.tracker_fit import base_from_tracker
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.poses import Poses

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.graphs.poses.tracker_start import base_from_tracker, tracker_and_target
+from jointscope.graphs.poses.tracker_start import tracker_and_target
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.geometry.tracker_fit import base_from_tracker
 
 Array = NDArray[np.float64]
 FEWEST = 6

@@ -20,6 +20,7 @@ from jointscope.factors.interpolated import InterpolatedFactor
 from jointscope.factors.joint_torque import JointTorqueFactor
 from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
+from jointscope.factors.position_target import PositionTargetFactor
 from jointscope.factors.relative_gyro import RelativeGyroFactor
 from jointscope.factors.rescaled import RescaledFactor
 from jointscope.factors.some_channels import SomeChannels
@@ -31,6 +32,7 @@ from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Recording, Stream
 
@@ -162,9 +164,8 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
     if isinstance(sensor, MotorEncoder | LinkEncoder):
         factor, shared = factor_on_state(robot, name, values, times), shared_error(stream, sensor.sigmas)
         return factor if shared is None else RescaledFactor(factor, shared[chosen])
-    if isinstance(sensor, Accelerometer | TorqueSensor) or (isinstance(sensor, Gyro) and sensor.form == "full"):
+    if not isinstance(sensor, Gyro) or sensor.form == "full":
         return factor_on_state(robot, name, values, times)
-    assert isinstance(sensor, Gyro)
     if sensor.form == "vertical":
         return VerticalGyroFactor(sensor, values, robot.tree, robot.layout)
     reference = robot.sensors[str(sensor.reference)]
@@ -191,6 +192,8 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
         body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
         seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
         return AccelerometerFactor(sensor, values, *seat, _values(robot))
+    if isinstance(sensor, PositionTarget):
+        return PositionTargetFactor(sensor, values, robot.kinematic_tree, robot.layout, _values(robot))
     if isinstance(sensor, TorqueSensor):
         return JointTorqueFactor(sensor, values, SpringTorques(robot))
     if isinstance(sensor, MotorEncoder):

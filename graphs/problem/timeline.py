@@ -53,7 +53,7 @@ class Timeline:
         """
         command = recording.command
         sensors = [stream for name, stream in recording.streams.items() if name != "command"]
-        period = float(np.median(np.diff(command.times))) if len(command) > 1 else np.inf
+        period = _usual_step(command)
         end = min(max(float(s.times[-1]) for s in sensors), float(command.times[-1]) + period)
         keep = np.append(np.diff(command.times) >= SHORTEST_STEP, True) & (command.times < end)
         times, u = command.times[keep], command.values[keep]
@@ -86,6 +86,13 @@ class Timeline:
         """As `locate`, but a time at a tick belongs to the step before it, whose command has acted until then."""
         step = np.clip(np.searchsorted(self.ticks, times, side="left") - 1, 0, len(self.ticks) - 2)
         return step, (times - self.ticks[step]) / self.h[step]
+
+
+def _usual_step(command: Stream) -> float:
+    """Usual time from one command to the next [s]; several drivers on one topic may speak just behind each other."""
+    drivers = command.values.shape[1] if command.filled is not None else 1
+    steps = (command.times[drivers:] - command.times[:-drivers]) / drivers
+    return float(np.median(steps)) if len(steps) else np.inf
 
 
 def _means(command: Stream, ticks: Array) -> Array:

@@ -47,7 +47,7 @@ class SpecificForce:
 
 
 @dataclass(frozen=True)
-class _Link:
+class ChainLink:
     """One joint on the way: column in q, placement, axis of its turn and of its slide (one of them zero)."""
 
     column: int
@@ -89,7 +89,7 @@ class BodyAccelerations:
 
     def __init__(self, model: pin.Model):
         self._model = model
-        self._chains: dict[int, list[_Link]] = {}
+        self._chains: dict[int, list[ChainLink]] = {}
 
     def at(self, frame: int, lever: Array, gravity: Array, q: Array, v: Array, a: Array) -> SpecificForce:
         """Specific force at a point of a frame.
@@ -107,7 +107,7 @@ class BodyAccelerations:
         omega, alpha = np.zeros((m, 3, 1 + 3 * n)), np.zeros((m, 3, 1 + 3 * n))
         force = np.zeros((m, 3, 1 + 3 * n))
         force[:, :, 0] = -gravity
-        for link in self._chain(frame):
+        for link in self.chain(frame):
             j = link.column
             force = _moved(force, alpha, omega, link.p_parent)
             R = turned_back(link.turn, q[:, j]) @ link.R_parent_joint.T
@@ -125,8 +125,8 @@ class BodyAccelerations:
         by_lever = skew(alpha[:, :, 0]) + W @ W
         return SpecificForce(f[:, :, 0], f[:, :, 1 : 1 + n], f[:, :, 1 + n : 1 + 2 * n], f[:, :, 1 + 2 * n :], by_lever)
 
-    def _chain(self, frame: int) -> list[_Link]:
-        """Joints from the base to a frame."""
+    def chain(self, frame: int) -> list[ChainLink]:
+        """Joints from the base to a frame, by its index."""
         if frame not in self._chains:
             joint, links = self._model.frames[frame].parentJoint, []
             while joint > 0:
@@ -135,12 +135,12 @@ class BodyAccelerations:
             self._chains[frame] = links[::-1]
         return self._chains[frame]
 
-    def _link(self, joint: int) -> _Link:
+    def _link(self, joint: int) -> ChainLink:
         placement, motion = self._model.jointPlacements[joint], unit_motion(self._model, joint)
         turn = np.array(motion.angular)
         slide = np.zeros(3) if np.any(turn) else np.array(motion.linear)
         column = self._model.joints[joint].idx_q
-        return _Link(column, placement.rotation.copy(), placement.translation.copy(), turn, slide)
+        return ChainLink(column, placement.rotation.copy(), placement.translation.copy(), turn, slide)
 
 
 def _turned(

@@ -13,6 +13,7 @@ pinocchio returns windows into its `data`, which its next call overwrites: every
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -80,6 +81,23 @@ class FreeEquations:
         pin.rneaInParallel(1, self._pool, *columns, tau)
         return np.ascontiguousarray(tau.T)
 
+    def body_torques(self, joints: Sequence[int], parameters: Array, q: Array, v: Array, a: Array) -> Array:
+        """Torques that bodies ask for, each alone, shape (c, m, n): they are linear in its parameters.
+
+        Args:
+            joints: index in pinocchio's model of the joint that moves each body.
+            parameters: dynamic parameters of each, or changes of them, shape (c, 10).
+            q: positions, shape (m, n), as v and a.
+            v: velocities.
+            a: accelerations.
+        """
+        from jointscope.robots.bodies.body_torques import body_torques  # numba takes half a second to import
+
+        table, tau = self._table, np.zeros((len(joints), *q.shape))
+        motion = (np.ascontiguousarray(x, dtype=np.float64) for x in (q, v, a))
+        body_torques(table.parents, table.rows, table.gravity, *table.with_bodies(joints, parameters), *motion, tau)
+        return tau
+
     def gravity_derivatives(self, q: Array) -> Array:
         """Derivatives of the torques of gravity by q, shape (m, n, n)."""
         by_q = np.empty((len(q), self._model.nv, self._model.nv))
@@ -144,6 +162,12 @@ class CoupledEquations:
         """As `FreeEquations.torque`."""
         coupling = self._coupling
         return coupling.torques(self._free.torque(coupling.positions(q), coupling.rates(v), coupling.rates(a)))
+
+    def body_torques(self, joints: Sequence[int], parameters: Array, q: Array, v: Array, a: Array) -> Array:
+        """As `FreeEquations.body_torques`."""
+        coupling = self._coupling
+        motion = coupling.positions(q), coupling.rates(v), coupling.rates(a)
+        return np.array([coupling.torques(tau) for tau in self._free.body_torques(joints, parameters, *motion)])
 
     def gravity_derivatives(self, q: Array) -> Array:
         """As `FreeEquations.gravity_derivatives`."""

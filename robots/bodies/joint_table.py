@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,17 +50,33 @@ class JointTable:
                 model.jointPlacements[joint],
             )
             frames.append(R)
-            parameters = model.inertias[joint].toDynamicParameters()
-            xx, xy, yy, xz, yz, zz = parameters[4:]
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             row = rows[joint - 1]
             row[ROTATION:ORIGIN] = (R_before.T @ placement.rotation @ R).ravel()
             row[ORIGIN:TURNS] = R_before.T @ placement.translation
-            row[TURNS], row[MASS], row[FIRST:SECOND] = float(turns), parameters[0], R.T @ parameters[1:4]
-            row[SECOND:ARMATURE] = (R.T @ (0.5 * np.trace(inertia) * np.eye(3) - inertia) @ R).ravel()
+            row[TURNS], row[MASS:ARMATURE] = float(turns), _body(model.inertias[joint].toDynamicParameters(), R)
         rows[:, ARMATURE] = model.armature
         parents = np.array(model.parents, dtype=np.intp)[1:] - 1
         return JointTable(parents, rows, np.array(model.gravity.linear), np.array(frames))
+
+    def with_bodies(self, joints: Sequence[int], parameters: Array) -> tuple[NDArray[np.intp], Array]:
+        """Bodies alone: rows of their joints, shape (c,), and rows that hold nothing but them, shape (c, 27).
+
+        Args:
+            joints: index in pinocchio's model of the joint that moves each body.
+            parameters: dynamic parameters of pinocchio, or changes of them, shape (c, 10).
+        """
+        rows = np.zeros((len(joints), int(COLUMNS)))
+        for row, joint, ten in zip(rows, joints, parameters, strict=True):
+            row[MASS:ARMATURE] = _body(ten, self.R_joint_axes[joint])
+        return np.array(joints, dtype=np.intp) - 1, rows
+
+
+def _body(parameters: Array, R: Array) -> Array:
+    """Mass, first and second moments in the axes of a row, shape (13,)."""
+    xx, xy, yy, xz, yz, zz = parameters[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    second = R.T @ (0.5 * np.trace(inertia) * np.eye(3) - inertia) @ R
+    return np.concatenate([parameters[:1], R.T @ parameters[1:4], second.ravel()])
 
 
 def unit_motion(model: pin.Model, joint: int) -> pin.Motion:

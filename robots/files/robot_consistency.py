@@ -38,6 +38,9 @@ def check_robot(robot: Robot) -> None:
                 f"{place}: sensors.{gyro.name}.reference: expected another gyro ({known}), got {gyro.reference!r}"
             )
     _check_accelerometers(robot, place)
+    for name in (name for target in robot.targets for name in target.own if name in robot.parameters):
+        if robot.parameters[name].positive:
+            raise RobotError(f"{place}: parameters.{name}.positive: expected false, a place has any sign")
     _check_names(robot, place)
     _check_stamps(robot, place)
     _check_positions(robot, place)
@@ -198,6 +201,8 @@ def _check_parameters(robot: Robot, place: str) -> None:
     }
     units |= of_effects | element_units(robot)
     units |= {name: "m" for sensor in robot.accelerometers for name in sensor.lever}
+    for target in robot.targets:
+        units |= target.parameters
     if robot.torque_sensor is not None:
         units |= {
             name: unit for pair in robot.torque_sensor.parameters for name, unit in zip(pair, ("1", "N m"), strict=True)

@@ -29,6 +29,7 @@ from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
 from jointscope.robots.files.transmission_section import transmission_matrix
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.tracker_frames import with_trackers
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_controller import PositionController, position_controller
@@ -118,6 +119,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
         motion=motion,
         frequency=shaken,
     )
+    robot = with_trackers(robot)
     if poses is not None:
         robot = with_poses(robot, poses)
     robot = with_effects(replace(robot, held_at_mean=_held_at_mean(top, locked)), top.texts("effects", ()))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import (
     BY_MESSAGE,
     RIGHT_FROM_LEFT,
@@ -27,7 +28,7 @@ from jointscope.robots.yaml_section import Section
 Array = NDArray[np.float64]
 
 GYRO_FORMS = ("full", "vertical", "relative")
-KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro", "accelerometer")
+KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro", "accelerometer", "position_target")
 UNKNOWN = "unknown"
 
 
@@ -99,6 +100,8 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
             return _gyro(name, section)
         if kind == "accelerometer":
             return _accelerometer(name, section)
+        if kind == "position_target":
+            return _position_target(name, section)
         if kind == "joint_torque":
             return _torque_sensor(name, section, joints)
         return (_motor_encoder if kind == "motor_encoder" else _link_encoder)(name, section, joints)
@@ -191,6 +194,35 @@ def _accelerometer(name: str, section: Section) -> Accelerometer:
     )
     bias.finish()
     return found
+
+
+def _position_target(name: str, section: Section) -> PositionTarget:
+    source = topic(section)
+    if si_unit(source.unit) != "m":
+        raise RobotError(f"{section.place}.unit: a position is in m or mm, got {source.unit!r}")
+    tracker, pose = section.text("tracker", None), section.array("tracker_pose", (4, 4), None)
+    if (tracker is None) == (pose is None):
+        raise RobotError(
+            f"{section.place}: the frame of the marker is {'unknown' if pose is None else 'given twice'}; say where "
+            "the tracker stands: `tracker:` with a link fixed to the base or with another sensor of kind "
+            "position_target that has the same tracker, or `tracker_pose:` with a matrix 4 x 4, base from tracker"
+        )
+    if pose is not None:
+        place = f"{section.place}.tracker_pose"
+        if not np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0]):
+            raise RobotError(f"{place}: expected a last row [0, 0, 0, 1], got {pose[3].tolist()}")
+        pose[:3, :3] = _rotation(pose[:3, :3], place)
+    unknown = np.full((4, 4), np.nan)
+    return PositionTarget(
+        name=name,
+        source=source,
+        body=section.text("target"),
+        at=section.array("at", (3,), np.zeros(3)),
+        tracker_link=tracker,
+        tracker_pose=unknown if pose is None else pose,
+        tracker=name,
+        sigma=section.number("sigma", positive=True),
+    )
 
 
 def _rotation(R: Array, place: str) -> Array:

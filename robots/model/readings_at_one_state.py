@@ -5,6 +5,7 @@
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
     accelerometer  R_imu_body f_body(q_link, v_link, a_link), to which a bias is added
     torque   scale times that of the springs, and offset
+    target   R_tracker_base (p_base(q_link) - place)
 
 A test holds it against the factors.
 """
@@ -43,6 +44,8 @@ class ReadingsAtOneState:
         self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
         self._accelerometers = {sensor.name: _Seat.of(robot, sensor) for sensor in robot.accelerometers}
         self._moving = tree.model.createData()  # with accelerations
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._targets = {t.name: (tree.frame_id(t.body), *t.seen(values)[:3]) for t in robot.targets}
         encoder = robot.motor_encoder
         self._encoder = np.zeros((robot.n, robot.layout.size))
         self._encoder[np.arange(robot.n), robot.layout.motor_q] = 1.0
@@ -50,7 +53,6 @@ class ReadingsAtOneState:
         self._link_encoder = robot.link_encoder
         self._links = np.zeros((robot.n, robot.layout.size))
         self._links[np.arange(robot.n), robot.layout.joint_q] = 1.0
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
         self._errors = {name: _errors_of(robot, sensor, values) for name, sensor in robot.sensors.items()}
         self._at: Array | None = None
 
@@ -71,6 +73,8 @@ class ReadingsAtOneState:
         """
         if name in self._accelerometers:
             return self._force(self._accelerometers[name], x)
+        if name in self._targets:
+            return self._place(*self._targets[name], x)
         if name in self._torques:
             return self._torques[name](x)
         if name in self._gyros:
@@ -107,6 +111,19 @@ class ReadingsAtOneState:
         J = np.zeros((3, len(x)))
         J[:, layout.q_link], J[:, layout.v_link], J[:, layout.size :] = parts
         return seat.R_imu_body @ f, J
+
+    def _place(self, frame: int, p: Array, R: Array, origin: Array, x: Array) -> tuple[Array, Array]:
+        """A point of a frame, seen from a tracker with rotation R in the base."""
+        layout, coupling = self._layout, self._coupling
+        q = x[layout.q_link] if coupling is None else coupling.positions(x[layout.q_link])
+        model, data = self._model, self._moving
+        pin.computeJointJacobians(model, data, q)
+        here = pin.updateFramePlacement(model, data, frame)
+        six = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL)
+        by_q = R.T @ here.rotation @ (six[:3] - pin.skew(p) @ six[3:])
+        J = np.zeros((3, layout.size))
+        J[:, layout.q_link] = by_q if coupling is None else by_q @ coupling.G
+        return R.T @ (here.rotation @ p + here.translation - origin), J
 
     def _rate(self, name: str, x: Array) -> tuple[Array, Array]:
         layout, coupling = self._layout, self._coupling

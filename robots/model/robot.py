@@ -28,6 +28,7 @@ from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.position_controller import PositionController
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, Topic, TorqueSensor
 from jointscope.robots.parts.state_layout import StateLayout
@@ -145,6 +146,11 @@ class Robot:
         return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, Accelerometer))
 
     @property
+    def targets(self) -> tuple[PositionTarget, ...]:
+        """All targets whose positions a tracker measures."""
+        return tuple(sensor for sensor in self.sensors.values() if isinstance(sensor, PositionTarget))
+
+    @property
     def biased(self) -> tuple[Gyro | Accelerometer, ...]:
         """The sensors whose offset is another one in each recording: gyros first."""
         return (*self.gyros, *self.accelerometers)
@@ -241,14 +247,11 @@ class Robot:
         return {"N m": None, "A": "torque_constant"}.get(self.command.unit, "k_pwm")
 
     def friction_sharpness(self, values: Mapping[str, float] | None = None) -> Array:
-        """Sharpness k in tanh(k v) of the dry friction of every joint, shape (n,) [s/rad, of joints that slide s/m].
-
-        Parameters in `values`, by full name, count before the robot's own.
-        """
+        """Sharpness k in tanh(k v) of each joint's dry friction, shape (n,) [s/rad or s/m]; `values` as in the next."""
         return np.array([self.sharpness_of(joint, values) for joint in self.joints])
 
     def sharpness_of(self, joint: str, values: Mapping[str, float] | None = None) -> float:
-        """The same of one joint: its own parameter if it has one, else that of the model's choices."""
+        """The same of one joint: from `values` by full name, its own parameter, or that of the model's choices."""
         name = f"{joint}.{SHARPNESS}"
         if values is not None and name in values:
             return values[name]
@@ -268,10 +271,8 @@ class Robot:
 
     def with_values(self, values: Mapping[str, float]) -> Robot:
         """The same robot with other parameter values, given by full name."""
-        parameters = dict(self.parameters)
-        for name, value in values.items():
-            parameters[name] = replace(self.parameter(name), value=float(value))
-        return replace(self, parameters=parameters)
+        changed = {name: replace(self.parameter(name), value=float(value)) for name, value in values.items()}
+        return replace(self, parameters={**self.parameters, **changed})
 
     def in_posture(self, positions: Mapping[str, float]) -> Robot:
         """The same robot with other joints held as in a recording, beside or instead of where its file locks them.

@@ -2,12 +2,13 @@
 """The rigid bodies as the model has them now: soft bearings inserted, inertias and Coriolis terms as parameters.
 
 Accelerations are M^-1 (tau - s c - g) with the scale s of the Coriolis terms; they are linear in s, and M is linear in
-every inertia parameter, so the derivatives by both follow from differences that are exact.
+every inertia parameter, so the derivatives by s follow from differences that are exact, and those by an inertia from
+the torque of a body that has nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # of an inertia in pinocchio's dynamic parameters
-UNIT_CHANGE = 1e-3  # [kg m2] size of the change whose torque is taken as a difference; the torque is linear in it
 
 
 @dataclass(frozen=True)
@@ -108,11 +108,9 @@ class StructuredTree:
         """Derivatives of the accelerations by parameters of the tree, by name, shape (m, n_link) each."""
         tree = self.bodies(values)
         found: dict[str, Array] = {}
-        for change in self._changes:
-            torque = inertia_torque(
-                tree, change, q, v, a, 1.0 if self.coriolis_scale is None else values[self.coriolis_scale]
-            )
-            found[change.name] = -np.einsum("kij,kj->ki", M_inverse, torque)
+        scale = 1.0 if self.coriolis_scale is None else values[self.coriolis_scale]
+        for name, torque in self._torques_of(self._changes, tree, q, v, a, scale):
+            found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         for name, link, _ in self._armature:
             found[name] = found.get(name, 0.0) - M_inverse[:, :, link] * a[:, link, None]
         if self._tilt:
@@ -127,11 +125,18 @@ class StructuredTree:
         """Derivatives of the torques of gravity by masses and its own direction, by name, shape (m, n_link) each."""
         tree, still = self.bodies(values), np.zeros_like(q)
         heavier = [change for change in self._changes if np.any(change.direction[:4])]
-        found = {change.name: inertia_torque(tree, change, q, still, still, 0.0) for change in heavier}
+        found = dict(self._torques_of(heavier, tree, q, still, still, 0.0))
         if self._tilt:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             found |= dict(zip(self._tilt, torques, strict=True))
         return found
+
+    @staticmethod
+    def _torques_of(
+        changes: Sequence[InertiaChange], tree: RigidTree, q: Array, v: Array, a: Array, coriolis: float
+    ) -> Iterator[tuple[str, Array]]:
+        torques = inertia_torques(tree, changes, q, v, a, coriolis) if changes else ()
+        return zip((change.name for change in changes), torques, strict=True)
 
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
@@ -154,15 +159,23 @@ class StructuredTree:
         return self._cache[1]
 
 
-def inertia_torque(tree: RigidTree, change: InertiaChange, q: Array, v: Array, a: Array, coriolis: float) -> Array:
-    """Torque that a unit of a parameter asks for at given motion, shape (m, n_link) [N m]."""
-    model = tree.model.copy()
-    size = UNIT_CHANGE / max(float(np.abs(change.direction).max()), 1e-12)
-    _change(model, change, size)
-    other = tree.with_model(model)
+def inertia_torques(
+    tree: RigidTree, changes: Sequence[InertiaChange], q: Array, v: Array, a: Array, coriolis: float
+) -> Array:
+    """Torques that a unit of each parameter asks for at given motion, shape (c, m, n_link) [N m].
+
+    Args:
+        tree: the bodies; the torques are the same whatever these weigh.
+        changes: what the parameters change.
+        q: positions, shape (m, n_link) [rad], as v and a.
+        v: velocities.
+        a: accelerations.
+        coriolis: share of the Coriolis terms, where the tree has them.
+    """
+    joints, directions = [change.joint for change in changes], np.array([change.direction for change in changes])
 
     def more(velocity: Array) -> Array:
-        return (other.torque(q, velocity, a) - tree.torque(q, velocity, a)) / size
+        return tree.equations.body_torques(joints, directions, q, velocity, a)
 
     share = coriolis if tree.coriolis else 0.0
     if share == 1.0:

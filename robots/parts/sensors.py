@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.units import si_factor, si_unit
 
 AXES = ("x", "y", "z")
-
-
 RIGHT_FROM_LEFT = (-1.0, 1.0, 1.0)  # factors on left-handed axes that make them right-handed
 BY_MESSAGE = "message"  # a joint that was sampled at the stamp of its message
 
@@ -273,4 +272,4 @@ class Accelerometer:
         return np.array([parameters[name].value for name in self.lever])
 
 
-Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro | Accelerometer
+Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro | Accelerometer | PositionTarget

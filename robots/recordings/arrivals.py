@@ -29,6 +29,7 @@ class Arrivals:
         stamps: time of measurement, on the time axis of the recording, shape (n,) [s].
         received: time of writing to the bag, on the same axis, shape (n,) [s].
         values: samples of each stream, shapes (m, c), in SI units.
+        about: which channels the messages of each stream are about, shapes (m, c); None where all are about all.
     """
 
     names: tuple[str, ...]
@@ -37,6 +38,7 @@ class Arrivals:
     stamps: Array
     received: Array
     values: tuple[Array, ...]
+    about: tuple[NDArray[np.bool_] | None, ...] = ()
 
     def __len__(self) -> int:
         return len(self.stamps)
@@ -47,6 +49,13 @@ class Arrivals:
             self.stream.tolist(), self.row.tolist(), self.stamps.tolist(), self.received.tolist(), strict=True
         ):
             yield received, self.names[k], stamp, self.values[k][row]
+
+    def channels(self) -> Iterator[NDArray[np.bool_] | None]:
+        """Which channels each message is about, shape (c,); None for all."""
+        about = self.about or (None,) * len(self.names)
+        for k, row in zip(self.stream.tolist(), self.row.tolist(), strict=True):
+            part = about[k]
+            yield None if part is None else part[row]
 
     @staticmethod
     def merged(names: tuple[str, ...], parts: list[tuple[Array, Array, Array]], place: list[Array]) -> Arrivals:

@@ -23,7 +23,8 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
-from jointscope.robots.parts.sensors import Accelerometer
+from jointscope.robots.parts.position_target import PositionTarget
+from jointscope.robots.parts.sensors import Accelerometer, Topic
 from jointscope.robots.recordings.recording import Recording, Stream
 
 READY = load_robot("doggy")
@@ -57,6 +58,14 @@ def with_an_accelerometer():
     return replace(DOGGY, sensors={**DOGGY.sensors, "acc": sensor}, parameters={**DOGGY.parameters, **place})
 
 
+def with_a_target():
+    """On its last link, seen by a tracker that is turned."""
+    pose = np.array([[0.0, -1.0, 0.0, 2.0], [0.0, 0.0, -1.0, 0.5], [1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]])
+    source = Topic("/camera", "geometry_msgs/msg/PointStamped", "point", "m")
+    target = PositionTarget("target", source, "link3", np.array([0.1, 0.2, 0.9]), None, pose, "target", 1e-3)
+    return replace(DOGGY, sensors={**DOGGY.sensors, "target": target})
+
+
 def with_a_weight():
     """On other bodies: its own weigh nothing about its joints."""
     urdf = Path(__file__).with_name("mimicking_doggy.urdf")
@@ -75,6 +84,7 @@ ROBOTS = {
     "joint 2 rigid": with_a_rigid_joint(),
     "soft bearing": with_a_soft_bearing(),
     "accelerometer": with_an_accelerometer(),
+    "target": with_a_target(),
     "heavy": with_a_weight(),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }

@@ -58,7 +58,7 @@ MISTAKES = [
     ("unit: rad/s\n", "unit: rad\n", "my.yaml: sensors.imu1.unit: a gyroscope measures an angular rate, got 'rad'"),
     ("kind: motor_encoder", "kind: encoder",
      "my.yaml: sensors.motor_encoder.kind: expected one of motor_encoder, link_encoder, joint_torque, gyro, "
-     "accelerometer, got 'encoder'"),
+     "accelerometer, position_target, got 'encoder'"),
     ("sigma: 6.9259e-5", "sigma: 0", "my.yaml: sensors.motor_encoder.sigma: expected a number above zero, got 0"),
     ("sigma: 6.9259e-5", "sigma: .nan", "my.yaml: sensors.motor_encoder.sigma: expected a finite number, got nan"),
     ("body: link1", "body: link9", "my.yaml: sensors.imu1.body: no link 'link9'; did you mean 'link3'?"),

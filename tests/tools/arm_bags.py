@@ -26,7 +26,7 @@ JOINT = (
     '<origin xyz="0 0 {down}"/><axis xyz="{axis}"/><limit lower="-2.9" upper="2.9" effort="100" velocity="9"/>'
     "{more}</joint>"
 )
-NO_ROWS = ("names", "type", "stamped")
+NO_ROWS = ("names", "type", "stamped", "rows")
 AXES = ("0 1 0", "1 0 0", "0 0 1")
 
 
@@ -112,7 +112,8 @@ def write_arm_bag(
         path: an .mcap.
         times: of all messages, shape (n,) [s].
         topics: names, position and effort of joints, `data` of arrays, `rate` of gyroscopes; `stamped` makes the
-            stamp in the header from the true one [ns].
+            stamp in the header from the true one [ns], `rows` are the times at which it publishes. What follows a `#`
+            tells several publishers of one topic apart.
         latency: from the true stamp to the reception [s].
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
@@ -123,10 +124,14 @@ def write_arm_bag(
         store.register(get_types_from_msg(text, name))
     folder = path.with_suffix("")
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {}
         for topic, content in topics.items():
-            kind = _kind(content)
-            connection = writer.add_connection(topic, kind, typestore=store)
-            for k, t in enumerate(times):
+            kind, name = _kind(content), topic.partition("#")[0]
+            if name not in connections:
+                connections[name] = writer.add_connection(name, kind, typestore=store)
+            connection = connections[name]
+            for k in content.get("rows", range(len(times))):
+                t = times[k]
                 stamp = 10**18 + round(float(t) * 1e9)
                 written = content.get("stamped", int)(stamp)
                 message = _message(store, kind, content, k, written)

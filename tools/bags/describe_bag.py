@@ -158,6 +158,6 @@ def _field(field: str, columns: Columns) -> FieldDescription:
         columns=tuple(labels),
         minimum=tuple(np.where(some, low, np.nan).tolist()),
         maximum=tuple(np.where(some, high, np.nan).tolist()),
-        not_finite=int(np.count_nonzero(~finite)),
+        not_finite=int(np.count_nonzero(~finite if columns.absent is None else ~finite & ~columns.absent)),
         clipping=tuple(notice.text for notice in clipping),
     )

@@ -2,7 +2,7 @@
 """Which messages of a topic belong together, by the names in them: several nodes may publish on one topic.
 
 Of messages that name joints, those are used that name all that are wanted, in whatever order and whatever else they
-name. Where every joint has messages of its own, the others are taken at the stamps of the one with most of them. Of
+name. Where none names all, as those of two drivers on one topic, all that name some of them are woven together. Of
 messages without names, those with the right number of values. All others are left out and counted by what they
 are.
 """
@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.messages.columns import Columns, LeftOut
@@ -23,13 +22,10 @@ from jointscope.tools.bags.messages.joined_topics import PLUS
 from jointscope.tools.bags.messages.message_parts import MessageParts, message_parts
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import RawTopic
-from jointscope.tools.bags.tidying.not_finite import LARGEST
-
-Array = NDArray[np.float64]
+from jointscope.tools.bags.woven_messages import woven
 
 NAMES_SAID = 6
-FEWEST = 4  # messages of a joint
-GAP = 4.5  # usual steps between two messages of a joint, from which nobody knows where it was between them
+FEWEST = 8  # messages of a node that make it one that belongs to the recording
 
 
 def read_columns(
@@ -69,11 +65,8 @@ def fitting_messages(
         acts_on: whether values act until the next one, as those of commands; else they were measured.
 
     Returns:
-        Their columns: the wanted names first, then others that all of them have. Where no message fits, the largest
-        part as it is.
-
-    Raises:
-        RecordingError: the wanted joints never stand together in one message.
+        Their columns: the wanted names first, then others that all of them have. Without wanted names, those of all
+        nodes that tell of different joints. Where no message fits, the largest part as it is.
     """
     parts = found.parts
     if len(parts) == 1:
@@ -85,9 +78,12 @@ def fitting_messages(
     if core:
         chosen = [part for part in named if set(core) <= set(part.names or ())]
         if not chosen and wanted and all(any(name in (part.names or ()) for part in named) for name in core):
-            return _woven(found, named, core, acts_on)
+            others = [part for part in parts if not set(part.names or ()) & set(core)]
+            return woven(named, core, acts_on, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
     else:
         chosen = []
+    if core and not wanted and (nodes := _nodes(named, core)):
+        return _of_nodes(found, nodes, acts_on)
     if not chosen:
         return _with_broken(_unnamed(parts, width), found.broken)
     first = chosen[0].names or ()
@@ -118,6 +114,31 @@ def _is_sound(part: Columns) -> bool:
     return bool(names) and len(names) == part.values.shape[1] and len(set(names)) == len(names)
 
 
+def _nodes(named: Sequence[Columns], core: tuple[str, ...]) -> list[list[Columns]]:
+    """Parts by the node that they come from, where several tell of different joints; empty where there is but one."""
+    nodes: list[list[Columns]] = []
+    left = list(named)
+    while left:
+        nodes.append([part for part in left if set(core) <= set(part.names or ())])
+        used = {name for node in nodes for part in node for name in part.names or ()}
+        left = [part for part in left if not set(part.names or ()) & used]
+        core = _most_shared(left)
+    nodes = [node for node in nodes if sum(len(part.values) for part in node) >= FEWEST]
+    return nodes if len(nodes) > 1 else []
+
+
+def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]], acts_on: bool) -> Columns:
+    """What several nodes tell, each of the joints that all of its messages name."""
+    used = {id(part) for node in nodes for part in node}
+    shared = [
+        [name for name in node[0].names or () if all(name in (part.names or ()) for part in node)] for node in nodes
+    ]
+    names = tuple(name for own in shared for name in own)
+    others = [part for part in found.parts if id(part) not in used]
+    left_out = (*_kinds(others, set(names)), *_broken(found.broken))
+    return woven([part for node in nodes for part in node], names, acts_on, left_out)
+
+
 def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:
     """Names of the part that brings the most values, over all messages that have them."""
 
@@ -126,56 +147,6 @@ def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:
         return len(own) * sum(len(other.values) for other in named if own <= set(other.names or ()))
 
     return max(named, key=values).names or () if named else ()
-
-
-def _woven(found: MessageParts, named: Sequence[Columns], names: tuple[str, ...], acts_on: bool) -> Columns:
-    """Joints that different messages name, at the stamps of the joint with most messages; NaN where one is silent."""
-    series = {name: _series(named, name) for name in names}
-    if any(series[name] is None for name in names):
-        counts = {name: sum(len(part.values) for part in named if name in (part.names or ())) for name in names}
-        said = ", ".join(f"{name} in {count}" for name, count in counts.items())
-        raise RecordingError(
-            f"topic {found.topic}, field {found.field!r}: no message names all of {', '.join(names)}: {said}; "
-            "expected them in one message, or stamps in each: let one node publish them together, or calibrate the "
-            "joints of one node at a time (`jointscope init URDF BAG --joints ...`)"
-        )
-    known = {name: one for name, one in series.items() if one is not None}
-    stamps, _, rows = max(known.values(), key=lambda one: len(one[0]))
-    values = np.column_stack([_at(stamps, *known[name][:2], acts_on) for name in names])
-    others = [part for part in found.parts if not set(part.names or ()) & set(names)]
-    return Columns(stamps, values, names, rows, tuple([*_kinds(others, set(names)), *_broken(found.broken)]))
-
-
-def _series(named: Sequence[Columns], name: str) -> tuple[NDArray[np.int64], Array, NDArray[np.intp]] | None:
-    """Stamps in order, values and places of one joint's messages; None where they carry no stamps."""
-    parts = [part for part in named if name in (part.names or ())]
-    if not all(part.stamps is not None and part.rows is not None for part in parts):
-        return None
-    stamps = np.concatenate([part.stamps for part in parts if part.stamps is not None])
-    values = np.concatenate([part.values[:, (part.names or ()).index(name)] for part in parts])
-    rows = np.concatenate([part.rows for part in parts if part.rows is not None])
-    stamps, first = np.unique(stamps, return_index=True)
-    return stamps, values[first], rows[first]
-
-
-def _at(wanted: NDArray[np.int64], stamps: NDArray[np.int64], values: Array, acts_on: bool) -> Array:
-    """One joint's values at the stamps of another: the last one, or a curve through those nearby."""
-    good = np.abs(values) < LARGEST
-    stamps, values = stamps[good], values[good]
-    if len(stamps) < FEWEST:
-        return np.full(len(wanted), np.nan)
-    if np.array_equal(wanted, stamps):
-        return values
-    from scipy.interpolate import CubicSpline  # slow to load, and rarely asked for
-
-    since, at = (stamps - stamps[0]) / 1e9, (wanted - stamps[0]) / 1e9
-    before = np.clip(np.searchsorted(since, at, side="right") - 1, 0, len(since) - 1)
-    if acts_on:
-        return np.where(at >= since[0], values[before], np.nan)
-    after = np.minimum(before + 1, len(since) - 1)
-    silent = (since[after] - since[before] > GAP * np.median(np.diff(since))) & (at > since[before])
-    outside = (at < since[0]) | (at > since[-1])
-    return np.where(silent | outside, np.nan, CubicSpline(since, values)(at))
 
 
 def _unnamed(parts: Sequence[Columns], width: int | None) -> Columns:
@@ -209,7 +180,7 @@ def _together(
 
 
 def _with_broken(part: Columns, broken: int) -> Columns:
-    return Columns(part.stamps, part.values, part.names, part.rows, (*part.left_out, *_broken(broken)))
+    return replace(part, left_out=(*part.left_out, *_broken(broken)))
 
 
 def _broken(count: int) -> list[LeftOut]:

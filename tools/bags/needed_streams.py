@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Topic
+from jointscope.robots.parts.position_target import PositionTarget
+from jointscope.robots.parts.sensors import Sensor, Topic
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.recordings.wrapped_counter import continued
 from jointscope.robots.yaml_section import did_you_mean
@@ -30,11 +31,13 @@ class StreamSource:
         name: "command" or the sensor's name.
         source: where it is in the bag.
         channels: name of each column.
+        of_target: whether it is the position of a target, which a tracker may lose.
     """
 
     name: str
     source: Topic
     channels: tuple[str, ...]
+    of_target: bool = False
 
 
 def needed_streams(robot: Robot) -> list[StreamSource]:
@@ -45,7 +48,11 @@ def needed_streams(robot: Robot) -> list[StreamSource]:
     """
     robot.need_motion()
     command = StreamSource("command", robot.command, tuple(f"{joint}.command" for joint in robot.joints))
-    return [command, *(StreamSource(s.name, s.source, s.channels) for s in robot.sensors.values())]
+    return [command, *(_of_sensor(sensor) for sensor in robot.sensors.values())]
+
+
+def _of_sensor(sensor: Sensor) -> StreamSource:
+    return StreamSource(sensor.name, sensor.source, sensor.channels, isinstance(sensor, PositionTarget))
 
 
 def check_same_streams(robots: Mapping[str, Robot]) -> None:

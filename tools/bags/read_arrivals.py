@@ -14,6 +14,7 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplaySource
 from jointscope.robots.errors import RobotError
@@ -37,6 +38,9 @@ from jointscope.tools.bags.needed_streams import (
     needed_streams,
     wanted_of,
 )
+from jointscope.tools.bags.tidying.late_copies import late_copies
+
+Array = NDArray[np.float64]
 
 BLOCK = 20_000  # messages
 ONE_SECOND = 1_000_000_000  # [ns]
@@ -73,6 +77,7 @@ class ArrivalReader:
         self.path = Path(path)
         self.start_ns = self.messages = 0
         self._needed = needed_streams(robot)
+        self._held = robot.command_held
         self._progress = progress
         self._block = block
         self._last: dict[str, np.ndarray] = {}
@@ -122,7 +127,7 @@ class ArrivalReader:
         types: dict[str, MessageType],
         counts: dict[str, int],
     ) -> Arrivals:
-        present, found, columns = [], [], []
+        present, found, columns, about = [], [], [], []
         for need in self._needed:
             topic = raw[need.source.topic]
             fitting = self._fitting(need, topic, types, counts) if topic.data else None
@@ -130,7 +135,16 @@ class ArrivalReader:
                 continue
             present.append(need)
             found.append(fitting)
-            columns.append(_in_si(need, topic, fitting, self._last.get(need.name)))
+            before = self._last.get(need.name)
+            columns.append(_in_si(need, topic, fitting, before))
+            about.append(_about(need, fitting))
+            if about[-1] is not None:
+                last = _newest(columns[-1][1], before)
+                if need.name == "command":
+                    columns[-1] = (columns[-1][0], _acting(*columns[-1], before, self._held))
+                    about[-1] = None
+                self._last[need.name] = last
+                continue
             self._last[need.name] = columns[-1][1][-1]
         if not present:
             return Arrivals.merged((), [], [])
@@ -149,7 +163,7 @@ class ArrivalReader:
             fitting.of(np.array(places[need.source.topic], dtype=float))
             for need, fitting in zip(present, found, strict=True)
         ]
-        return Arrivals.merged(tuple(need.name for need in present), parts, keys)
+        return replace(Arrivals.merged(tuple(need.name for need in present), parts, keys), about=tuple(about))
 
     def _on_one_clock(
         self,
@@ -193,7 +207,18 @@ class ArrivalReader:
             return None
         for part in columns.left_out:
             self._left_out[need.name, part.what] += part.count
-        return self._filled(need, self._on_time(need, topic, columns))
+        return self._own(need, topic, self._filled(need, self._on_time(need, topic, columns)))
+
+    def _own(self, need: StreamSource, topic: RawTopic, columns: Columns) -> Columns:
+        """The messages without those that a second node repeats later."""
+        stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
+        order = np.argsort(stamps, kind="stable")
+        copies = np.zeros(len(order), bool)
+        copies[order] = late_copies(stamps[order], columns.values[order])
+        if not copies.any():
+            return columns
+        self._left_out[need.name, "of a second node that repeats those of the driver later"] += int(copies.sum())
+        return columns.take(~copies)
 
     def _filled(self, need: StreamSource, columns: Columns) -> Columns:
         """The messages whose stamps are filled."""
@@ -231,3 +256,33 @@ def _in_si(
     order, _ = column_order(need, columns)
     stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
     return stamps, in_si(need.source, columns.values[:, order], before)
+
+
+def _about(need: StreamSource, columns: Columns) -> NDArray[np.bool_] | None:
+    """Which channels the messages are about, shape (n, m); None where all are about all."""
+    order, _ = column_order(need, columns)
+    return None if columns.absent is None else ~columns.absent[:, order]
+
+
+def _newest(values: Array, before: Array | None) -> Array:
+    """The last number of every channel, shape (m,); where a block has none, the one before."""
+    known = np.vstack([np.full(values.shape[1], np.nan) if before is None else before, values])
+    last = len(known) - 1 - np.argmax(np.isfinite(known)[::-1], axis=0)
+    return np.asarray(known[last, np.arange(known.shape[1])], dtype=np.float64)
+
+
+def _acting(stamps: NDArray[np.int64], values: Array, before: Array | None, held: bool) -> Array:
+    """Commands of all joints where each message is about some: the others' act on, measured ones run on between."""
+    whole = np.vstack([np.full(values.shape[1], np.nan) if before is None else before, values])
+    for j, column in enumerate(whole.T):
+        known = np.flatnonzero(np.isfinite(column))
+        if not len(known):
+            continue
+        if held or len(known) < 2:
+            last = np.searchsorted(known, np.arange(len(whole)), side="right") - 1
+            whole[:, j] = np.where(last < 0, np.nan, column[known[np.maximum(last, 0)]])
+            continue
+        inside = known[known > 0]
+        order = inside[np.argsort(stamps[inside - 1], kind="stable")]
+        whole[1:, j] = np.interp(stamps - stamps[0], stamps[order - 1] - stamps[0], column[order])
+    return whole[1:]

@@ -37,8 +37,10 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.silences import with_silences_left_out
+from jointscope.tools.bags.tidying.late_copies import without_late_copies
 from jointscope.tools.bags.tidying.lone_samples import without_lone_samples
 from jointscope.tools.bags.tidying.long_holes import with_short_holes
+from jointscope.tools.bags.tidying.lost_targets import without_lost
 from jointscope.tools.bags.tidying.not_finite import without_gibberish
 from jointscope.tools.bags.tidying.stream_notices import (
     by_importance,
@@ -48,6 +50,8 @@ from jointscope.tools.bags.tidying.stream_notices import (
     timing_notices,
 )
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
+
+SHARED = 0.5  # of the rows of a stream that lack a channel, from which several drivers make it
 
 
 def read_recording(
@@ -94,7 +98,7 @@ def read_recording(
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
     for stream in streams.values():
-        notices += timing_notices(stream.name, stream.times)
+        notices += timing_notices(stream.name, _usual_times(stream))
         notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
     notices += step_notices("command", streams["command"].values, streams["command"].channels, streams["command"].unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
@@ -147,8 +151,13 @@ def _in_bag_order(
 def _cleaned(need: StreamSource, samples: TimedSamples, held: bool) -> tuple[TimedSamples, list[Notice]]:
     """The samples of one stream in the order of their stamps and in SI units, without those that are none."""
     samples, notices = in_time_order(need.name, samples)
+    samples, found = without_late_copies(need.name, samples)
+    notices += found
     samples, found = without_gibberish(need.name, need.channels, samples, need.source.wraps, held)
     notices += found
+    if need.of_target:
+        samples, found = without_lost(need.name, samples)
+        notices += found
     if need.name != "command":  # commands jump and repeat themselves as they like
         samples, found = cleaned_sensor(need.name, need.channels, samples, need.source.wraps)
         notices += found
@@ -193,7 +202,15 @@ def _samples(
         whole = continued(values, need.source.wraps) if need.source.wraps else values
         values, found = at_message_stamps(need.name, need.source.stamped_by, stamps, whole, others)
         notices += found
-    return TimedSamples(stamps, received, values), notices
+    absent = None if columns.absent is None else columns.absent[:, order]
+    return TimedSamples(stamps, received, values, absent), notices
+
+
+def _usual_times(stream: Stream) -> NDArray[np.float64]:
+    """Times of the channel with most samples: those of several drivers together are none of any clock."""
+    if stream.filled is None or stream.filled.any(axis=1).mean() < SHARED:
+        return stream.times
+    return stream.times[~stream.filled[:, int(np.argmin(stream.filled.sum(axis=0)))]]
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:

@@ -26,6 +26,7 @@ from jointscope.tools.simulator.loop.sampled_sensor import (
     SampledEncoder,
     SampledGyro,
     SampledSensor,
+    SampledTarget,
     SampledTorque,
 )
 from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling
@@ -143,6 +144,9 @@ class Occasion:
         if torque is not None:
             times = stamps(torque.name, sampling.encoder_rate)
             found[torque.name] = SampledTorque(torque, self.engine, sampling, times, seed, self.truth)
+        for target in self._robot.targets:
+            times = stamps(target.name, sampling.target_rate)
+            found[target.name] = SampledTarget(target, self.engine, sampling, times, seed, self.truth)
         for gyro in self.gyros:
             times = stamps(gyro.sensor.name, sampling.gyro_rate)
             found[gyro.sensor.name] = SampledGyro(gyro, self.engine, sampling, times, seed)

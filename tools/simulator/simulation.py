@@ -66,6 +66,7 @@ def simulate(
     gyro_rate: float = 1.0 / TICK,
     transport_delay: float = 5e-4,
     quantized: bool = True,
+    target_rate: float = 200.0,
     hardware_seed: int | None = None,
     steps_per_tick: int = STEPS_PER_TICK,
     progress: Callable[[float], None] | None = None,
@@ -86,6 +87,7 @@ def simulate(
         drop: probability that a sensor sample is lost.
         encoder_rate: [Hz].
         gyro_rate: [Hz].
+        target_rate: of cameras and motion capture [Hz].
         transport_delay: mean time from stamp to arrival [s].
         quantized: False gives white encoder noise instead of steps.
         hardware_seed: of the mounting errors, if it shall differ from `seed`.
@@ -101,7 +103,7 @@ def simulate(
         RobotError: an unknown parameter.
     """
     seconds = DEFAULT_SECONDS.get(motion, 30.0) if seconds is None else float(seconds)
-    sampling = Sampling(encoder_rate, gyro_rate, jitter, drop, transport_delay, quantized)
+    sampling = Sampling(encoder_rate, gyro_rate, jitter, drop, transport_delay, quantized, target_rate)
     conditions = Conditions(
         parameters or {}, effects, friction, disturbance or Disturbance(), sampling, hardware_seed, steps_per_tick
     )

@@ -34,7 +34,8 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
     robot = without_effects(robot)
     published = {p.name: p.published for p in robot.parameters.values() if p.published is not None}
     truth = robot.with_values({**published, **overrides})
-    places = {name for sensor in robot.accelerometers for name in sensor.lever}
+    places = {name for sensor in robot.accelerometers for name in sensor.own}
+    places |= {name for target in robot.targets for name in target.own}
     for parameter in truth.parameters.values():
         friction_or_damping = parameter.name.endswith((".coulomb_torque", ".damping", ".k_mi"))
         least = -np.inf if parameter.name in places else 0.0 if friction_or_damping else TINY

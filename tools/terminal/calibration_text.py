@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.calibration.findings import AS_STATED
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
@@ -40,6 +41,8 @@ def _verdict(result: CalibrationResult, judgement: Judgement) -> str:
     lines = [judgement.headline]
     doubts = [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
     told_below = {direction.text for direction in result.weak_directions}
+    if judgement.level == "bad":
+        told_below.add(AS_STATED)
     findings = [f"  - {finding}" for finding in result.findings if finding not in told_below]
     lines += doubts + findings[:SHOWN_FINDINGS]
     if len(findings) > SHOWN_FINDINGS:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,8 @@ class ResultFiles:
         rrd: rerun recording.
         json: what the screen says, for machines.
         robot: robot file; only a calibration has one.
-        figures: folder for every picture of the report as SVG; made if it is not there.
+        figures: folder for every picture of the report as SVG, with the extra `plot` as PDF, too; made if it is
+            not there.
 
     Raises:
         JointscopeError: an rrd is asked for, and rerun is not there; the folder for pictures is a file or has no place.
@@ -63,6 +65,8 @@ class ResultFiles:
         named = [str(path) for path in (*self.all, *others, self.figures) if path is not None]
         if named:
             print(f"\nWrote {', '.join(named)}")
+        if self.figures is not None and not can_draw_pdf():
+            print("Pictures as PDF, too: pip install 'jointscope[plot]'")
 
     @property
     def pictures(self) -> bool:
@@ -70,10 +74,16 @@ class ResultFiles:
         return self.report is not None or self.rrd is not None or self.figures is not None
 
 
+def can_draw_pdf() -> bool:
+    """Whether the modules of the extra `plot` are there."""
+    return all(find_spec(module) is not None for module in ("matplotlib", "cssselect2"))
+
+
 def add_result_options(parser: argparse.ArgumentParser, viewer: bool = True) -> None:
     """Adds --report, --figures and --json, which every verb that estimates something takes, and --rrd for motion."""
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="write every picture of the report as SVG")
+    pictures = "write every picture of the report as SVG, with the extra plot as PDF, too"
+    parser.add_argument("--figures", type=Path, metavar="DIR", help=pictures)
     if viewer:
         parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
@@ -246,3 +256,8 @@ def write_report(stack: ExitStack, files: ResultFiles, report: Callable[[], str]
         files.figures.mkdir(exist_ok=True)
         for name, svg in report_figures(html).items():
             stack.enter_context(whole_file(files.figures / name)).write_text(svg, encoding="utf-8")
+            if can_draw_pdf():
+                from jointscope.tools.report.pdf.pdf_picture import pdf_picture
+
+                page = pdf_picture(svg)
+                stack.enter_context(whole_file((files.figures / name).with_suffix(".pdf"))).write_bytes(page)

@@ -34,6 +34,7 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
     sensors = parser.add_argument_group("sensors and disturbances")
     sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
     sensors.add_argument("--gyro-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
+    sensors.add_argument("--target-rate", type=float, default=200.0, metavar="HZ", help="of trackers; default 200")
     sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of sampling, 1 sigma [ms]; default 0")
     sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="share of lost samples; default 0")
     sensors.add_argument(
@@ -65,6 +66,7 @@ def conditions_of(args: argparse.Namespace) -> Conditions:
         args.drop,
         args.transport_delay * 1e-3,
         not args.white_encoder,
+        args.target_rate,
     )
     disturbance = Disturbance.parse(args.disturbance or "")
     return Conditions(assignments(args.set), args.effect, args.friction, disturbance, sampling)

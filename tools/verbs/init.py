@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +13,7 @@ from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 if TYPE_CHECKING:
+    from jointscope.robots.model.robot import Robot
     from jointscope.tools.init.robot_guess import RobotGuess
     from jointscope.tools.init.streams.named_signal import Wish
 
@@ -54,6 +57,13 @@ def add_parser(subparsers: Any) -> None:
         choices=("duty", "V", "A", "Nm"),
         help="unit of the command, if you know it; else the masses of the URDF and its size tell",
     )
+    parser.add_argument(
+        "--target",
+        action="append",
+        default=[],
+        metavar="TOPIC=LINK",
+        help="positions that a camera or motion capture measured of a point on this link; may be repeated",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
     parser.set_defaults(run=run)
 
@@ -63,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
     from jointscope.robots.files.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.init.estimates.target_places import find_targets
     from jointscope.tools.init.robot_guess import guess_robot
     from jointscope.tools.init.streams.other_joints import Typed
     from jointscope.tools.init.text.drive_table import drive_content, drive_table
@@ -71,13 +82,16 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.init.text.robot_text import robot_text
 
     _check_order(args.urdf, args.bag)
-    typed = Typed(
-        args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name, args.unit.replace("Nm", "N m")
-    )
+    unit, targets = args.unit.replace("Nm", "N m"), tuple(args.target)
+    typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name, unit, targets)
     with progress_bar() as progress:
         guess = guess_robot(typed, reading(args.bag, progress))
-        text = robot_text(guess, urdf_reference(args.urdf, args.output.parent))
+        urdf = urdf_reference(args.urdf, args.output.parent)
         with whole_file(args.output) as unfinished:
+            unfinished.write_text(robot_text(guess, urdf), encoding="utf-8")
+            robot = load_robot(unfinished)
+            guess = _with_position_hints(guess, robot, args.bag, targets)
+            text = robot_text(guess, urdf, find_targets(args.bag, robot, targets))
             unfinished.write_text(text, encoding="utf-8")
             robot = load_robot(unfinished)
         description = describe_bag(args.bag, robot)
@@ -110,6 +124,17 @@ def run(args: argparse.Namespace) -> int:
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
     print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {better}")
     return 0
+
+
+def _with_position_hints(guess: RobotGuess, robot: Robot, bag: Path, targets: Sequence[str]) -> RobotGuess:
+    """What may be done with positions in the bag, where there are masses."""
+    from jointscope.tools.init.estimates.target_places import position_topics
+    from jointscope.tools.init.text.target_text import position_hints
+
+    if guess.free_links:
+        return guess
+    links = [body for body in robot.tree.bodies if robot.tree.joints_below(body)]
+    return replace(guess, left_out=[*guess.left_out, *position_hints(list(position_topics(bag)), targets, links)])
 
 
 def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:

@@ -57,7 +57,9 @@ def channel_memory(fit: BagFit, robot: Robot) -> dict[str, float]:
     for name, series in fit.residuals.items():
         sensor = robot.sensors.get(name)
         for i, channel in enumerate(series.channels):
-            rho = autocorrelation((series.measured - series.predicted)[:, i], min(LAGS, len(series.times) // PART))
+            rest = (series.measured - series.predicted)[:, i]
+            rest = rest[np.isfinite(rest)]  # drivers that send a message for each joint leave the others open
+            rho = autocorrelation(rest, min(LAGS, len(rest) // PART))
             by_smoother = 0.0
             if sensor is not None and i < len(series.chi2) and series.chi2[i] <= AS_EXPECTED:
                 left = float(np.nanmean((series.sigma[:, i] / sensor.sigmas[i]) ** 2))  # 1 - s
@@ -83,7 +85,7 @@ def strength(times: Array, residual: Array, window: float = WINDOW) -> tuple[Arr
     which = np.clip(((times - times[0]) / window).astype(int), 0, count - 1)
     squares = np.nan_to_num(residual) ** 2
     sums = np.stack([np.bincount(which, column, count) for column in squares.T], axis=1)
-    number = np.bincount(which, minlength=count)[:, None]
+    number = np.stack([np.bincount(which, column, count) for column in np.isfinite(residual).T.astype(float)], axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return edges, np.sqrt(sums / number)
 

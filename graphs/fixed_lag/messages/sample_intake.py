@@ -17,11 +17,13 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
 LONGEST_DOUBT = 6  # commands in a row of which some joint lacks its own: that joint's drive may do anything then
+NOISY = (Gyro, Accelerometer, PositionTarget)  # sensors that never repeat a sample, as coarse encoders do
 LARGEST = 1e6  # [SI] no angle, rate or command is larger; beyond it a number is as good as none
 
 
@@ -44,7 +46,7 @@ class SampleIntake:
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
         for name, sensor in robot.sensors.items():
-            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, Gyro | Accelerometer))
+            self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
     def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one.
@@ -66,8 +68,13 @@ class SampleIntake:
         self._acting = values = np.where(np.isin(np.arange(len(values)), bad), self._acting, values)
         return values
 
-    def sample(self, name: str, t: float, values: ArrayLike, now: float | None) -> list[Observation]:
-        """The channels of a sample that can be used, in groups taken at the same time; now as in `command`."""
+    def sample(
+        self, name: str, t: float, values: ArrayLike, now: float | None, about: NDArray[np.bool_] | None = None
+    ) -> list[Observation]:
+        """The channels of a sample that can be used, in groups taken at the same time; now as in `command`.
+
+        A message may be `about` some channels only, shape (c,); nothing is said about the others.
+        """
         if name not in self._groups:
             known = ", ".join(["command", *self._groups])
             raise EstimatorError(f"no sensor {name!r}; robot {self._robot.name!r} has {known}")
@@ -79,13 +86,15 @@ class SampleIntake:
         bad = _useless(numbers)
         if bad:
             numbers = [math.nan if j in bad else number for j, number in enumerate(numbers)]
-            which = ", ".join(sensor.channels[j] for j in bad)
-            self._drop(name, t, "not_finite", f"{which}: no number, left out; the rest of the message is used")
+            lost = bad if about is None else [j for j in bad if about[j]]
+            if lost:
+                which = ", ".join(sensor.channels[j] for j in lost)
+                self._drop(name, t, "not_finite", f"{which}: no number, left out; the rest of the message is used")
         stuck = checks.stuck(numbers)
         if stuck:
             self._drop(name, t, "stuck", f"{name} repeats one value: saturated or dead; it is left out")
         sigma = self._sigmas[name]
-        shared = None if isinstance(sensor, Gyro | Accelerometer) else checks.shared_error(t, numbers)
+        shared = None if isinstance(sensor, NOISY) else checks.shared_error(t, numbers)
         if shared is not None:
             sigma = sigma * np.array(shared)
         result = []

@@ -92,9 +92,9 @@ class _Run:
             self._first = min(self._first, float(block.stamps.min()))
             self._last = max(self._last, float(block.stamps.max()))
         sample, start, outside = self._estimator.sample, perf_counter(), self._outside
-        for _, name, stamp, values in block:
+        for (_, name, stamp, values), about in zip(block, block.channels(), strict=True):
             self._begin = perf_counter()
-            sample(name, stamp, values)
+            sample(name, stamp, values) if about is None else sample(name, stamp, values, about)
             self._spent += perf_counter() - self._begin
         self._messages += len(block)
         self._wall += perf_counter() - start - (self._outside - outside)

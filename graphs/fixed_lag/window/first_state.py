@@ -35,7 +35,7 @@ ACCELERATION = 100.0  # [rad/s^2] that a straight line may hide
 
 @dataclass(frozen=True)
 class EncoderSample:
-    """Complete readings of all encoders: time [s] and positions without zero, shape (n,) [rad]."""
+    """Readings of the encoders: time [s] and positions without zero, shape (n,) [rad]; NaN where it lacks a joint."""
 
     time: float
     q: Array
@@ -54,15 +54,19 @@ class FirstSamples:
 
     @property
     def newest(self) -> Array | None:
-        """Newest positions, shape (n,) [rad]; None before the first."""
-        return self.samples[-1].q if self.samples else None
+        """Newest positions, shape (n,) [rad]; None before all joints have one."""
+        q = np.array([sample.q for sample in self.samples])
+        if not len(q) or np.isnan(q).all(axis=0).any():
+            return None
+        last = len(q) - 1 - np.argmax(np.isfinite(q)[::-1], axis=0)
+        return np.asarray(q[last, np.arange(self._n)], dtype=np.float64)
 
     def add(self, observations: Sequence[Observation]) -> bool:
         """Takes in the groups of channels of one message; returns whether the estimator can begin."""
         own = [o for o in observations if o.sensor == self._encoder.name]
-        if sum(len(o.values) for o in own) < self._n:
+        if not own:
             return False
-        q = np.empty(self._n)
+        q = np.full(self._n, np.nan)
         for o in own:
             q[o.channels] = o.values
         taken, samples = own[0].taken, self.samples
@@ -72,7 +76,8 @@ class FirstSamples:
             return False  # older than what is there
         samples.append(EncoderSample(taken, q - np.asarray(self._encoder.zero)))
         span = taken - samples[0].time
-        return (span >= WINDOW and len(samples) >= FEWEST) or (span >= LONGEST_WAIT / 2 and len(samples) > 1)
+        count = int(np.isfinite([sample.q for sample in samples]).sum(axis=0).min())
+        return (span >= WINDOW and count >= FEWEST) or (span >= LONGEST_WAIT / 2 and count > 1)
 
 
 def first_state(
@@ -86,23 +91,28 @@ def first_state(
     Args:
         robot: sensors with priors of their biases.
         layout: of the estimator's state.
-        samples: encoder samples, in the order of time.
+        samples: encoder samples, in the order of time; at least two of every joint.
         walking: an earlier estimate whose biases and parameters go on; None for their priors.
     """
     own, sigma = layout.robot, robot.motor_encoder.sigmas
     t = np.array([s.time for s in samples])
     q = np.array([s.q for s in samples])
     now, span = float(t[-1]), float(max(t[-1] - t[0], 1e-4))
-    rests = bool(np.all(np.ptp(q, axis=0) < STILL * sigma))
-    v = np.zeros(robot.n) if rests else np.polyfit(t - now, q, 1)[0]
+    seen = np.isfinite(q)
+    rests = bool(np.all(np.nanmax(q, axis=0) - np.nanmin(q, axis=0) < STILL * sigma))
+    ways = [np.polyfit(t[has] - now, column[has], 1)[0] for column, has in zip(q.T, seen.T, strict=True)]
+    v = np.zeros(robot.n) if rests else np.array(ways)
+    last = len(t) - 1 - np.argmax(seen[::-1], axis=0)
+    since = now - t[last]  # [s] of joints that other messages tell of
+    newest = q[last, np.arange(robot.n)] + v * since
     v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * float(np.max(sigma)) / span, 0.5 * ACCELERATION * span)
     mean, variance = np.zeros(layout.size), np.zeros(layout.size)
-    mean[own.motor_q], mean[own.motor_v] = q[-1], v
-    mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, q[-1]), joint_angles(robot, v)
+    mean[own.motor_q], mean[own.motor_v] = newest, v
+    mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, newest), joint_angles(robot, v)
     variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, v_sigma**2
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
-    variance[own.motor_q] = sigma**2
+    variance[own.motor_q] = sigma**2 + (v_sigma * since) ** 2
     variance[own.memory] = memory_spreads(robot) ** 2
     if walking is not None:
         mean[layout.walking] = walking.mean[layout.walking]

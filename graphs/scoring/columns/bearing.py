@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Columns of a soft bearing, by its compliance: a tilt rings, sensors see its motion, the joints its inertia.
 
-Gyros see its rate, accelerometers its acceleration and how gravity turns. Only the ringing depends on the
-resonance that is tried; the rest is worked out once for each bearing.
+Gyros see its rate, accelerometers its acceleration and how gravity turns, targets its angle. Only the ringing depends
+on the resonance that is tried; the rest is worked out once for each bearing.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from jointscope.graphs.scoring.columns.column import Column, SensorColumn, Senso
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.bodies.body_accelerations import specific_force
+from jointscope.robots.bodies.body_points import body_point
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 
@@ -31,8 +32,8 @@ class _Hinge:
     Attributes:
         reaction: torque that the bearing carries about it, shape (m + 1,) [N m].
         coupling: rows of the mass matrix between the links and it, shape (m + 1, n_link) [kg m2].
-        seen: what every gyro and accelerometer sees of a tilt, of its speed and of its acceleration, by name, shape
-            (m + 1, 3) each.
+        seen: what every gyro, accelerometer and target sees of a tilt, of its speed and of its acceleration, by name,
+            shape (m + 1, 3) each.
     """
 
     reaction: Array
@@ -81,7 +82,7 @@ def _hinges(owner: str, s: ScoreSignals) -> list[_Hinge]:
 
 
 def _slopes(tree: RigidTree, s: ScoreSignals, q: Array, v: Array, a: Array) -> dict[str, tuple[Array, Array, Array]]:
-    """Derivatives of what gyros and accelerometers see by q, v and a, in their own axes, shape (m + 1, 3, n) each."""
+    """Derivatives of what sensors of the links see by q, v and a, in their own axes, shape (m + 1, 3, n) each."""
     found = {}
     gyros = {gyro.name: gyro for gyro in s.robot.gyros}
     for gyro in gyros.values():
@@ -91,6 +92,11 @@ def _slopes(tree: RigidTree, s: ScoreSignals, q: Array, v: Array, a: Array) -> d
         gyro, lever, gravity = gyros[sensor.gyro], sensor.place(s.robot.parameters), s.robot.gravity_at(sensor)
         f = specific_force(tree, gyro.body, lever, q, v, a, gravity)
         found[sensor.name] = gyro.R_imu_body @ f.by_q, gyro.R_imu_body @ f.by_v, gyro.R_imu_body @ f.by_a
+    values = {name: parameter.value for name, parameter in s.robot.parameters.items()}
+    for target in s.robot.targets:
+        at, R, _, _ = target.seen(values)
+        by_q = R.T @ body_point(tree, target.body, at, q).by_q
+        found[target.name] = by_q, np.zeros_like(by_q), np.zeros_like(by_q)
     return found
 
 

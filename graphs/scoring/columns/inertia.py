@@ -9,7 +9,7 @@ from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
-from jointscope.robots.model.structured_tree import InertiaChange, inertia_torque, tilt_torques
+from jointscope.robots.model.structured_tree import InertiaChange, inertia_torques, tilt_torques
 
 
 def inertia_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
@@ -19,11 +19,11 @@ def inertia_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Colum
     joint = tree.model.getJointId(hypothesis.here.owner)
     directions = effect.change(tree.model.inertias[joint].toDynamicParameters())
     q, v = s.x[:, layout.q_link], s.x[:, layout.v_link]
+    changes = [InertiaChange(size.name, joint, np.asarray(directions[size.name], float)) for size in hypothesis.sizes]
     found = []
-    for size in hypothesis.sizes:
-        change = InertiaChange(size.name, joint, np.asarray(directions[size.name], float))
+    for torque in inertia_torques(tree, changes, q, v, s.a_link, 1.0):
         tau = np.zeros((len(s.ticks), layout.n_rates))
-        tau[:, : layout.n_link] = -inertia_torque(tree, change, q, v, s.a_link, 1.0)
+        tau[:, : layout.n_link] = -torque
         found.append(Column(at_ticks=s.accelerations(tau)))
     return found
 

@@ -27,6 +27,7 @@ OTHERS = ("motor_viscous", "torque_offset", "motor_lag", "link_viscous", "gravit
 OTHERS += ("inertia_error", "gyro_scale", "gyro_delay", "encoder_delay", "encoder_eccentricity")
 CASES += one_hypothesis_each("joint 2 rigid", OTHERS)
 CASES += one_hypothesis_each("accelerometer", ("motor_viscous", "link_viscous", "payload", "gyro_delay", "gyro_scale"))
+CASES += one_hypothesis_each("target", ("motor_viscous", "link_viscous", "payload", "gyro_delay", "clock_offset"))
 CASES += one_hypothesis_each(
     "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
 )

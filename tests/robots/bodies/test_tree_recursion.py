@@ -47,3 +47,17 @@ def test_a_joint_that_moves_no_inertia_has_no_finite_acceleration():
     model.inertias[2], model.armature = pin.Inertia.Zero(), np.zeros(2)
     q, v, tau = np.ones((3, 2, 2))
     assert not np.isfinite(FreeEquations(model).acceleration(q, v, tau)[:, 1]).any()
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1, 1), (3, 2), (6, 3), (12, 4)])
+def test_torques_of_a_body_are_what_pinocchios_model_asks_for_with_it_more_than_without(n, seed):
+    model, rng = _random_tree(n, seed), np.random.default_rng(seed)
+    equations, joints, bodies = FreeEquations(model), rng.integers(1, n + 1, 4), rng.normal(size=(4, 10))
+    q, v, a = rng.normal(size=(3, 20, n)) * np.array([2.0, 3.0, 20.0])[:, None, None]
+    before = equations.torque(q, v, a)
+    for joint, body, found in zip(joints, bodies, equations.body_torques(list(joints), bodies, q, v, a), strict=True):
+        heavier = model.copy()
+        parameters = heavier.inertias[int(joint)].toDynamicParameters() + 1e-3 * body
+        heavier.inertias[int(joint)] = pin.Inertia.FromDynamicParameters(parameters)
+        expected = (FreeEquations(heavier).torque(q, v, a) - before) / 1e-3
+        np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(before).max() + 1e-9 * np.abs(expected).max())

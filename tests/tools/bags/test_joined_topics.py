@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from changed_bag import changed_bag
 
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.fitting_messages import fitting_messages
 from jointscope.tools.bags.messages.columns import Columns
@@ -67,28 +66,38 @@ def columns(name, times, values, first):
     return Columns(stamps, np.asarray(values)[:, None], (name,), first + 2 * np.arange(len(stamps)))
 
 
-def test_joints_with_messages_of_their_own_are_read_at_the_stamps_of_one():
+def test_joints_with_messages_of_their_own_are_read_at_their_own_stamps():
     a, b = np.arange(0.0, 2.0, 0.01), np.arange(0.0042, 1.99, 0.0101)
     b = b[(b < 0.7) | (b > 0.8)]
     parts = MessageParts("/t", "position", (columns("a", a, np.sin(3 * a), 0), columns("b", b, np.cos(4 * b), 1)), 0)
     found = fitting_messages(parts, ("b", "a"))
-    assert found.names == ("b", "a") and found.stamps.tolist() == parts.parts[0].stamps.tolist()
-    assert found.values[:, 1].tolist() == np.sin(3 * a).tolist()
-    silent = (a < b[0]) | (a > b[-1]) | ((a > b[b < 0.7][-1]) & (a < b[b > 0.7][0]))
-    np.testing.assert_array_equal(np.isnan(found.values[:, 0]), silent)
-    np.testing.assert_allclose(found.values[~silent, 0], np.cos(4 * a[~silent]), atol=2e-6)
-    held = fitting_messages(parts, ("b", "a"), acts_on=True).values[:, 0]
-    k = 150
-    assert held[k] == np.cos(4 * b[b <= a[k]][-1])  # a command acts until the next one
+    assert found.names == ("b", "a") and not found.left_out
+    times = found.stamps / 1e9
+    told = np.isfinite(found.values)
+    np.testing.assert_allclose(np.sort(times[told[:, 1]]), a, atol=1e-12)
+    np.testing.assert_allclose(found.values[told[:, 1], 1], np.sin(3 * times[told[:, 1]]), atol=1e-8)
+    np.testing.assert_allclose(found.values[told[:, 0], 0], np.cos(4 * times[told[:, 0]]), atol=1e-8)
+    silent = (times > b[b < 0.7][-1]) & (times < b[b > 0.7][0])  # nobody knows where b was
+    np.testing.assert_array_equal(found.absent[:, 0], ~told[:, 0] & ~silent)
+    assert not fitting_messages(parts, ("b", "a"), acts_on=True).absent[told[:, 0], 0].any()
+    np.testing.assert_array_equal(fitting_messages(parts, ("b", "a"), acts_on=True).absent[:, 0], ~told[:, 0])
 
 
-def test_joints_of_messages_without_stamps_are_refused_with_the_way_out():
-    parts = [columns("a", np.arange(9.0), np.arange(9.0), 0), columns("b", np.arange(8.0), np.arange(8.0), 1)]
-    parts = [replace(part, stamps=None) for part in parts]
-    with pytest.raises(
-        RecordingError, match=r"no message names all of a, b: a in 9, b in 8; .* or stamps in each: let"
-    ):
-        fitting_messages(MessageParts("/t", "position", tuple(parts), 0), ("a", "b"))
+def test_messages_of_two_nodes_with_one_stamp_are_one_row_and_those_of_one_node_stay_apart():
+    t = np.repeat(np.arange(20) / 10, [1] * 5 + [2] + [1] * 14)
+    parts = (columns("a", t, np.arange(21.0), 0), columns("b", np.arange(20) / 10, -np.arange(20.0), 1))
+    found = fitting_messages(MessageParts("/t", "position", parts, 0))
+    assert found.names == ("a", "b") and len(found.values) == 21
+    assert found.values[5].tolist() == [5.0, -5.0] and found.values[6, 0] == 6.0 and found.absent[6].tolist() == [0, 1]
+    assert np.count_nonzero(found.absent) == 1
+
+
+def test_joints_of_messages_without_stamps_are_rows_in_the_order_of_the_bag():
+    parts = [columns("a", np.zeros(9), np.arange(9.0), 0), columns("b", np.zeros(8), -np.arange(8.0), 1)]
+    for stamps in (parts, [replace(part, stamps=None) for part in parts]):
+        found = fitting_messages(MessageParts("/t", "position", tuple(stamps), 0), ("a", "b"))
+        assert found.rows.tolist() == list(range(17))
+        assert np.isnan(found.values[::2, 1]).all() and found.values[1::2, 1].tolist() == (-np.arange(8.0)).tolist()
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")

@@ -4,6 +4,7 @@
 import pytest
 
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.tools.init.text.drive_table import _cell
 from jointscope.tools.init.text.drive_text import _why_lost
 
 
@@ -22,3 +23,8 @@ class Drive:
 )
 def test_a_value_far_below_zero_is_not_called_uncertain(found, words):
     assert words in _why_lost(Drive(), found)
+
+
+def test_a_friction_below_zero_is_marked_as_no_result():
+    assert _cell(Value(-2.2, 0.5), positive=True) == "-2.2 +- 0.5 (!)"
+    assert _cell(Value(-0.6, 0.5), positive=True) == "-0.6 +- 0.5" and _cell(Value(-2.2, 0.5)) == "-2.2 +- 0.5"

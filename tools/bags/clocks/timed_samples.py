@@ -18,7 +18,8 @@ class TimedSamples:
         stamps: time of measurement, shape (n,) [ns].
         received: time of writing to the bag, shape (n,) [ns].
         values: shape (n, m).
-        filled: whether a value stands for one that was no number, shape (n, m); None where all were measured.
+        filled: whether a value stands for one that was no number, or is still NaN because the message is not about that
+            joint, shape (n, m); None where all were measured.
     """
 
     stamps: NDArray[np.int64]

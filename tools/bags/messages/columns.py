@@ -35,6 +35,8 @@ class Columns:
         names: what the messages call the columns, the same in all of them; None where their type has no such texts.
         rows: place in the topic of the message behind each row, shape (n,); None where all messages are used.
         left_out: messages that do not fit the others.
+        absent: where the message of a row is not about a column, because another node tells of that joint: a value
+            there is NaN and missing nowhere, shape (n, m); None where all messages are about all.
     """
 
     stamps: NDArray[np.int64] | None
@@ -42,6 +44,7 @@ class Columns:
     names: tuple[str, ...] | None
     rows: NDArray[np.intp] | None = None
     left_out: tuple[LeftOut, ...] = ()
+    absent: NDArray[np.bool_] | None = None
 
     def of(self, per_message: NDArray[Any]) -> NDArray[Any]:
         """What belongs to the rows, of something that is there for every message of the topic, shape (n, ...)."""
@@ -51,4 +54,5 @@ class Columns:
         """Some of the rows."""
         every = np.arange(len(self.values)) if self.rows is None else self.rows
         stamps = None if self.stamps is None else self.stamps[index]
-        return replace(self, stamps=stamps, values=self.values[index], rows=every[index])
+        absent = None if self.absent is None else self.absent[index]
+        return replace(self, stamps=stamps, values=self.values[index], rows=every[index], absent=absent)

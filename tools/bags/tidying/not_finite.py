@@ -4,7 +4,8 @@
 A channel of a sensor that lacks a sample says less, and what it and the others say is right: a spline through its
 neighbours stands there as `filled`, and no estimate takes it for a measurement. A command that is no number acts
 somehow: where a few stand alone, that channel's command before acts on; where many follow each other, as before a
-controller is switched on, the whole stretch is left out as one without commands.
+controller is switched on, the whole stretch is left out as one without commands. What a message is not about, because
+another node tells of that joint (`filled` and NaN), is missing nowhere, and is filled in alike.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def without_gibberish(
     Args:
         name: of the stream.
         channels: name of each column.
-        samples: in the order of their stamps, in the unit of the bag.
+        samples: in the order of their stamps, in the unit of the bag; `filled` where messages are not about a joint.
         wraps: period of the counter behind them, 0 for none; filled ones are continued.
         held: whether a command acts until the next one; else it was measured and runs on between its samples.
 
@@ -52,19 +53,21 @@ def without_gibberish(
         RecordingError: too many are not.
     """
     values = numbers_only(samples.values)
-    bad: Flags = np.isnan(values)
+    bad, absent = np.isnan(values), _absent(samples)
+    bad &= ~absent
     rows = np.asarray(bad.any(axis=1))
+    acts_on = name == COMMAND and held
     if not rows.any():
-        return samples, []
+        return filled_in(samples, wraps, acts_on), []
     _check_shares(name, channels, samples, bad)
-    left_out = _in_runs(rows) if name == COMMAND else np.asarray(bad.all(axis=1))
+    left_out = _in_runs(rows) if name == COMMAND else np.asarray((bad | absent).all(axis=1))
     lacking = {channel: int(n) for channel, n in zip(channels, bad.sum(axis=0), strict=True) if n}
     where = ", ".join(f"{channel} in {counted(n, 'message')}" for channel, n in lacking.items())
     since = (samples.stamps[int(np.argmax(rows))] - samples.stamps[0]) / 1e9
     rest = "" if left_out[rows].all() else "; what the others of these messages say is used"
     text = f"{name}: left out what is no number (NaN or infinite): {where}, the first at {since:.3f} s{rest}"
     kept = replace(samples, values=values).take(~left_out)
-    kept = filled_in(kept, wraps, acts_on=name == COMMAND and held)
+    kept = filled_in(kept, wraps, acts_on)
     return kept, [Notice(name, "dropped", int(np.count_nonzero(rows)), text)]
 
 
@@ -79,6 +82,7 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
     bad = np.isnan(samples.values)
     if not bad.any():
         return samples
+    missing = bad & ~_absent(samples)
     times, values = (samples.stamps - samples.stamps[0]) / 1e9, samples.values.copy()
     for j in range(values.shape[1]):
         good = np.flatnonzero(~bad[:, j])
@@ -87,11 +91,18 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
         column = values[good, j]
         if acts_on:
             before = np.maximum(np.searchsorted(good, np.arange(len(values)), side="right") - 1, 0)
-            values[:, j] = np.where(_in_runs(bad[:, j]), np.nan, column[before])
+            values[:, j] = np.where(_in_runs(missing[:, j]), np.nan, column[before])
             continue
         column = np.unwrap(column, period=wraps) if wraps else column
-        values[:, j] = _bridged(times, times[good], column, _in_runs(bad[:, j], SMOOTH + 1))
+        bridged = _bridged(times, times[good], column, _in_runs(missing[:, j], SMOOTH + 1))
+        bridged[good] = column  # a spline may round it
+        values[:, j] = bridged
     return replace(samples, values=values, filled=bad & ~np.isnan(values))
+
+
+def _absent(samples: TimedSamples) -> Flags:
+    """Where messages are not about a joint, shape (n, m)."""
+    return np.zeros(samples.values.shape, bool) if samples.filled is None else samples.filled
 
 
 def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
@@ -107,7 +118,8 @@ def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
 
 def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, bad: Flags) -> None:
     counts = np.count_nonzero(bad, axis=0)
-    worst, n = int(np.argmax(counts)), len(samples)
+    worst = int(np.argmax(counts))
+    n = len(samples) - int(np.count_nonzero(_absent(samples)[:, worst]))
     too_many, scattered = counts[worst] > MOST * n, False
     if name == COMMAND:
         rows = np.asarray(bad.any(axis=1))

@@ -11,6 +11,7 @@ from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.tidying.glitches import without_glitches
+from jointscope.tools.bags.tidying.late_copies import without_late_copies
 from jointscope.tools.bags.tidying.not_finite import MOST, filled_in, numbers_only
 from jointscope.tools.bags.tidying.second_publisher import without_second_publisher
 from jointscope.tools.bags.tidying.staircase import without_repetitions
@@ -19,7 +20,7 @@ FEWEST = 30  # samples that tell anything
 
 
 def ordered_samples(name: str, samples: TimedSamples) -> TimedSamples:
-    """The samples in the order of their stamps, whatever is no number as NaN.
+    """The samples in the order of their stamps, without late copies, whatever is no number as NaN.
 
     Args:
         name: of the stream.
@@ -28,7 +29,7 @@ def ordered_samples(name: str, samples: TimedSamples) -> TimedSamples:
     Raises:
         RecordingError: the clock cannot be trusted.
     """
-    samples, _ = in_time_order(name, samples)
+    samples, _ = without_late_copies(name, in_time_order(name, samples)[0])
     return replace(samples, values=numbers_only(samples.values))
 
 
@@ -42,7 +43,9 @@ def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
     Raises:
         RecordingError: so much would be left out that something else is wrong.
     """
-    sound = np.isnan(samples.values).mean(axis=0) <= MOST
+    absent = np.zeros(samples.values.shape, bool) if samples.filled is None else samples.filled
+    missing = np.count_nonzero(np.isnan(samples.values) & ~absent, axis=0)
+    sound = missing <= MOST * np.count_nonzero(~absent, axis=0)
     if not sound.any():
         return samples
     whole = filled_in(samples)

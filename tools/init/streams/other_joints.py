@@ -30,6 +30,7 @@ class Typed:
         wish: joints, names and locks.
         name: of the robot; empty for that of the URDF.
         unit: of the command; empty where the recording shall tell.
+        targets: texts TOPIC=LINK of what a tracker measures.
     """
 
     urdf: Path
@@ -38,6 +39,7 @@ class Typed:
     wish: Wish = field(default_factory=Wish)
     name: str = ""
     unit: str = ""
+    targets: tuple[str, ...] = ()
 
     def command(self) -> str:
         """As it is typed."""
@@ -51,6 +53,7 @@ class Typed:
             words += ["--name", self.name]
         if self.unit:
             words += ["--unit", self.unit.replace(" ", "")]
+        words += [word for target in self.targets for word in ("--target", target)]
         words += ["-o", str(self.output or f"{self.urdf.stem}.yaml")]
         return shlex.join(words)
 

@@ -16,7 +16,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.screening import MIN_SAMPLES
 from jointscope.tools.init.streams.known_fields import IMU
 from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, named_signal
-from jointscope.tools.init.streams.signals import Signal
+from jointscope.tools.init.streams.signals import Signal, complain_of_lengths
 from jointscope.tools.init.streams.standing import Stance, stances
 
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
@@ -72,6 +72,7 @@ def assign_roles(
     _check_wish(wish, urdf_joints)
     positions = [s for s in signals if s.quantity == "position" and not s.commanded]
     if not positions:
+        complain_of_lengths(signals, ("position",))
         raise RecordingError(
             "the bag holds no joint positions; expected sensor_msgs/msg/JointState.position or the state of a "
             "controller, besides commands"
@@ -254,6 +255,7 @@ def _drive(
             f"nothing in the bag drives the motors on one topic: commands come joint by joint, on {', '.join(single)}; "
             "put them together into one sensor_msgs/msg/JointState with names and effort, and record that"
         )
+    complain_of_lengths(signals, ("effort", "torque", "current"))
     raise RecordingError(
         "nothing in the bag drives the motors: no effort on a command topic nor with the joint positions that varies "
         f"for {', '.join(moving)}; record the duty cycle, voltage or torque (JointState.effort) beside the positions"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
@@ -49,6 +50,7 @@ class Signal:
         joints: whose command each column is, where the topics say so that are joined in it.
         sent: the same with all messages, where some were left out; streams are compared one for one by it.
         filled: where a value only stands for one that was no number, shape (n, m); None where all were measured.
+        trouble: why nobody can tell whose its values are; its quantity is empty then.
     """
 
     topic: str
@@ -62,6 +64,7 @@ class Signal:
     sent: Signal | None = None
     joints: tuple[str, ...] = ()
     filled: NDArray[np.bool_] | None = None
+    trouble: str = ""
 
     @property
     def as_sent(self) -> Signal:
@@ -91,7 +94,10 @@ class Signal:
         """Some joints as a stream, finite samples only, times a factor."""
         values = self.columns(names) * factor
         good = np.isfinite(values).all(axis=1)
-        filled = None if self.filled is None else self.filled[good][:, self._places(names)]
+        filled = None
+        if self.filled is not None:
+            good &= ~self.filled[:, self._places(names)].all(axis=1)  # messages about other joints
+            filled = self.filled[good][:, self._places(names)]
         return Stream(self.topic, self.times[good], values[good], names, "", filled=filled)
 
 
@@ -131,6 +137,17 @@ def read_signals(path: Path, progress: Progress | None = None, joints: Sequence[
             f"controllers, arrays of motors); jointscope info {path} shows what is there"
         )
     return signals
+
+
+def complain_of_lengths(signals: Sequence[Signal], words: Sequence[str]) -> None:
+    """Complains about lists that are shorter or longer than those of their names, where nothing else tells it.
+
+    Raises:
+        RecordingError: there is one whose field speaks of what is missing.
+    """
+    for signal in signals:
+        if signal.trouble and any(word in signal.field.lower() for word in words):
+            raise RecordingError(signal.trouble)
 
 
 def joint_by_joint(bag: Bag, joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -174,6 +191,7 @@ class _Field:
     names: tuple[str, ...]
     samples: TimedSamples
     stamped: bool
+    trouble: str = ""
 
     @property
     def label(self) -> str:
@@ -188,12 +206,22 @@ def _field(raw: RawTopic, kind: MessageType, known: KnownField) -> _Field | None
         return None
     width = columns.values.shape[1]
     names = columns.names or ()
-    if width == 0 or (names and len(names) != width) or len(set(names)) != len(names):
+    trouble = ""
+    if 0 < width != len(names) > 0:
+        trouble = (
+            f"{raw.name} has {counted(width, 'value')} in `{known.path}` for {len(names)} names ({', '.join(names)}); "
+            "expected one for each, in their order, so that it is known whose they are: let the driver fill in the "
+            "others (NaN where it has none), or name in each message only those that it has"
+        )
+        names = ()
+    elif width == 0 or len(set(names)) != len(names):
         return None
     received = columns.of(raw.received_ns)
     stamps = received if columns.stamps is None else columns.stamps
-    samples = TimedSamples(stamps, received, columns.values)
-    return _Field(raw.name, kind, known, names, samples, columns.stamps is not None and not empty_stamps(samples))
+    samples = TimedSamples(stamps, received, columns.values, columns.absent)
+    return _Field(
+        raw.name, kind, known, names, samples, columns.stamps is not None and not empty_stamps(samples), trouble
+    )
 
 
 def _signal(field: _Field, timed: TimedSamples, start_ns: int, troubles: list[RecordingError]) -> Signal | None:
@@ -205,7 +233,8 @@ def _signal(field: _Field, timed: TimedSamples, start_ns: int, troubles: list[Re
         later = np.diff(times, prepend=-np.inf) > 0  # far from zero, seconds do not tell all nanoseconds apart
         names, values = field.names, samples.values[later]
         return Signal(
-            field.topic, field.kind.name, known.path, names, times[later], values, field.stamped, known.quantity, sent,
+            field.topic, field.kind.name, known.path, names, times[later], values, field.stamped,
+            "" if field.trouble else known.quantity, sent, trouble=field.trouble,
             filled=None if samples.filled is None else samples.filled[later],
         )  # fmt: skip
 

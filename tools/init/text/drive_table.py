@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.graphs.starts.drive_regression import Value
+from jointscope.graphs.starts.drive_regression import PLACES, Value
 from jointscope.robots.units import joined, of_slide
+from jointscope.tools.init.estimates.drive_values import IMPOSSIBLE
 from jointscope.tools.init.robot_guess import RobotGuess
 
 GAIN_UNIT = {"N m": "1", "A": "N m/A", "V": "N m/V", "duty": "N m"}  # of torque per unit of the command
 QUANTITIES = {"gain": "", "inertia": "kg m2", "dry": "N m", "viscous": "N m s/rad"}
 HEADS = {"gain": "k", "inertia": "inertia", "dry": "dry friction", "viscous": "viscous friction"}
-UNKNOWN = "-"
+UNKNOWN, IMPOSSIBLE_CELL = "-", " (!)"
 MOST_DECIMALS = 9
 
 
@@ -41,13 +42,18 @@ def drive_table(guess: RobotGuess) -> list[str]:
     rows = [["joint", *(_head(guess, name) for name in QUANTITIES), "explained"]]
     for joint, drive in zip(joints, guess.drives, strict=True):
         found = {} if drive.unknown_scale else drive.found
-        cells = [_cell(found.get(name)) for name in QUANTITIES]
+        cells = [_cell(found.get(name), name in PLACES) for name in QUANTITIES]
         rows.append([joint, *cells, f"{100.0 * drive.explained:.4g} %"])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     if any(UNKNOWN in row for row in rows):
         lines.append(
             f"{UNKNOWN}: the recording does not tell it; where the robot file has it, it is a guess and says so"
+        )
+    if any(IMPOSSIBLE_CELL in cell for row in rows for cell in row):
+        lines.append(
+            f"{IMPOSSIBLE_CELL.strip()}: below zero, which no inertia and no friction can be: not a result; masses, "
+            "units, names or stamps are wrong there, or something else acts"
         )
     return ["drives by regression with rigid joints, sigmas from blocks of the recording:", *(f"  {x}" for x in lines)]
 
@@ -61,9 +67,10 @@ def _unit(guess: RobotGuess, name: str, joint: str) -> str:
     return of_slide(unit) if joint in guess.slides else unit
 
 
-def _cell(found: Value | None) -> str:
-    """A value with as many digits as its sigma leaves."""
+def _cell(found: Value | None, positive: bool = False) -> str:
+    """A value with as many digits as its sigma leaves; marked where it is below zero beyond doubt and cannot be."""
     if found is None or not 0.0 < found.sigma < np.inf:
         return UNKNOWN
     decimals = int(np.clip(-np.floor(np.log10(found.sigma)), 0, MOST_DECIMALS))
-    return f"{found.value:.{decimals}f} +- {found.sigma:.{decimals}f}"
+    mark = IMPOSSIBLE_CELL if positive and found.value < -IMPOSSIBLE * found.sigma else ""
+    return f"{found.value:.{decimals}f} +- {found.sigma:.{decimals}f}{mark}"

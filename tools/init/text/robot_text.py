@@ -10,6 +10,7 @@ import numpy as np
 from jointscope.robots.units import joined, si_factor, si_unit
 from jointscope.tools.init.estimates.drive_values import TYPED
 from jointscope.tools.init.estimates.joint_signs import SignGuess
+from jointscope.tools.init.estimates.target_places import GuessedTarget
 from jointscope.tools.init.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.init.streams.named_signal import Chosen
 from jointscope.tools.init.streams.sensor_noise import NoiseGuess
@@ -23,16 +24,18 @@ from jointscope.tools.init.text.robot_line import line as _line
 from jointscope.tools.init.text.robot_line import number as _number
 from jointscope.tools.init.text.robot_line import plain as _plain
 from jointscope.tools.init.text.source_text import FINEST, sigma_line, source_lines
+from jointscope.tools.init.text.target_text import target_lines, target_parameters
 
 LOOSE = (0.35, 0.26)  # [rad/s/sqrt(s)] densities that a calibration begins with
 
 
-def robot_text(guess: RobotGuess, urdf: str) -> str:
+def robot_text(guess: RobotGuess, urdf: str, targets: Sequence[GuessedTarget] = ()) -> str:
     """The robot file.
 
     Args:
         guess: what was found.
         urdf: how the file names the URDF.
+        targets: what a tracker measures of it.
     """
     joints = guess.roles.joints
     free = guess.free_links
@@ -59,10 +62,12 @@ def robot_text(guess: RobotGuess, urdf: str) -> str:
         *(_torque(guess) if free else ()),
         *(line for gyro in guess.gyros for line in gyro_lines(gyro, guess.encoder_signs)),
         *(line for gyro in guess.gyros if not free for line in accelerometer_lines(gyro, guess.gravity)),
+        *(line for target in targets for line in target_lines(target)),
         *(f"  # not used: {text}" for text in guess.left_out),
         "",
         *effect_lines(guess),
         *parameter_lines(guess),
+        *target_parameters(targets),
         *([] if free else _noise(len(joints))),
     ]
     return "\n".join(lines) + "\n"

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import joined
@@ -159,3 +161,29 @@ class SampledTorque(SampledSensor):
             mujoco.mj_rne(self._model, data, 1, found)
             torques[k] = found[self._link]
         return self._scale * torques + self._offset + self._sigmas * self._noise[rows]
+
+
+class SampledTarget(SampledSensor):
+    """A target as a tracker sees it that stands where the parameters of `robot` say."""
+
+    def __init__(
+        self, target: PositionTarget, engine: Engine, sampling: Sampling, stamps: Array, seed: int, robot: Robot
+    ):
+        super().__init__(target, engine, sampling, stamps, seed)
+        self._engine, self._sigma = engine, target.sigma
+        offset, place, turn = (
+            [robot.parameters[name].value if name in robot.parameters else 0.0 for name in names]
+            for names in (target.offset, target.place, target.turn)
+        )
+        model = robot.tree.model
+        frame = model.frames[robot.tree.frame_id(target.body)]
+        self._joint, self._p_joint = model.names[frame.parentJoint], frame.placement.act(target.at + offset)
+        self._axes = Rotation.from_matrix(target.tracker_pose[:3, :3]) * Rotation.from_rotvec(turn)
+        self._origin = target.tracker_pose[:3, 3] + place
+        self._noise = random_stream(seed, "noise", target.name).standard_normal((len(stamps), 3))
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Positions in the axes of the tracker, shape (k, 3) [m]."""
+        q, _ = trajectory.at(self.taken[rows] - self._age[0])
+        seen = self._axes.inv().apply(self._engine.points(self._joint, self._p_joint, q) - self._origin)
+        return np.asarray(seen + self._sigma * self._noise[rows], dtype=np.float64)

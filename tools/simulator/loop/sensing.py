@@ -35,6 +35,7 @@ class Sampling:
         drop: probability that a sensor sample is lost. Commands are never lost.
         transport_delay: mean time from stamp to arrival [s].
         quantized: False gives encoders white Gaussian noise of the same sigma instead of steps.
+        target_rate: samples per second of cameras and motion capture [Hz].
     """
 
     encoder_rate: float = 1.0 / TICK
@@ -43,9 +44,10 @@ class Sampling:
     drop: float = 0.0
     transport_delay: float = 5e-4
     quantized: bool = True
+    target_rate: float = 200.0
 
     def __post_init__(self) -> None:
-        for name in ("encoder_rate", "gyro_rate"):
+        for name in ("encoder_rate", "gyro_rate", "target_rate"):
             if not 1.0 <= getattr(self, name) <= 1e5:
                 raise SimulationError(f"{name.replace('_', ' ')}: expected 1 to 100000 Hz, got {getattr(self, name):g}")
         for name in ("jitter", "transport_delay"):

@@ -40,7 +40,7 @@ def test_a_rigid_joint_that_becomes_elastic_leads_its_link_by_compliance_times_t
 
 @pytest.mark.parametrize("axis", "xy")
 @pytest.mark.parametrize("joint", ("joint1", "joint2"))
-@pytest.mark.parametrize("name", ("doggy", "accelerometer"))
+@pytest.mark.parametrize("name", ("doggy", "accelerometer", "target"))
 def test_a_soft_bearing_tilts_as_its_hinges_do_in_equilibrium(name, joint, axis):
     """Tilts that leave the hinges of the real model without acceleration, put into its residuals; small motion."""
     segment, x = base(name, amplitude=0.04, posture=0.5)
@@ -59,9 +59,9 @@ def test_a_soft_bearing_tilts_as_its_hinges_do_in_equilibrium(name, joint, axis)
     scale, scale_soft = impulses(segment.problem), impulses(problem)
     k, inside = "xy".index(axis), slice(100, -100)
     links = [row for row in before if row.endswith(".link_velocity")]
-    gyros, felt = ([row for row in before if row.startswith(kind)] for kind in ("imu", "acc"))
-    assert len(felt) == 3 * (name == "accelerometer")
-    for group, allowed in ((links, NEGLECTED), (gyros, LAG), (felt, FELT)):
+    gyros, felt, placed = ([row for row in before if row.startswith(kind)] for kind in ("imu", "acc", "target"))
+    assert len(felt) == 3 * (name == "accelerometer") and len(placed) == 3 * (name == "target")
+    for group, allowed in ((links, NEGLECTED), (gyros, LAG), (felt, FELT), (placed, LAG)):
         pairs = []
         for row in group:
             size, size_soft = scale.get(row, np.ones(len(before[row]))), scale_soft.get(row, np.ones(len(before[row])))

@@ -90,6 +90,7 @@ def histogram(series: ResidualSeries, i: int) -> str:
 def memory(series: ResidualSeries, i: int) -> str:
     """Autocorrelation of a channel's residuals in sigmas, with the band of white noise."""
     r = (series.measured[:, i] - series.predicted[:, i]) / series.sigma[:, i]
+    r = r[np.isfinite(r)]
     rho = autocorrelation(r)
     lags = np.arange(1, len(rho) + 1, dtype=float)
     if not len(rho):

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Drivers that each publish their own joint on one topic are one robot, whatever their rates."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from arm_bags import ArmMotion, write_arm_bag, write_urdf
+
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.tools.bags.read_arrivals import ArrivalReader
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.command_line import main
+
+TRUE = {"coulomb_torque": 0.3, "motor_viscous.coefficient": 0.4, "inertia": 0.05}
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    """A URDF, a motion, and the times at which two drivers publish: 100 Hz and 40 Hz, together now and then."""
+    folder = tmp_path_factory.mktemp("drivers")
+    urdf = write_urdf(folder / "arm.urdf", {"shoulder": None, "elbow": "shoulder"})
+    motion = ArmMotion(urdf, ["shoulder", "elbow"], seconds=4.0)
+    every = np.arange(len(motion.times))
+    return folder, urdf, motion, {"shoulder": every[::2], "elbow": every[1::5]}
+
+
+def _instants(rows):
+    """Number of times at which any driver publishes."""
+    return len(set().union(*(own.tolist() for own in rows.values())))
+
+
+@pytest.fixture(scope="module")
+def halves(arm):
+    folder, _, motion, rows = arm
+    states = {f"/joint_states#{joint}": motion.states([joint]) | {"rows": rows[joint]} for joint in rows}
+    states["/cmd"] = motion.commands(["elbow", "shoulder"])
+    return write_arm_bag(folder / "halves.mcap", motion.times, states)
+
+
+def test_the_door_opens_and_the_values_are_right(arm, halves, tmp_path, capsys):
+    _, urdf, _, rows = arm
+    robot, found, told = tmp_path / "arm.yaml", tmp_path / "found.yaml", tmp_path / "found.json"
+    assert main(["init", str(urdf), str(halves), "-o", str(robot)]) == 0
+    assert "the recording can be used with it" in capsys.readouterr().out
+    assert main(["info", str(halves), "--robot", str(robot)]) == 0
+    out = capsys.readouterr().out
+    assert "The recording can be used for arm." in out and "not finite" not in out and "left out" not in out
+    assert main(["calibrate", str(robot), str(halves), "-o", str(found), "--json", str(told)]) == 0
+    values = json.loads(told.read_text())["parameters"]
+    for joint in rows:
+        for name, true in TRUE.items():
+            got = values[f"{joint}.{name}"]
+            assert abs(got["value"] - true) < max(0.01 * true, 3.5 * got["sigma"]), name
+    assert "Yes, this calibration is good" in capsys.readouterr().out
+    assert main(["replay", str(found), str(halves)]) == 0
+    out = capsys.readouterr().out
+    assert f"All {_instants(rows) + len(arm[2].times)} messages went in" in out
+    assert "ok Agrees with the batch smoother" in out
+
+
+def test_each_joint_has_its_own_samples_and_nothing_else(arm, halves, tmp_path):
+    _, urdf, motion, rows = arm
+    robot = tmp_path / "arm.yaml"
+    assert main(["init", str(urdf), str(halves), "-o", str(robot)]) == 0
+    stream = read_recording(halves, load_robot(robot)).streams["motor_encoder"]
+    (block,) = list(ArrivalReader(halves, load_robot(robot)))
+    arrived = block.values[block.names.index("motor_encoder")]
+    for j, (joint, own) in enumerate(rows.items()):
+        seen = np.isfinite(stream.measured[:, j])
+        np.testing.assert_allclose(stream.times[seen], motion.times[own], atol=1e-9)
+        assert stream.measured[seen, j].tolist() == motion.position[joint][own].tolist()
+        assert arrived[np.isfinite(arrived[:, j]), j].tolist() == motion.position[joint][own].tolist()
+
+
+@pytest.mark.parametrize("held", (True, False))
+def test_a_command_of_one_joint_leaves_those_of_the_others(arm, halves, tmp_path, held):
+    _, urdf, motion, rows = arm
+    commands = {f"/cmd#{joint}": motion.commands([joint]) | {"rows": rows[joint]} for joint in rows}
+    bag = write_arm_bag(tmp_path / "both.mcap", motion.times, {"/joint_states": motion.states(), **commands})
+    robot = tmp_path / "arm.yaml"
+    assert main(["init", str(urdf), str(halves), "-o", str(robot)]) == 0
+    text = robot.read_text()
+    assert "held: false" in text
+    robot.write_text(text.replace("held: false", f"held: {str(held).lower()}"))
+    stream = read_recording(bag, load_robot(robot)).streams["command"]
+    (block,) = list(ArrivalReader(bag, load_robot(robot)))
+    online = block.values[block.names.index("command")]
+    assert len(stream) == len(online) == _instants(rows)
+    for j, (joint, own) in enumerate(rows.items()):
+        times, given = motion.times[own], motion.effort[joint][own]
+        if held:
+            expected = given[np.maximum(np.searchsorted(times, stream.times + 1e-9, side="right") - 1, 0)]
+            np.testing.assert_array_equal(stream.values[1:, j], expected[1:])
+            np.testing.assert_array_equal(online[1:, j], expected[1:])
+        else:
+            on_the_way = np.interp(stream.times, times, given)
+            np.testing.assert_allclose(online[:, j], on_the_way, atol=1e-6)
+            own_rows = np.isin(np.round(1e6 * stream.times), np.round(1e6 * times))
+            np.testing.assert_array_equal(stream.values[own_rows, j], given)
+
+
+def test_a_list_that_is_shorter_than_its_names_is_said_with_both_lengths(arm, tmp_path, capsys):
+    _, urdf, motion, _ = arm
+    command = motion.commands(["shoulder", "elbow"])
+    command["effort"] = command["effort"][:, :1]
+    bag = write_arm_bag(tmp_path / "short.mcap", motion.times, {"/joint_states": motion.states(), "/cmd": command})
+    assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 1
+    assert (
+        "/cmd has 1 value in `effort` for 2 names (shoulder, elbow); expected one for each" in capsys.readouterr().err
+    )
+
+
+def test_a_relay_of_the_commands_changes_nothing(arm, tmp_path, capsys):
+    _, urdf, motion, _ = arm
+    every, late = np.arange(len(motion.times)), np.arange(0, len(motion.times) - 20, 2)
+    command = motion.commands(["shoulder", "elbow"])
+    relay = command | {"rows": late, "stamped": lambda stamp: stamp + 61_000_000}
+    topics = {"/joint_states": motion.states(), "/cmd": command | {"rows": every}, "/cmd#relay": relay}
+    bag = write_arm_bag(tmp_path / "relay.mcap", motion.times, topics)
+    assert main(["init", str(urdf), str(bag), "-o", str(tmp_path / "arm.yaml")]) == 0
+    assert (
+        f"left out {len(late)} messages of a second node that repeats those of the driver 61" in capsys.readouterr().out
+    )
+    recording = read_recording(bag, load_robot(tmp_path / "arm.yaml"))
+    assert recording.streams["command"].values[:, 0].tolist() == motion.effort["shoulder"].tolist()
+    (block,) = list(ArrivalReader(bag, load_robot(tmp_path / "arm.yaml")))
+    assert len(block) == 2 * len(every)
