@@ -21,6 +21,7 @@ from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.held_back.encoder_filters import (
     free_filters,
+    lacking_filter,
     solved_with_filters,
     with_filters,
 )
@@ -144,7 +145,9 @@ def _calibrated(
     else:
         calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
-    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
+    stated = {e.name: e.sigmas for e in (seen.motor_encoder, seen.link_encoder) if e is not None}
+    anew = near is None and not biases_only
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated)
     solved = stage.solve(problems, noise, calibrations)
     solved = solved_with_filters(stage, solved, filters) if filters else solved
     if not biases_only and not standstill:
@@ -155,7 +158,7 @@ def _calibrated(
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        result = _asked_for_causes(result, solved, effects=memory)
+        result = _asked_for_causes(result, solved, stage if memory else None)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -170,10 +173,13 @@ def _calibrated(
     return result
 
 
-def _asked_for_causes(result: CalibrationResult, solved: Solved, effects: bool) -> CalibrationResult:
-    """With what a linear step says of late signals, of masses and, where it is wanted, of the whole catalogue."""
+def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeStage | None) -> CalibrationResult:
+    """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
     test = ScoreTest.of(*solved.of_motions)
-    lacking = lacking_effects(test) if effects else ()
+    lacking = lacking_effects(test) if stage else ()
+    smoothed = lacking_filter(stage, solved) if stage else None
+    if smoothed is not None and smoothed.moved(result.found):
+        lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
     return replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
 
 

@@ -11,18 +11,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.calibration.whole_stage import WholeStage, anchored
+from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.errors import SolveError
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.robot import Robot
 
 TRIED = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0]) * 1e-3  # [s] time constants of first order
 ITERATIONS = 12  # of each trial
 PARABOLAS = 3  # at the most
+FAR = 4.0  # times the lowest cost, beyond which no longer filter is tried
+SURELY = 5.0  # [sigma] from which a delay is one
+LABEL = "encoder_filter@robot"
 NEAR = 0.03  # relative change of a variance that changes nothing
 ROUNDS = 3  # of a filter, and of the noise that is found with it
 
@@ -52,7 +58,7 @@ def solved_with_filters(stage: WholeStage, held: Solved, names: tuple[str, ...])
     for _ in range(ROUNDS):
         before = dict(values)
         for name in names:
-            values = _Trials(stage, held, values, name).best()
+            values = {**values, name: _Trials(stage, held, with_filters(held.robot, values, True), name).best()}
         robot = with_filters(held.robot, values, fixed=True)
         held = _settled(stage, held, robot)
         if all(abs(values[name] - before[name]) < NEAR * before[name] for name in names):
@@ -69,34 +75,80 @@ def _settled(stage: WholeStage, solved: Solved, robot: Robot) -> Solved:
     return stage.settled(problems, noise, Estimate(estimate.states, calibrations))
 
 
+def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
+    """Filters of all encoders, where a delay was found and the same noise makes them likelier than none.
+
+    A linear step does not tell: it freezes the moments at which joints turn over, and a filter moves them.
+
+    Args:
+        stage: solves.
+        solved: a solution without filters.
+    """
+    robot = solved.robot
+    if not _is_late(robot, solved) or any(isinstance(here.effect, SmoothedReading) for here in robot.effects):
+        return None
+    effect, owner = LABEL.split("@")
+    with_one = add_effect(robot, LABEL)
+    (name,) = free_filters(with_one)
+    trials = _Trials(stage, solved, with_filters(with_one, {name: float(TRIED[0]) ** 2}, True), name)
+    best = trials.best()
+    fall = solved.solution.cost - trials.costs[best]
+    if not trials.is_between(best) or not fall > 0.0:
+        return None
+    calibration = trials.found[best].calibrations[0]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    return LackingEffect(effect, owner, float(chdtrc(1.0, 2.0 * fall)), fall, values, tried=True)
+
+
+def _is_late(robot: Robot, solved: Solved) -> bool:
+    """Whether the calibration found a delay that is one."""
+    names = solved.solution.estimate.calibrations[0].names
+    sigmas = np.sqrt(np.diag(solved.covariance))
+    found = dict(zip(names, solved.solution.estimate.calibrations[0].values.tolist(), strict=True))
+    late = [i for i, n in enumerate(names) if n in robot.parameters and n.endswith(".delay")]
+    return any(found[names[i]] > SURELY * sigmas[i] for i in late)
+
+
 @dataclass
 class _Trials:
-    """Costs by the variance of one filter, all other values free, the noise as it is."""
+    """Costs by the variance of one filter, all other values free, the noise as it is.
+
+    Attributes:
+        stage: solves.
+        solved: where to start, and the noise.
+        robot: the model with all filters held.
+        name: of the variance that is tried.
+        costs, found: by variance.
+    """
 
     stage: WholeStage
     solved: Solved
-    values: dict[str, float]
+    robot: Robot
     name: str
     costs: dict[float, float] = field(default_factory=dict)
+    found: dict[float, Estimate] = field(default_factory=dict)
 
-    def best(self) -> dict[str, float]:
-        """All variances, with that of this filter where the cost is lowest."""
-        start = self.solved.solution.estimate
-        estimate = start
-        for variance in sorted({*(TRIED**2).tolist(), self.values[self.name]}):
+    def best(self) -> float:
+        """The variance at which the cost is lowest."""
+        start = estimate = self.solved.solution.estimate
+        for variance in sorted({*(TRIED**2).tolist(), self.robot.parameters[self.name].value}):
             estimate = self._tried(variance, estimate)
-            if self.costs[variance] > max(4.0 * min(self.costs.values()), 1.0):
-                break  # far beyond
+            if self.costs[variance] > FAR * min(self.costs.values()):
+                break
         for _ in range(PARABOLAS):
             lowest = min(self.costs, key=self.costs.__getitem__)
             between = _vertex(self.costs, lowest)
             if between is None or abs(between - lowest) < NEAR * lowest:
                 break
-            self._tried(between, start)
-        return {**self.values, self.name: min(self.costs, key=self.costs.__getitem__)}
+            self._tried(between, self.found.get(lowest, start))
+        return min(self.costs, key=self.costs.__getitem__)
+
+    def is_between(self, variance: float) -> bool:
+        """Whether larger and smaller ones were tried and cost more."""
+        return min(self.costs) < variance < max(self.costs)
 
     def _tried(self, variance: float, estimate: Estimate) -> Estimate:
-        robot = with_filters(self.solved.robot, {**self.values, self.name: variance}, fixed=True)
+        robot = with_filters(self.robot, {self.name: variance}, fixed=True)
         problems = anchored([p.of_robot(robot) for p in self.solved.problems], estimate.calibrations)
         noise = self.solved.problems[0].dynamics.steps.noise
         try:
@@ -104,7 +156,7 @@ class _Trials:
         except SolveError:
             self.costs[variance] = float("inf")
             return estimate
-        self.costs[variance] = solution.cost
+        self.costs[variance], self.found[variance] = solution.cost, solution.estimate
         return solution.estimate
 
 
