@@ -65,7 +65,7 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
     lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
     highest = np.max([_roughness(fit.stream.measured) for fit in fits], axis=0)
     for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
-        wanted, white = float(sigmas[j] * np.sqrt(chi2[j])), all(fit.is_white(j) for fit in fits)
+        wanted, white = float(sigmas[j] * np.sqrt(chi2[j])), all(fit.is_white(int(j)) for fit in fits)
         if wanted < sigmas[j]:  # hides nothing, whatever colour is left
             sigmas[j] = min(max(wanted, lowest[j]), sigmas[j])
         else:

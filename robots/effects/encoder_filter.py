@@ -11,7 +11,7 @@ EFFECT = SmoothedReading(
     owners=("joint", "robot"),
     variance="variance",
     parameters=(EffectParameter("variance", "s^2", start=5e-5, prior_sigma=1e-3, sign="+", logarithmic=True),),
-    example={"variance": 4e-5},
+    example={"variance": 1e-4},
     card=Card(
         title="encoder smoothed by a filter",
         law="reading(t) = q_motor(t) + variance/2 q_motor''(t), with the variance of the filter's weights over time: "

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from jointscope.graphs.calibration.held_back.turned_mounting import held, released, turned_without_reason
+from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 
 
 def result(doggy, angle, chi2):
