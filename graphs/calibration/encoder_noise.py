@@ -4,9 +4,9 @@
     sigma^2 <- sigma^2 times sum of squares / (samples - leverages)
 
 where residuals are white: they are noise, and as large as they are. Coloured residuals are something that the model
-lacks, and no sigma may hide it. For the same reason none is raised beyond what neighbouring samples differ by: a
-missing effect bends the motion, it does not make samples jump. Process noise is estimated in the same way beside it,
-see noise_estimation.py.
+lacks, and no sigma may hide it; but one that had fallen may come back to what was stated. For the same reason none is
+raised beyond what neighbouring samples differ by: a missing effect bends the motion, it does not make samples jump.
+Process noise is estimated in the same way beside it, see noise_estimation.py.
 """
 
 from __future__ import annotations
@@ -44,13 +44,18 @@ class EncoderFit:
     stream: Stream
     series: ResidualSeries
 
+    def is_white(self, channel: int) -> bool:
+        """Whether what is left of a channel has no memory."""
+        return _is_white(self.series.measured[:, channel] - self.series.predicted[:, channel])
 
-def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]) -> Array:
+
+def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit], stated: Array) -> Array:
     """Sigma of each channel that the residuals ask for, shape (n,); as it was where they do not tell.
 
     Args:
         encoder: with the sigmas that were used.
         fits: of all recordings.
+        stated: sigmas before any was found anew, shape (n,).
     """
     sigmas = encoder.sigmas.copy()
     if not encoder.estimate_sigma or not fits:
@@ -60,14 +65,13 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
     lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
     highest = np.max([_roughness(fit.stream.measured) for fit in fits], axis=0)
     for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
-        # a smaller sigma hides nothing, whatever colour is left
-        if chi2[j] < AGREES[0] or all(
-            _is_white(fit.series.measured[:, j] - fit.series.predicted[:, j]) for fit in fits
-        ):
-            wanted = float(sigmas[j] * np.sqrt(chi2[j]))
-            bounded = max(wanted, lowest[j]) if wanted < sigmas[j] else min(wanted, highest[j])
-            # a bound may lie beyond what is there already
-            sigmas[j] = min(bounded, sigmas[j]) if wanted < sigmas[j] else max(bounded, sigmas[j])
+        wanted, white = float(sigmas[j] * np.sqrt(chi2[j])), all(fit.is_white(int(j)) for fit in fits)
+        if wanted < sigmas[j]:  # hides nothing, whatever colour is left
+            sigmas[j] = min(max(wanted, lowest[j]), sigmas[j])
+        else:
+            # one that fell where states followed the samples, while the noise of the motion was loose, may come back
+            bound = max(highest[j] if white else 0.0, stated[j])
+            sigmas[j] = max(min(wanted, bound), sigmas[j])
     return sigmas
 
 

@@ -8,7 +8,7 @@ from below: a smaller one that agrees with its own residuals is the better expla
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -78,6 +78,7 @@ class WholeStage:
         sigmas: whether the sigmas of encoders are estimated, too.
         solver: minimises the cost of all samples.
         sets: recordings of other kinds, which share the values of the motions from here on.
+        stated: sigmas of encoders before any was found anew, by sensor, shape (n,) each; those at hand where empty.
     """
 
     hold: tuple[str, ...]
@@ -86,6 +87,7 @@ class WholeStage:
     sigmas: bool
     solver: Solver = solve
     sets: Sequence[SetProblem] = ()
+    stated: Mapping[str, Array] = field(default_factory=dict)
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -126,7 +128,7 @@ class WholeStage:
             _must_converge(solution, problems[0].robot, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
-            other = _with_sigmas(problems, solved) if self.sigmas else None
+            other = _with_sigmas(problems, solved, self.stated) if self.sigmas else None
             better = scaled(noise, solved.evidence.factors) if noise.estimate else noise
             if other is None and np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
                 break
@@ -236,12 +238,14 @@ def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]
     return placed(problems, values)
 
 
-def _with_sigmas(problems: Sequence[BagProblem], solved: Solved) -> list[BagProblem] | None:
+def _with_sigmas(
+    problems: Sequence[BagProblem], solved: Solved, stated: Mapping[str, Array]
+) -> list[BagProblem] | None:
     """The problems with the sigmas of encoders that the residuals ask for; None where all are as they were."""
     robot, changed = problems[0].robot, {}
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
-            found = solved.encoder_sigmas(encoder)
+            found = solved.encoder_sigmas(encoder, stated.get(encoder.name, encoder.sigmas))
             if np.any(np.abs(np.log(found / encoder.sigmas)) > SIGMA_AGREES):
                 changed[encoder.name] = replace(encoder, sigmas=found)
     if not changed:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.interpolated import interpolate
+from jointscope.factors.interpolated import interpolate, smoothed
 from jointscope.graphs.comparison.causal_filter import FilteredStates
 from jointscope.graphs.comparison.noise_floor import are_judged, settled_from
 from jointscope.graphs.comparison.prediction import Predictor
@@ -55,12 +55,14 @@ class _Group:
         channels: indices of the channels.
         taken: when the samples were really taken, shape (m,) [s].
         accelerated: whether it feels the accelerations of the links, too.
+        variance: over time, of the weights of the filter that smoothed them [s^2].
     """
 
     sensor: str
     channels: NDArray[np.intp]
     taken: Array
     accelerated: bool
+    variance: float
 
     def steps(self, timeline: Timeline, times: Array) -> NDArray[np.intp]:
         """Steps in which samples at these times were taken."""
@@ -71,6 +73,8 @@ class _Group:
     ) -> Array:
         """What its factor asks for: states between two ticks, with accelerations behind them where it feels them."""
         x = _between(problem, step, times, *ends)
+        if self.variance:
+            smoothed(problem.robot.layout, x, *ends, problem.timeline.h[step], self.variance)
         return predictor.with_accelerations(x, step) if self.accelerated else x
 
 
@@ -130,8 +134,10 @@ def _groups(problem: BagProblem) -> list[_Group]:
     for name, sensor in problem.robot.sensors.items():
         stamps = problem.recording.streams[name].times
         for channels, late in late_channels(problem.robot, name):
-            taken = stamps - Lateness.of(problem.robot, late, stamps).anchor
-            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer)))
+            lateness = Lateness.of(problem.robot, late, stamps)
+            variance = lateness.variance({name: p.value for name, p in problem.robot.parameters.items()})[0]
+            taken = stamps - lateness.anchor
+            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer), variance))
     return found
 
 

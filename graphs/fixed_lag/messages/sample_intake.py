@@ -14,9 +14,8 @@ from jointscope.graphs.fixed_lag.messages.status import EstimatorStatus, EventLo
 from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import EstimatorError
-from jointscope.robots.model.lateness import late_channels
+from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro
@@ -125,7 +124,8 @@ class SampleIntake:
                 taken = t - _lateness(effects, t, self._values) if effects else t
                 whole = len(channels) == len(found)
                 chosen = (found, sigma) if whole else (found[channels], sigma[channels])
-                result.append(Observation(name, t, taken, channels, *chosen))
+                variance = Lateness(effects, found, found).variance(self._values)[0]
+                result.append(Observation(name, t, taken, channels, *chosen, variance))
         return result
 
     def forget_stamps(self) -> None:
@@ -183,9 +183,5 @@ def _useless(numbers: list[float]) -> list[int]:
 
 def _lateness(effects: tuple[EffectAt, ...], t: float, values: dict[str, float]) -> float:
     """How late a stamp is by the effects of the robot file [s]."""
-    total, stamp = 0.0, np.array([t])
-    for here in effects:
-        assert isinstance(here.effect, TimeShift)
-        own = {p.name: values[here.parameter(p.name)] for p in here.effect.parameters}
-        total += float(here.effect.late(stamp, own)[0][0])
-    return total
+    stamp = np.array([t])
+    return float(Lateness(effects, stamp, np.zeros(1)).since_anchor(values)[0][0])
