@@ -20,8 +20,11 @@ BLOCK = re.compile(
 
 @pytest.fixture
 def run(simulated, doggy, tmp_path, monkeypatch):
-    """Runs the example of a page beside a recording; its names and what it printed."""
+    """Runs the example of a page beside recordings; its names and what it printed."""
+    (tmp_path / "demo").mkdir()  # as the demo leaves it
     write_bag(tmp_path / "train.mcap", simulated.recording.between(4.0, 5.5), doggy)
+    write_bag(tmp_path / "demo" / "train.mcap", simulated.recording.between(4.0, 5.5), doggy)
+    write_bag(tmp_path / "demo" / "test.mcap", simulated.recording.between(5.5, 6.5), doggy)
     monkeypatch.chdir(tmp_path)
 
     def example(page, index=0):

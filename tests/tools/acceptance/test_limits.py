@@ -153,3 +153,20 @@ def test_a_file_without_lines_is_refused(tmp_path, text):
     (tmp_path / "limits.yaml").write_text(text)
     with pytest.raises(RobotError, match=r"limits\.yaml"):
         read_limits(tmp_path / "limits.yaml")
+
+
+@pytest.mark.parametrize(
+    "name, content, words",
+    [
+        ("absent.yaml", None, r"^cannot read the limits file .*absent\.yaml: No such file or directory$"),
+        ("bag.mcap", b"\x89MCAP0\xff", r"bag\.mcap is not a limits file: it is not text$"),
+        ("arm.urdf", b"<robot name='a'>\n  <link: [</robot>", r"^arm\.urdf is a URDF and no limits file$"),
+        ("broken.yaml", b"limits: [", r"^broken\.yaml is not YAML: line 1, column 10: "),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_called_a_limits_file(tmp_path, name, content, words):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(RobotError, match=words) as raised:
+        read_limits(tmp_path / name)
+    assert "robot file" not in str(raised.value)
