@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -23,7 +24,7 @@ from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.simulator.simulation import Simulation
 from jointscope.tools.verb_parts import result_files
 from jointscope.tools.verb_parts.result_files import ResultFiles
-from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.judgement import Judgement, judge
 from jointscope.tools.verdicts.replay_judgement import judge_replay
 from jointscope.tools.writing.whole_file import write_json
 
@@ -75,9 +76,14 @@ class Calibrated(_Limited, CalibrationResult):
             raise RobotError(f"{self.robot.name} has no parameter {name}; it has {', '.join(found)}")
         return found[name]
 
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The verdict, and every check that was made with its outcome and reason."""
+        return judge(self)
+
     def answer(self) -> str:
-        """Whether the result is good."""
-        return judge(self).headline
+        """Whether the result is good, and below it a line for each reason to doubt it."""
+        return self.judgement.answer
 
     def rows(self) -> list[Row]:
         """A record for each parameter."""
@@ -211,9 +217,14 @@ class Discovered(_Found, Discovery):
 class Replayed(_Found, ReplayResult):
     """The estimator over a recording."""
 
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The verdict, and every check that was made with its outcome and reason."""
+        return judge_replay(self)
+
     def answer(self) -> str:
-        """Whether the estimator can be trusted."""
-        return judge_replay(self).headline
+        """Whether the estimator can be trusted, and below it a line for each reason to doubt it."""
+        return self.judgement.answer
 
     def rows(self) -> list[Row]:
         """A record for each kept tick: states and their sigmas."""
