@@ -29,6 +29,22 @@ def test_the_make_targets_that_are_named_exist():
         assert set(re.findall(r"`make ([\w-]+)", text_of(page))) <= targets, page
 
 
+@pytest.mark.parametrize("page", [*PAGES, *sorted((ROOT / "examples").rglob("*.md"))], ids=named)
+def test_every_block_of_commands_names_what_executes_it(page):
+    """A test that knows the page or its mark, or a target of make; what it names is there."""
+    lines = text_of(page).splitlines()
+    blocks = [i for i, line in enumerate(lines) if re.match(r"```(bash|sh|console|python)\b", line)]
+    for i in blocks:
+        mark = re.fullmatch(r"<!-- executed by (\S+)(?: (\S+))? -->", lines[i - 1])
+        assert mark, f"{named(page)}:{i + 1}"
+        if mark[1] == "make":
+            targets = [mark[2]] if mark[2] else re.findall(r"^make ([\w-]+)", "\n".join(lines[i:]), re.MULTILINE)
+            assert targets and all(re.search(f"^{t}:", text_of(ROOT / "Makefile"), re.MULTILINE) for t in targets)
+        else:
+            test = text_of(ROOT / mark[1])
+            assert "page_commands" in test or page.name in test, f"{named(page)}:{i + 1}"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_links_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text_of(page)):
