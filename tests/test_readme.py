@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from page_commands import EXECUTED, PAGES, ROOT, check_commands, named, text_of
+from page_commands import EXECUTED, PAGES, ROOT, check_commands, named, pictures, text_of
 
 pytest.importorskip("mujoco", reason="the pages simulate their recordings")
 
@@ -43,6 +43,16 @@ def test_every_block_of_commands_names_what_executes_it(page):
         else:
             test = text_of(ROOT / mark[1])
             assert "page_commands" in test or page.name in test, f"{named(page)}:{i + 1}"
+
+
+@pytest.mark.parametrize("name", ["first_steps", "is_it_good", "export", "notebook", "rests"])
+def test_pages_show_what_their_commands_draw(name):
+    page = ROOT / "docs" / f"{name}.md"
+    assert pictures(page)
+    folders = {made.parts[0] for made in pictures(page).values() if len(made.parts) > 1}
+    assert all(re.search(rf"--figures {folder}\b", text_of(page)) for folder in folders)
+    files = [made.name for made in pictures(page).values() if len(made.parts) == 1]
+    assert all(re.search(rf"savefig\(\"{file}\"\)", text_of(page)) for file in files)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)

@@ -33,6 +33,23 @@ def lines_of(block: str) -> list[str]:
     return [line for line in lines if line.strip()]
 
 
+PICTURE = re.compile(r"\]\((?:\.\./)?pictures/(?:pages|robots)/([\w.-]+)\)")
+TITLE = re.compile(r"<text class=\"title\"[^>]*>([^<]*)")
+
+
+def pictures(page: Path) -> dict[str, Path]:
+    """Pictures that a page shows and that its commands write: FOLDER-FILE.svg is FILE.svg in what --figures names."""
+    return {name: Path(*name.split("-", 1)) for name in PICTURE.findall(text_of(page))}
+
+
+def check_pictures(page: Path, folder: Path) -> None:
+    """The commands have drawn what the page shows; numbers in a drawing are those of the machine that drew it."""
+    for name, made in pictures(page).items():
+        (kept,) = (ROOT / "docs" / "pictures").glob(f"*/{name}")
+        assert "<svg" in text_of(folder / made), name
+        assert TITLE.findall(text_of(folder / made)) == TITLE.findall(text_of(kept)), name
+
+
 def named(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
@@ -56,3 +73,4 @@ def check_commands(page: Path, folder: Path) -> None:
         assert done.stderr == "", command
     files = {name for command in commands(page) for name in re.findall(r"[\w.]+\.(?:mcap|yaml|html|rrd|csv)", command)}
     assert files <= {file.name for file in folder.rglob("*")}
+    check_pictures(page, folder)

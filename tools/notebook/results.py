@@ -29,6 +29,7 @@ from jointscope.tools.verdicts.replay_judgement import judge_replay
 from jointscope.tools.writing.whole_file import write_json
 
 TOLD = 12  # candidates in a figure
+FEW_DECADES = 100.0  # of a logarithmic axis that has room for ticks between them
 
 
 class _Found(Shown):
@@ -135,8 +136,15 @@ class Compared(_Limited, ComparisonResult):
             errors = [m.channels[name].horizons["0.1"] / m.channels[name].noise_sigma for name in names]
             axes.bar(np.arange(len(names)) + k * width, errors, width, label=m.label)
         axes.set_xticks(np.arange(len(names)), names, rotation=45, ha="right")
-        axes.set(yscale="log", ylabel="error 0.1 s ahead [sigma]")
-        axes.legend()
+        shown = [patch.get_height() for patch in axes.patches]
+        low, high = min(0.5, 0.8 * min(shown)), max(3.0, 1.3 * max(shown))  # differences of noise look small
+        steps = (1, 2, 5) if high < FEW_DECADES * low else (1,)
+        ticks = [m * 10.0**k for k in range(-3, 9) for m in steps if low <= m * 10.0**k <= high]
+        axes.set(yscale="log", ylim=(low, high), ylabel="error 0.1 s ahead [sigma]")
+        axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.axhline(1.0, color="0.3", linestyle=":", linewidth=1.0)
+        axes.legend(fontsize="x-small", ncols=len(self.models), loc="upper right")
 
     def write(self, files: ResultFiles) -> None:
         """Report, viewer recording, JSON."""

@@ -114,6 +114,25 @@ def test_figures_need_no_display(results, tmp_path, monkeypatch):
     assert not importlib.import_module("matplotlib.pyplot").get_fignums()
 
 
+@pytest.mark.parametrize("worst, labels", [(1.04, ["0.5", "1", "2"]), (480.0, ["1", "10", "100"])])
+def test_errors_near_the_noise_are_drawn_on_an_axis_on_which_they_look_alike(worst, labels):
+    pyplot = pytest.importorskip("matplotlib.pyplot", reason="comes with the extra plot")
+    comparison = Compared.of(fake_comparison())
+    errors = np.linspace(0.97, worst, len(comparison.models[0].channels))
+
+    def scaled(model):
+        pairs = zip(model.channels.items(), errors, strict=True)
+        return {n: dataclasses.replace(c, horizons={**c.horizons, "0.1": e * c.noise_sigma}) for (n, c), e in pairs}
+
+    models = tuple(dataclasses.replace(m, channels=scaled(m)) for m in comparison.models)
+    figure, axes = pyplot.subplots()
+    dataclasses.replace(comparison, models=models).draw(axes)
+    low, high = axes.get_ylim()
+    assert low <= 0.5 and high >= max(3.0, worst)
+    assert [label.get_text() for label in axes.get_yticklabels()] == labels
+    pyplot.close(figure)
+
+
 def test_a_figure_is_drawn_into_axes_that_are_given(results):
     """With a stand-in for axes, so that the curves are looked at where matplotlib is not installed, too."""
     calibrated = results[0]
