@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.files.robot_writer import robot_text
 from jointscope.tools.bags.write_bag import write_bag
 
 ROOT = Path(__file__).parents[3]
@@ -25,6 +26,8 @@ def run(simulated, doggy, tmp_path, monkeypatch):
     write_bag(tmp_path / "train.mcap", simulated.recording.between(4.0, 5.5), doggy)
     write_bag(tmp_path / "demo" / "train.mcap", simulated.recording.between(4.0, 5.5), doggy)
     write_bag(tmp_path / "demo" / "test.mcap", simulated.recording.between(5.5, 6.5), doggy)
+    for name in ("found.yaml", "found.step0.yaml"):
+        (tmp_path / "demo" / name).write_text(robot_text(doggy, tmp_path / "demo"))
     monkeypatch.chdir(tmp_path)
 
     def example(page, index=0):
