@@ -33,7 +33,9 @@ def test_the_make_targets_that_are_named_exist():
 def test_every_block_of_commands_names_what_executes_it(page):
     """A test that knows the page or its mark, or a target of make; what it names is there."""
     lines = text_of(page).splitlines()
-    blocks = [i for i, line in enumerate(lines) if re.match(r"```(bash|sh|console|python)\b", line)]
+    typed = re.compile(r"(jointscope|python|pip|make) ")
+    fences = [i for i, line in enumerate(lines) if line.startswith("```")][::2]
+    blocks = [i for i in fences if re.match(r"```(bash|sh|console|python)\b", lines[i]) or typed.match(lines[i + 1])]
     for i in blocks:
         mark = re.fullmatch(r"<!-- executed by (\S+)(?: (\S+))? -->", lines[i - 1])
         assert mark, f"{named(page)}:{i + 1}"

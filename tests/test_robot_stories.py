@@ -11,14 +11,15 @@ from page_commands import ROOT, check_pictures, lines_of, pictures, run, text_of
 DATA = ROOT.parent / "shared" / "data"
 BLOCK = re.compile(r"<!-- executed by tests/test_robot_stories.py -->\n```bash\n(.*?)```", re.DOTALL)
 PAGES = {page.stem: page for page in sorted((ROOT / "docs").rglob("*.md")) if BLOCK.search(text_of(page))}
-RECORDINGS = {"rests": "biorob"}  # where the folder is not called as the page
+RECORDINGS = {"rests": "biorob", "hebi": "real/hebi_arms_mit", "kr300": "real/kr300", "xl330": "real/bam_xl330"}
+WITH_PICTURES = ("biorob", "rests", "tx90l")
 
 
 def test_there_are_stories():
-    assert {"biorob", "rests", "tx90l"} <= PAGES.keys()
+    assert {*RECORDINGS, *WITH_PICTURES} <= PAGES.keys()
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", WITH_PICTURES)
 def test_every_picture_of_a_story_is_there(name):
     shown = pictures(PAGES[name])
     assert shown
