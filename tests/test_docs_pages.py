@@ -34,11 +34,13 @@ def test_the_limits_of_their_page_are_checked_as_it_says(tmp_path):
         "cp arm.yaml arm_january.yaml",
     ):
         assert run(command, tmp_path).returncode == 0
-    for command in lines_of(block):
+    printed = re.findall(r"^  (pass|fail|not evaluated) +(\S+)", text, re.MULTILINE)
+    for k, command in enumerate(lines_of(block)):
         done = run(f"{command} --json told.json", tmp_path)
         (lines,) = json.loads((tmp_path / "told.json").read_text())["acceptance"].values()
         outcomes = [line["outcome"] for line in lines]
         assert len(outcomes) >= limits.count("- {")
+        assert k or [(line["outcome"], line["name"]) for line in lines] == printed
         assert done.returncode == (FAILED if FAIL in outcomes else UNDECIDED if OPEN in outcomes else 0)
         assert done.returncode in (FAILED, UNDECIDED)  # no command computes what every line is about
         assert done.stderr == ""

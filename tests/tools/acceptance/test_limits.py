@@ -73,6 +73,14 @@ def test_outcomes(tmp_path, line, expected):
     assert found[1]
 
 
+@pytest.mark.parametrize(
+    "horizon, words", [("0.1", "no error 0.1 s ahead; "), ("open_loop", "no error in the open loop; ")]
+)
+def test_an_error_that_is_not_there_is_named_with_its_horizon(tmp_path, horizon, words):
+    line = f"channel: joint1.motor_position, horizon: {horizon}, error: 0.02"
+    assert outcome(tmp_path, line) == (OPEN, f"this result has {words}`jointscope compare` has it")
+
+
 def test_a_pattern_is_checked_on_every_name_that_fits(tmp_path):
     limits = limits_of(tmp_path, 'parameter: "joint*.stiffness", sigma_percent: 4.9, because: bench')
     assert [(line.name, line.outcome) for line in check_limits(limits, CONTENT)] == [
