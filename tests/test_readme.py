@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from page_commands import EXECUTED, PAGES, ROOT, check_commands, named, text_of
+from page_commands import EXECUTED, PAGES, ROOT, check_commands, named, pictures, text_of
 
 pytest.importorskip("mujoco", reason="the pages simulate their recordings")
 
@@ -27,6 +27,34 @@ def test_the_make_targets_that_are_named_exist():
     targets = set(re.findall(r"^([\w-]+):", makefile, re.MULTILINE))
     for page in PAGES:
         assert set(re.findall(r"`make ([\w-]+)", text_of(page))) <= targets, page
+
+
+@pytest.mark.parametrize("page", [*PAGES, *sorted((ROOT / "examples").rglob("*.md"))], ids=named)
+def test_every_block_of_commands_names_what_executes_it(page):
+    """A test that knows the page or its mark, or a target of make; what it names is there."""
+    lines = text_of(page).splitlines()
+    typed = re.compile(r"(jointscope|python|pip|make) ")
+    fences = [i for i, line in enumerate(lines) if line.startswith("```")][::2]
+    blocks = [i for i in fences if re.match(r"```(bash|sh|console|python)\b", lines[i]) or typed.match(lines[i + 1])]
+    for i in blocks:
+        mark = re.fullmatch(r"<!-- executed by (\S+)(?: (\S+))? -->", lines[i - 1])
+        assert mark, f"{named(page)}:{i + 1}"
+        if mark[1] == "make":
+            targets = [mark[2]] if mark[2] else re.findall(r"^make ([\w-]+)", "\n".join(lines[i:]), re.MULTILINE)
+            assert targets and all(re.search(f"^{t}:", text_of(ROOT / "Makefile"), re.MULTILINE) for t in targets)
+        else:
+            test = text_of(ROOT / mark[1])
+            assert "page_commands" in test or page.name in test, f"{named(page)}:{i + 1}"
+
+
+@pytest.mark.parametrize("name", ["first_steps", "is_it_good", "export", "notebook", "rests"])
+def test_pages_show_what_their_commands_draw(name):
+    page = ROOT / "docs" / f"{name}.md"
+    assert pictures(page)
+    folders = {made.parts[0] for made in pictures(page).values() if len(made.parts) > 1}
+    assert all(re.search(rf"--figures {folder}\b", text_of(page)) for folder in folders)
+    files = [made.name for made in pictures(page).values() if len(made.parts) == 1]
+    assert all(re.search(rf"savefig\(\"{file}\"\)", text_of(page)) for file in files)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)

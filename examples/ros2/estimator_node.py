@@ -119,6 +119,7 @@ def main() -> None:
         pass
     finally:
         node.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ EFFECT = EncoderEccentricity(
     parameters=(
         EffectParameter("cos", "rad", start=0.0, prior_sigma=0.1),
         EffectParameter("sin", "rad", start=0.0, prior_sigma=0.1),
-        EffectParameter("order", "1", start=1.0, prior_sigma=0.01, sign="+", logarithmic=True, grid=(1.0,)),
+        EffectParameter("order", "1", start=1.0, prior_sigma=0.01, sign="+", logarithmic=True, grid=(1.0,), weak=True),
     ),
     example={"cos": 0.002, "sin": 0.003, "order": 1.0},
     card=Card(

@@ -6,7 +6,6 @@ Ready robots are the YAML files below `robots/`; every other name is a path.
 
 from __future__ import annotations
 
-import io
 import os
 import shlex
 from collections.abc import Sequence
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML, YAMLError
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -35,6 +33,7 @@ from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_controller import PositionController, position_controller
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Topic
+from jointscope.robots.yaml_document import read_document
 from jointscope.robots.yaml_section import Section, did_you_mean
 
 FORMAT = 1
@@ -165,54 +164,12 @@ def with_effects(robot: Robot, labels: Sequence[str]) -> Robot:
     return replace(robot, effects=tuple(found), parameters=parameters)
 
 
-def read_document(path: Path) -> Any:
-    """The content of a YAML file with its comments.
-
-    Raises:
-        RobotError: the file cannot be read or is not YAML.
-    """
-    try:
-        document = _yaml().load(path.read_text(encoding="utf-8"))
-    except OSError as err:
-        raise RobotError(f"cannot read the robot file {path}: {err.strerror or err}") from err
-    except UnicodeDecodeError as err:
-        raise RobotError(f"{path} is not a robot file: it is not text; a robot comes first, then the bag") from err
-    except YAMLError as err:
-        if path.suffix == ".urdf" or "<robot" in path.read_text(encoding="utf-8")[:2000]:
-            raise RobotError(
-                f"{path.name} is a URDF and no robot file; make one with: jointscope init {path} BAG -o ROBOT.yaml"
-            ) from err
-        raise RobotError(f"{path.name} is not YAML: {_yaml_trouble(err)}") from err
-    return document
-
-
-def _yaml_trouble(err: YAMLError) -> str:
-    """The parser's complaint in one line, with the place in the file."""
-    mark, problem = getattr(err, "problem_mark", None), getattr(err, "problem", None)
-    text = " ".join(str(problem or err).split())[:160]
-    return f"line {mark.line + 1}, column {mark.column + 1}: {text}" if mark is not None else text
-
-
-def dump_document(document: Any) -> str:
-    """A YAML document as text, comments included."""
-    stream = io.StringIO()
-    _yaml().dump(document, stream)
-    return stream.getvalue()
-
-
 def urdf_reference(urdf: Path, folder: Path) -> str:
     """How a robot file in `folder` names a URDF: "ready:..." for those of the package, else a relative path."""
     urdf = urdf.resolve()
     if urdf.is_relative_to(READY_ROOT.resolve()):
         return READY_PREFIX + urdf.relative_to(READY_ROOT.resolve()).as_posix()
     return Path(os.path.relpath(urdf, folder.resolve())).as_posix()
-
-
-def _yaml() -> YAML:
-    yaml = YAML()
-    yaml.width = 160
-    yaml.preserve_quotes = True
-    return yaml
 
 
 def _find(name_or_path: str) -> Path:

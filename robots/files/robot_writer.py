@@ -12,11 +12,12 @@ import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from jointscope.robots.files.pose_section import write_tracker
-from jointscope.robots.files.robot_file import dump_document, urdf_reference
+from jointscope.robots.files.robot_file import urdf_reference
 from jointscope.robots.files.transmission_section import write_transmission
 from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.yaml_document import dump_document
 
 
 def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None = None) -> str:

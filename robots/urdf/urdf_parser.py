@@ -32,7 +32,7 @@ def parse_urdf(path: Path, text: UrdfText) -> tuple[pin.Model, tuple[str, ...]]:
     need_module("pinocchio")
     completed, said = text.completed, list[str]()
     try:
-        with _heard(said):
+        with heard(said):
             model = pin.buildModelFromUrdf(str(path)) if completed is None else pin.buildModelFromXML(completed)
     except Exception as err:
         reason = text.trouble or (said[0] if said else str(err).splitlines()[0])
@@ -41,7 +41,7 @@ def parse_urdf(path: Path, text: UrdfText) -> tuple[pin.Model, tuple[str, ...]]:
 
 
 @contextlib.contextmanager
-def _heard(said: list[str]) -> Iterator[None]:
+def heard(said: list[str]) -> Iterator[None]:
     """Keeps the parser's own lines, written from C++, off the screen, and collects those that name a mistake."""
     try:
         saved = os.dup(2)

@@ -56,10 +56,18 @@ class Node:
         pass
 
 
+CALLED: list[str] = []
+"""What a program did with rclpy itself."""
+
+
+def _noted(name):
+    return lambda *_: CALLED.append(name)
+
+
 def install(monkeypatch):
     """Puts the stand-ins where the example imports them from."""
     contents = {
-        "rclpy": {},
+        "rclpy": {"init": _noted("init"), "spin": _noted("spin"), "try_shutdown": _noted("try_shutdown")},
         "rclpy.node": {"Node": Node},
         "rclpy.qos": {"qos_profile_sensor_data": 10},
         "sensor_msgs": {},

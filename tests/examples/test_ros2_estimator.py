@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
+import re
+import shlex
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ros_stand_in import DiagnosticStatus, Imu, JointState, Node, install
+from ros_stand_in import CALLED, DiagnosticStatus, Imu, JointState, Node, install
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.files.robot_writer import robot_text
 from jointscope.tools.bags.needed_streams import needed_streams
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "ros2" / "estimator_node.py"
@@ -80,6 +83,26 @@ def test_states_are_those_of_the_robot_in_the_order_of_its_joints(module, doggy,
     node.timers[1.0]()
     keys = {pair.key for pair in node.published["/diagnostics"][-1].status[0].values}
     assert {"NIS joint1.motor_position", "NIS imu1.x"} <= keys
+
+
+def test_the_command_of_the_readme_starts_the_node_and_leaves_rclpy_as_it_was(module, doggy, tmp_path, monkeypatch):
+    (block,) = re.findall(r"```bash\n(.*?)```", (EXAMPLE.parent / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    python, script, *rest = shlex.split(block)
+    assert python == "python" and Path(script) == EXAMPLE.relative_to(EXAMPLE.parents[2])
+    given = dict(word.split(":=") for word in rest if ":=" in word)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / given["robot"]).write_text(robot_text(doggy, tmp_path))
+    monkeypatch.setattr(Node, "parameters", {name: yaml_value(text) for name, text in given.items()})
+    CALLED.clear()
+    module.main()
+    assert CALLED == ["init", "spin", "try_shutdown"]
+
+
+def yaml_value(text: str):
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def test_messages_for_other_joints_alone_are_not_taken(module):

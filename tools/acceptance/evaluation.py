@@ -160,11 +160,12 @@ def _of_channel(limit: Limit, _: str, entry: Mapping[str, Any]) -> _Found:
     if limit.quantity == "error":
         horizons = entry.get("horizons", {})
         if limit.horizon not in horizons:
-            known = f"; horizons are {', '.join(horizons)}" if horizons else "; `jointscope compare` tells it"
-            return _Found(missing=f"this result has no error {limit.horizon} ahead{known}")
+            known = f"; horizons are {', '.join(horizons)}" if horizons else "; `jointscope compare` has it"
+            asked = "in the open loop" if limit.horizon == "open_loop" else f"{limit.horizon} s ahead"
+            return _Found(missing=f"this result has no error {asked}{known}")
         return _number(horizons[limit.horizon])
     if limit.quantity not in entry:
-        return _Found(missing=f"this result has no {limit.quantity}; `jointscope calibrate` tells it")
+        return _Found(missing=f"this result has no {limit.quantity}; `jointscope calibrate` has it")
     return _number(entry[limit.quantity])
 
 

@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.robot_file import load_robot, read_document
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.yaml_document import read_document
 from jointscope.robots.yaml_section import Section, did_you_mean
 
 BESIDE = ("because", "horizon", "against")  # keys that say more of a limit
@@ -76,7 +77,7 @@ def read_limits(path: Path) -> tuple[Limit, ...]:
     Raises:
         RobotError: it cannot be read, a line has a mistake, or an earlier robot cannot be read.
     """
-    document = Section(read_document(path), path.name)
+    document = Section(read_document(path, "limits file"), path.name)
     lines = document.raw("limits")
     document.finish()
     if not isinstance(lines, list) or not lines:

@@ -20,15 +20,17 @@ class Exported:
         text: of the file.
         holds: what of the calibration is in it, phrases.
         lacks: what is not, by name, each with the reason and what to do.
+        warnings: what programs that read the file may stumble over, sentences.
     """
 
     text: str
     holds: tuple[str, ...]
     lacks: dict[str, str]
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, object]:
         """The same for machines, without the text."""
-        return {"holds": list(self.holds), "lacks": self.lacks}
+        return {"holds": list(self.holds), "lacks": self.lacks, "warnings": list(self.warnings)}
 
 
 def need_masses(robot: Robot) -> None:

@@ -47,7 +47,7 @@ def mujoco_model(robot: Robot) -> Exported:
 
     Raises:
         RobotError: the robot has no equations of motion.
-        SimulationError: MuJoCo is missing or cannot build it.
+        SimulationError: MuJoCo is missing, cannot build it, or refuses the text.
     """
     need_masses(robot)
     settled = bodies_as_calibrated(robot)
@@ -72,7 +72,24 @@ def mujoco_model(robot: Robot) -> Exported:
         raise SimulationError(f"MuJoCo cannot build robot {robot.name!r}: {str(err).splitlines()[0]}") from err
     gone = {here.label: why_not(here.effect, NO_ELEMENT) for here, effect in kept if effect is None}
     held = [here.label for here in robot.effects if here.label not in gone]
-    return Exported(_possible(spec.to_xml()), (*_base_model(plain), *held), {**_choices(robot), **gone})
+    text = _possible(spec.to_xml())
+    _load(text, robot.name)
+    return Exported(text, (*_base_model(plain), *held), {**_choices(robot), **gone})
+
+
+def _load(text: str, name: str) -> None:
+    """Loads what will be written: the engine rounds numbers in a file, so that compiling the specification proves less.
+
+    Raises:
+        SimulationError: MuJoCo refuses it.
+    """
+    try:
+        load_mujoco().MjModel.from_xml_string(text)
+    except ValueError as err:
+        raise SimulationError(
+            f"MuJoCo refuses the model of robot {name!r} that would be written: {str(err).splitlines()[0]}; "
+            "nothing was written"
+        ) from err
 
 
 def _possible(text: str) -> str:

@@ -13,7 +13,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
@@ -25,6 +24,8 @@ from jointscope.robots.model.structured_tree import inertia_changes
 from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
 from jointscope.tools.export.exported import Exported, need_masses, of_drives, why_not
+from jointscope.tools.export.urdf_inertia import inertia_of, write_inertial
+from jointscope.tools.export.urdf_readers import stumbling_blocks
 
 Array = NDArray[np.float64]
 NO_PLACE = "a URDF has no place for it"
@@ -40,13 +41,13 @@ def urdf_model(robot: Robot) -> Exported:
         robot: as calibrated, of motion, of poses or of both.
 
     Raises:
-        RobotError: its URDF cannot be read or lacks a joint, or masses are not known.
+        RobotError: its URDF cannot be read or lacks a joint, masses are not known, or pinocchio refuses the new file.
     """
     root = read_urdf(robot.tree.urdf)
     if robot.poses is not None:
         move_joints(root, robot)
     if not robot.motion:
-        return Exported(urdf_text(root), ("geometry",), {**_sag(robot), **_effects(robot, set())})
+        return _exported(root, robot, ("geometry",), {**_sag(robot), **_effects(robot, set())})
     need_masses(robot)
     joints = {element.get("name", ""): element for element in root.findall("joint")}
     links = {element.get("name", ""): element for element in root.findall("link")}
@@ -65,7 +66,12 @@ def urdf_model(robot: Robot) -> Exported:
     named = [here.label for here in robot.effects if here.label not in gone]
     geometry = ("geometry",) if robot.poses is not None else ()
     holds = ("inertias", *geometry, "dry friction", *springs, *named)
-    return Exported(urdf_text(root), holds, {**_sag(robot), **_drives(settled, soft), **gone})
+    return _exported(root, robot, holds, {**_sag(robot), **_drives(settled, soft), **gone})
+
+
+def _exported(root: ET.Element, robot: Robot, holds: tuple[str, ...], lacks: dict[str, str]) -> Exported:
+    text = urdf_text(root)
+    return Exported(text, holds, lacks, stumbling_blocks(root, text, robot.tree.urdf))
 
 
 def _effects(robot: Robot, held: set[str]) -> dict[str, str]:
@@ -95,38 +101,12 @@ def _change_bodies(robot: Robot, joints: Mapping[str, ET.Element], links: Mappin
 
 def _add_inertia(link: ET.Element, change: Array) -> None:
     """Changes the ten dynamic parameters of a link about its origin, in pinocchio's order, shape (10,)."""
-    parameters = _inertia_of(link).toDynamicParameters() + change
+    parameters = inertia_of(link).toDynamicParameters() + change
     mass, first = parameters[0], parameters[1:4]
     com = first / mass if mass > 0.0 else np.zeros(3)
     xx, xy, yy, xz, yz, zz = parameters[4:]
     about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    _write_inertial(link, mass, com, about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
-
-
-def _inertia_of(link: ET.Element) -> pin.Inertia:
-    inertial = link.find("inertial")
-    if inertial is None:
-        return pin.Inertia.Zero()
-    origin, mass, moments = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
-    place = {} if origin is None else origin.attrib
-    com, rpy = (np.array([float(x) for x in place.get(key, "0 0 0").split()]) for key in ("xyz", "rpy"))
-    R = pin.rpy.rpyToMatrix(*rpy)
-    entry = {} if moments is None else moments.attrib
-    xx, yy, zz, xy, xz, yz = (float(entry.get(f"i{axes}", 0.0)) for axes in ("xx", "yy", "zz", "xy", "xz", "yz"))
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return pin.Inertia(0.0 if mass is None else float(mass.get("value", 0.0)), com, R @ own @ R.T)
-
-
-def _write_inertial(link: ET.Element, mass: float, com: Array, inertia: Array) -> None:
-    inertial = link.find("inertial")
-    if inertial is None:
-        inertial = ET.SubElement(link, "inertial")
-    for child in list(inertial):
-        inertial.remove(child)
-    ET.SubElement(inertial, "origin", xyz=" ".join(f"{x:.9g}" for x in com), rpy="0 0 0")
-    ET.SubElement(inertial, "mass", value=f"{mass:.9g}")
-    places = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(inertial, "inertia", {name: f"{inertia[place]:.9g}" for name, place in places.items()})
+    write_inertial(link, mass, com, about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
 
 def _damp(element: ET.Element, robot: Robot, joint: str, soft: bool) -> set[str]:
@@ -168,7 +148,7 @@ def _split(root: ET.Element, element: ET.Element, robot: Robot, joint: str) -> N
     _set_dynamics(spring, robot.parameter(f"{joint}.damping").value, 0.0)
     child.set("link", f"{joint}_rotor")
     rotor = ET.Element("link", name=f"{joint}_rotor")
-    _write_inertial(rotor, LIGHT, np.zeros(3), _disc(axis, robot.drive_parameter(joint, "inertia").value))
+    write_inertial(rotor, LIGHT, np.zeros(3), _disc(axis, robot.drive_parameter(joint, "inertia").value))
     gazebo = ET.Element("gazebo", reference=f"{joint}_spring")
     ET.SubElement(gazebo, "springStiffness").text = f"{robot.parameter(f'{joint}.stiffness').value:.9g}"
     ET.SubElement(gazebo, "springReference").text = "0"

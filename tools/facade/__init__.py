@@ -17,17 +17,8 @@ if TYPE_CHECKING:
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.robots.files.robot_writer import robot_text
     from jointscope.tools.bags.read_recording import read_recording
-    from jointscope.tools.notebook.calls import (
-        add,
-        calibrate,
-        compare,
-        diagnose,
-        discover,
-        graph,
-        read,
-        replay,
-        simulate,
-    )
+    from jointscope.tools.notebook.calls import calibrate, compare, diagnose, discover, graph, read, replay, simulate
+    from jointscope.tools.notebook.models import add, export, info, remove
 
 __version__: str
 __all__ = [
@@ -40,10 +31,13 @@ __all__ = [
     "diagnose",
     "discover",
     "errors",
+    "export",
     "graph",
+    "info",
     "load_robot",
     "read",
     "read_recording",
+    "remove",
     "replay",
     "robot_text",
     "simulate",
@@ -51,8 +45,8 @@ __all__ = [
 
 _CALLS = "tools.notebook.calls"
 _MODULES = {
-    **dict.fromkeys(("add", "calibrate", "compare", "diagnose", "discover", "graph"), _CALLS),
-    **dict.fromkeys(("read", "replay", "simulate"), _CALLS),
+    **dict.fromkeys(("calibrate", "compare", "diagnose", "discover", "graph", "read", "replay", "simulate"), _CALLS),
+    **dict.fromkeys(("add", "export", "info", "remove"), "tools.notebook.models"),
     "CalibrationGraph": "graphs.calibration.calibration_graph",
     "FixedLagEstimator": "graphs.fixed_lag.estimator",
     "JointscopeError": "robots.errors",

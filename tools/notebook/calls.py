@@ -24,8 +24,6 @@ from jointscope.graphs.transmission.calibrate_links import calibrate_links
 from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
-from jointscope.robots.files.effects_at_once import add_effects
-from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
@@ -193,19 +191,6 @@ def discover(
         return Discovered.of(discovery_of(discover_links(model, learnt, held, **options), learnt, held))
     options |= {"missing_torque": missing_torque, "side_by_side": side_by_side}
     return Discovered.of(discovery_of(discover_motion(model, learnt, held, **options), learnt, held))
-
-
-def add(robot: AnyRobot, *effects: str) -> Robot:
-    """The robot with more effects, at their start values.
-
-    Args:
-        robot: is left as it is.
-        effects: ID@OWNER; ID@* for everything that it can act on.
-
-    Raises:
-        EffectError: an effect is unknown, is there already, or cannot act there.
-    """
-    return add_effects(robot_of(robot), effects).robot
 
 
 def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replayed:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -23,11 +24,12 @@ from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.simulator.simulation import Simulation
 from jointscope.tools.verb_parts import result_files
 from jointscope.tools.verb_parts.result_files import ResultFiles
-from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.judgement import Judgement, judge
 from jointscope.tools.verdicts.replay_judgement import judge_replay
 from jointscope.tools.writing.whole_file import write_json
 
 TOLD = 12  # candidates in a figure
+FEW_DECADES = 100.0  # of a logarithmic axis that has room for ticks between them
 
 
 class _Found(Shown):
@@ -75,9 +77,14 @@ class Calibrated(_Limited, CalibrationResult):
             raise RobotError(f"{self.robot.name} has no parameter {name}; it has {', '.join(found)}")
         return found[name]
 
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The verdict, and every check that was made with its outcome and reason."""
+        return judge(self)
+
     def answer(self) -> str:
-        """Whether the result is good."""
-        return judge(self).headline
+        """Whether the result is good, and below it a line for each reason to doubt it."""
+        return self.judgement.answer
 
     def rows(self) -> list[Row]:
         """A record for each parameter."""
@@ -129,8 +136,15 @@ class Compared(_Limited, ComparisonResult):
             errors = [m.channels[name].horizons["0.1"] / m.channels[name].noise_sigma for name in names]
             axes.bar(np.arange(len(names)) + k * width, errors, width, label=m.label)
         axes.set_xticks(np.arange(len(names)), names, rotation=45, ha="right")
-        axes.set(yscale="log", ylabel="error 0.1 s ahead [sigma]")
-        axes.legend()
+        shown = [patch.get_height() for patch in axes.patches]
+        low, high = min(0.5, 0.8 * min(shown)), max(3.0, 1.3 * max(shown))  # differences of noise look small
+        steps = (1, 2, 5) if high < FEW_DECADES * low else (1,)
+        ticks = [m * 10.0**k for k in range(-3, 9) for m in steps if low <= m * 10.0**k <= high]
+        axes.set(yscale="log", ylim=(low, high), ylabel="error 0.1 s ahead [sigma]")
+        axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+        axes.minorticks_off()
+        axes.axhline(1.0, color="0.3", linestyle=":", linewidth=1.0)
+        axes.legend(fontsize="x-small", ncols=len(self.models), loc="upper right")
 
     def write(self, files: ResultFiles) -> None:
         """Report, viewer recording, JSON."""
@@ -211,9 +225,14 @@ class Discovered(_Found, Discovery):
 class Replayed(_Found, ReplayResult):
     """The estimator over a recording."""
 
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The verdict, and every check that was made with its outcome and reason."""
+        return judge_replay(self)
+
     def answer(self) -> str:
-        """Whether the estimator can be trusted."""
-        return judge_replay(self).headline
+        """Whether the estimator can be trusted, and below it a line for each reason to doubt it."""
+        return self.judgement.answer
 
     def rows(self) -> list[Row]:
         """A record for each kept tick: states and their sigmas."""

@@ -22,7 +22,7 @@ class Shown(ABC):
 
     @abstractmethod
     def answer(self) -> str:
-        """What was found, one sentence."""
+        """What was found: a sentence, and where there are doubts a line for each below it."""
 
     @abstractmethod
     def rows(self) -> list[Row]:
@@ -61,7 +61,7 @@ class Shown(ABC):
             figure, axes = pyplot.subplots(figsize=(9.0, 4.0), layout="constrained")
             pyplot.close(figure)  # a notebook shows what is returned, not that and the open figure
         self.draw(axes)
-        axes.set_title(self.answer(), wrap=True)
+        axes.set_title(self.answer().splitlines()[0], wrap=True)
         return axes.figure
 
     def save(
@@ -93,7 +93,9 @@ class Shown(ABC):
         head = "".join(f"<th>{escape(name)}</th>" for name in rows[0]) if rows else ""
         lines = "".join(f"<tr>{''.join(map(_cell, row.values()))}</tr>" for row in rows[:SHOWN_ROWS])
         more = f"<p>{len(rows) - SHOWN_ROWS} more</p>" if len(rows) > SHOWN_ROWS else ""
-        return f"<p><b>{escape(self.answer())}</b></p><table><tr>{head}</tr>{lines}</table>{more}"
+        first, *doubts = map(escape, self.answer().splitlines())
+        told = f"<b>{first}</b>{''.join(f'<br>{doubt}' for doubt in doubts)}"
+        return f"<p>{told}</p><table><tr>{head}</tr>{lines}</table>{more}"
 
 
 def _cell(value: Any) -> str:

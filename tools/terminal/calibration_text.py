@@ -38,13 +38,12 @@ def _headline(result: CalibrationResult) -> str:
 
 
 def _verdict(result: CalibrationResult, judgement: Judgement) -> str:
-    lines = [judgement.headline]
-    doubts = [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
+    lines = [judgement.answer]
     told_below = {direction.text for direction in result.weak_directions}
     if judgement.level == "bad":
         told_below.add(AS_STATED)
     findings = [f"  - {finding}" for finding in result.findings if finding not in told_below]
-    lines += doubts + findings[:SHOWN_FINDINGS]
+    lines += findings[:SHOWN_FINDINGS]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"  - and {len(findings) - SHOWN_FINDINGS} more in the report")
     return "\n".join(lines)

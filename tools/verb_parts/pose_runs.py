@@ -230,6 +230,8 @@ def _candidate(c: Any) -> dict[str, Any]:
 
 def pose_json(result: Any) -> dict[str, Any]:
     """A calibration for machines."""
+    from jointscope.tools.verdicts.pose_judgement import judge_poses
+
     robot = result.robot
     return {
         "converged": True,
@@ -252,6 +254,7 @@ def pose_json(result: Any) -> dict[str, Any]:
         "left_out": [{"path": path, "pose": pose, "sigmas": sigmas} for path, pose, sigmas in result.left_out],
         "poses": [errors.to_json() for errors in result.errors],
         "poses_before": [errors.to_json() for errors in result.before],
+        **judge_poses(result).to_json(),
     }
 
 

@@ -109,8 +109,10 @@ def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_
         write_robot(stack, files, result.robot, provenance(result))
         from jointscope.tools.report import calibration_report
         from jointscope.tools.rerun_log import log_calibration
+        from jointscope.tools.verdicts.judgement import judge
 
-        _write_views(stack, result, files, partial(calibration_report, checked=checked), log_calibration, checked)
+        report, said = partial(calibration_report, checked=checked), acceptance_json(checked)
+        _write_views(stack, result, files, report, log_calibration, lambda: judge(result).to_json() | said)
 
 
 def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
@@ -123,7 +125,8 @@ def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_L
         from jointscope.tools.report import comparison_report
         from jointscope.tools.rerun_log import log_comparison
 
-        _write_views(stack, result, files, partial(comparison_report, checked=checked), log_comparison, checked)
+        report, said = partial(comparison_report, checked=checked), acceptance_json(checked)
+        _write_views(stack, result, files, report, log_comparison, lambda: said)
 
 
 def write_diagnosis(result: Any, files: ResultFiles) -> None:
@@ -181,8 +184,9 @@ def write_replay(result: Any, files: ResultFiles) -> None:
     with ExitStack() as stack:
         from jointscope.tools.report.replay_report import replay_report
         from jointscope.tools.rerun_log.log_replay import log_replay
+        from jointscope.tools.verdicts.replay_judgement import judge_replay
 
-        _write_views(stack, result, files, replay_report, log_replay)
+        _write_views(stack, result, files, replay_report, log_replay, lambda: judge_replay(result).to_json())
 
 
 def _write_views(
@@ -191,14 +195,14 @@ def _write_views(
     files: ResultFiles,
     report: Callable[[Any], str],
     log: Callable[[Any, Path], None],
-    checked: AcceptedBy = NO_LIMITS,
+    more: Callable[[], dict[str, Any]] = dict,
 ) -> None:
-    """Report, rerun recording and JSON; they take their places when the stack closes."""
+    """Report, rerun recording and JSON with `more`; they take their places when the stack closes."""
     write_report(stack, files, partial(report, result))
     if files.rrd is not None:
         log(result, stack.enter_context(whole_file(files.rrd)))
     if files.json is not None:
-        write_json(stack.enter_context(whole_file(files.json)), result.to_json() | acceptance_json(checked))
+        write_json(stack.enter_context(whole_file(files.json)), result.to_json() | more())
 
 
 def write_still(

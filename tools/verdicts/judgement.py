@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
@@ -28,9 +30,7 @@ CORRELATION = (0.25, 0.5)  # largest autocorrelation within LAGS; a quantized en
 UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open after DRIFT, in the worst window
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
-HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
-UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -51,16 +51,34 @@ class Judgement:
     headline: str
     checks: tuple[Check, ...]
 
+    @property
+    def doubts(self) -> tuple[Check, ...]:
+        """The checks that speak against the result."""
+        return tuple(check for check in self.checks if check.level in ("warn", "bad"))
+
+    @property
+    def answer(self) -> str:
+        """The headline, and below it a line for each doubt."""
+        return "\n".join([self.headline, *(f"  ! {check.name}? {check.text}" for check in self.doubts)])
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict and every check that was made, for machines."""
+        return {
+            "verdict": {"level": self.level, "text": self.headline},
+            "checks": [{"name": c.name, "verdict": c.level, "why": c.text} for c in self.checks],
+        }
+
 
 def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
     plausible, timing, missing = plausible_torques(result), same_time(result), missing_effects(result)
+    held = values_from_data(result)
     checks = (
         _noise_as_stated(result),
         _white(result),
         *([] if result.robot.free_links else [_even(result)]),
         _determined(result),
-        _held(result),
+        Check(held[0], "Values from data, not from priors", held[1]),
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         _two_ways(result),
@@ -71,16 +89,6 @@ def judge(result: CalibrationResult) -> Judgement:
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
     return Judgement(level, ANSWERS[level], checks)
-
-
-def is_held(parameter: ParameterEstimate) -> bool:
-    """Whether the prior, not the recording, determines a parameter."""
-    return parameter.prior_sigma > 0.0 and parameter.sigma > HELD * parameter.prior_sigma
-
-
-def is_mounting_or_bias(parameter: ParameterEstimate) -> bool:
-    """Whether it describes how a sensor sits, not how the robot moves."""
-    return any(part in parameter.name for part in (".R_imu_body", ".bias", ".lever_"))
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:
@@ -173,29 +181,6 @@ def _typically_open(result: CalibrationResult) -> float:
     """Median relative sigma of the dynamic parameters."""
     free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit not in ("s", "s^2") and p.value]
     return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
-
-
-def _held(result: CalibrationResult) -> Check:
-    name = "Values from data, not from priors"
-    noted = [p for p in result.parameters if p.note or is_held(p)]
-    dynamic = [p for p in noted if not is_mounting_or_bias(p)]
-    if not noted:
-        return Check("good", name, "No parameter leans on its prior or lies on a bound.")
-    known = result.robot.parameters
-    guessed = [p for p in dynamic if is_held(p) and p.name in known and known[p.name].null is None]
-    guessed = [p for p in guessed if p.sigma > UNDETERMINED * abs(p.value)]
-    if guessed:
-        joints = ", ".join(dict.fromkeys(p.name.rsplit(".", 1)[0] for p in guessed))
-        text = (
-            f"The recordings tell nothing of {', '.join(p.name for p in guessed[:4])}"
-            f"{f' and {len(guessed) - 4} more' if len(guessed) > 4 else ''}: what stands there is a guess of the robot "
-            f"file, and so is its sigma. Hold one value of {joints} that you know with `fixed: true`, or leave the "
-            "joint out of the robot"
-        )
-        return Check("bad", name, f"{text}.")
-    text = "; ".join(f"{p.name}: {p.note or 'held by its prior'}" for p in (dynamic or noted)[:3])
-    more = f" and {len(dynamic or noted) - 3} more" if len(dynamic or noted) > 3 else ""
-    return Check("warn" if dynamic else "info", name, f"{text}{more}.")
 
 
 def _honest_sigmas(result: CalibrationResult) -> Check:

@@ -73,6 +73,14 @@ def test_outcomes(tmp_path, line, expected):
     assert found[1]
 
 
+@pytest.mark.parametrize(
+    "horizon, words", [("0.1", "no error 0.1 s ahead; "), ("open_loop", "no error in the open loop; ")]
+)
+def test_an_error_that_is_not_there_is_named_with_its_horizon(tmp_path, horizon, words):
+    line = f"channel: joint1.motor_position, horizon: {horizon}, error: 0.02"
+    assert outcome(tmp_path, line) == (OPEN, f"this result has {words}`jointscope compare` has it")
+
+
 def test_a_pattern_is_checked_on_every_name_that_fits(tmp_path):
     limits = limits_of(tmp_path, 'parameter: "joint*.stiffness", sigma_percent: 4.9, because: bench')
     assert [(line.name, line.outcome) for line in check_limits(limits, CONTENT)] == [
@@ -153,3 +161,20 @@ def test_a_file_without_lines_is_refused(tmp_path, text):
     (tmp_path / "limits.yaml").write_text(text)
     with pytest.raises(RobotError, match=r"limits\.yaml"):
         read_limits(tmp_path / "limits.yaml")
+
+
+@pytest.mark.parametrize(
+    "name, content, words",
+    [
+        ("absent.yaml", None, r"^cannot read the limits file .*absent\.yaml: No such file or directory$"),
+        ("bag.mcap", b"\x89MCAP0\xff", r"bag\.mcap is not a limits file: it is not text$"),
+        ("arm.urdf", b"<robot name='a'>\n  <link: [</robot>", r"^arm\.urdf is a URDF and no limits file$"),
+        ("broken.yaml", b"limits: [", r"^broken\.yaml is not YAML: line 1, column 10: "),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_called_a_limits_file(tmp_path, name, content, words):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(RobotError, match=words) as raised:
+        read_limits(tmp_path / name)
+    assert "robot file" not in str(raised.value)

@@ -101,6 +101,19 @@ def test_comments_meshes_and_undeclared_prefixes_survive(tmp_path):
     assert '<mesh filename="a.stl" />' in exported
 
 
+def test_a_file_that_only_this_program_reads_stays_so_and_that_is_said(tmp_path):
+    """pinocchio wants limits, which makers leave out."""
+    arm_with(tmp_path)
+    text = (tmp_path / "arm.urdf").read_text()
+    (tmp_path / "arm.urdf").write_text(text.replace('<limit effort="40" velocity="4" lower="-2" upper="2"/>', ""))
+    exported = urdf_model(load_robot(tmp_path / "arm.yaml"))
+    (warning,) = exported.warnings
+    assert "pinocchio refuses the file, as it refuses the original" in warning
+    assert "elbow" in warning
+    with pytest.raises(ValueError, match="valid URDF"):
+        model_of(exported.text)
+
+
 def test_geometry_of_poses_is_in_it_and_sag_is_named(tmp_path):
     robot = load_robot("tx90l").with_values({"joint2.ly": 0.001})
     exported = urdf_model(robot)
@@ -114,3 +127,46 @@ def test_a_robot_whose_masses_are_not_known_is_refused():
     told = r"^kr300 has link_dynamics: free, so its masses are not known, .* stands in kr300\.yaml$"
     with pytest.raises(RobotError, match=told):
         urdf_model(load_robot("kr300"))
+
+
+def with_inertia(folder, link: str, moments: dict[str, float]) -> None:
+    """Writes other moments of inertia into the maker's file."""
+    root = ET.parse(folder / "arm.urdf").getroot()
+    root.find(f"link[@name='{link}']/inertial/inertia").attrib.update({n: str(x) for n, x in moments.items()})
+    ET.ElementTree(root).write(folder / "arm.urdf")
+
+
+def test_a_sound_file_has_no_warnings(tmp_path):
+    assert urdf_model(arm_with(tmp_path)).warnings == ()
+    assert urdf_model(arm_with(tmp_path, rigid=("shoulder",))).warnings == ()  # the rotor is a disc: A + B = C
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [{"ixx": 0.01, "iyy": 0.01, "izz": 0.03}, {"ixx": 0.01, "iyy": 0.01, "izz": 0.01, "ixy": 0.02}],
+    ids=["triangle inequality", "negative principal moment"],
+)
+def test_an_impossible_inertia_of_the_maker_is_kept_and_said(moments, tmp_path):
+    arm_with(tmp_path)
+    with_inertia(tmp_path, "fore", {**dict.fromkeys(("ixy", "ixz", "iyz"), 0.0), **moments})
+    exported = urdf_model(load_robot(tmp_path / "arm.yaml"))
+    (warning,) = exported.warnings
+    assert "inertia of fore" in warning
+    assert "kept as the original has it" in warning
+    mujoco = pytest.importorskip("mujoco", reason="reads the URDF as users of MuJoCo do")
+    with pytest.raises(ValueError, match="inertia must"):
+        mujoco.MjModel.from_xml_string(exported.text)
+
+
+def test_an_impossible_inertia_that_was_calibrated_is_said_as_such(tmp_path):
+    robot = add_effects(arm_with(tmp_path), ["inertia_error@elbow"]).robot
+    (warning,) = urdf_model(robot.with_values({"elbow.inertia_error.izz": 9.0})).warnings
+    assert "calibrated for fore" in warning
+
+
+def test_a_urdf_that_pinocchio_refuses_is_an_error(tmp_path, monkeypatch):
+    from jointscope.tools.export import urdf_model as module
+
+    monkeypatch.setattr(module, "_unlimited", lambda element: "nonsense")
+    with pytest.raises(RobotError, match="pinocchio refuses the URDF that would be made"):
+        urdf_model(arm_with(tmp_path, rigid=("shoulder",)))

@@ -22,10 +22,16 @@ BLOCK = re.compile(
 def test_the_example_of_the_page_runs_and_leaves_its_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = run_block(0)
-    told, replayed = capsys.readouterr().out.splitlines()
-    assert re.match(r"Error 0.1 s ahead, calibrated: [\d.]+ sigma \(floor [\d.]+\), one more: [\d.]+ sigma", told)
-    assert replayed == names["replayed"].answer()
-    assert {file.name for file in tmp_path.iterdir()} == {"train.mcap", "calibrated.yaml", "calibration.html"}
+    told, *said = capsys.readouterr().out.splitlines()
+    answer = names["replayed"].answer().splitlines()
+    replayed, exported = said[: len(answer)], said[len(answer)]
+    labels = ("start", "calibrated", "with motor_viscous")
+    errors = ", ".join(rf"{label}: [\d.]+ sigma \(floor [\d.]+\)" for label in labels)
+    assert re.match(f"Error 0.1 s ahead, {errors}", told)
+    assert replayed == answer
+    assert exported.startswith("Wrote doggy.urdf: inertias, dry friction, springs of joint1")
+    left = {"train.mcap", "calibrated.yaml", "calibration.html", "doggy.urdf", "doggy.xml", "comparison.svg"}
+    assert {file.name for file in tmp_path.iterdir()} == left
     assert js.load_robot("calibrated.yaml").parameters["joint2.stiffness"].sigma is not None
 
 

@@ -44,6 +44,13 @@ CASES = {
     ),
     "unknown effect": (["add", "doggy", "clogging@joint1", "-o", "o.yaml"], lambda: js.add("doggy", "clogging@joint1")),
     "impossible owner": (["add", "doggy", "cogging@imu1", "-o", "o.yaml"], lambda: js.add("doggy", "cogging@imu1")),
+    "not there to be removed": (
+        ["remove", "doggy", "cogging@joint1", "-o", "o.yaml"],
+        lambda: js.remove("doggy", "cogging@joint1"),
+    ),
+    "nothing to export": (["export", "doggy"], lambda: js.export("doggy")),
+    "masses not known": (["export", "kr300", "--urdf", "o.urdf"], lambda: js.export("kr300", urdf="o.urdf")),
+    "no bag to look at": (["info", "broken.mcap"], lambda: js.info("broken.mcap")),
     "not for the estimator": (["replay", "kr300", "good.mcap"], lambda: js.replay("kr300", "good.mcap")),
     "hidden effect": (
         ["simulate", "doggy", "-o", "o.mcap", "--effect", "x@y"],

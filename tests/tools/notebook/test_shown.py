@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import importlib
 import json
 import sys
@@ -22,6 +23,7 @@ from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.notebook.given import limits_of
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
 from jointscope.tools.notebook.shown import SHOWN_ROWS
+from jointscope.tools.terminal.calibration_text import calibration_text
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +57,28 @@ def test_a_parameter_is_found_by_its_name_and_an_unknown_one_is_told_with_those_
 
 def test_a_notebook_shows_the_answer_and_a_table_whose_texts_are_escaped(results):
     for result in results:
-        html = result._repr_html_()
-        assert html.startswith("<p><b>") and result.answer().split(",")[0][:20] in html
-        assert html.count("<tr>") == 1 + min(len(result.rows()), SHOWN_ROWS)
-        assert "<train" not in html
+        shown = result._repr_html_()
+        assert shown.startswith("<p><b>") and result.answer().split(",")[0][:20] in shown
+        assert shown.count("<tr>") == 1 + min(len(result.rows()), SHOWN_ROWS)
+        assert "<train" not in shown
+
+
+def test_an_answer_holds_the_reasons_and_a_title_only_the_verdict(calibrated, tmp_path):
+    """The same as on the screen and in the report."""
+    channel, fit = next(iter(calibrated.channels.items()))
+    bad = {**calibrated.channels, channel: dataclasses.replace(fit, chi2=4.0)}
+    doubtful = dataclasses.replace(calibrated, channels=bad)
+    verdict, *reasons = doubtful.answer().splitlines()
+    assert verdict == "No, do not rely on this calibration yet."
+    assert any(line.startswith(f"  ! Residuals as large as the sensor noise? {channel} has") for line in reasons)
+    assert doubtful.answer() in calibration_text(doubtful)
+    assert all(line.partition("? ")[2] in html.unescape(doubtful._repr_html_()) for line in reasons)
+    doubtful.save(json=tmp_path / "it.json")
+    content = json.loads((tmp_path / "it.json").read_text())
+    assert content["verdict"] == {"level": "bad", "text": verdict}
+    told = [f"  ! {c['name']}? {c['why']}" for c in content["checks"] if c["verdict"] in ("warn", "bad")]
+    assert told == reasons
+    assert {"parameters", "channels", "findings"} <= content.keys()
 
 
 def test_rows_have_one_shape(results):
@@ -92,6 +112,25 @@ def test_figures_need_no_display(results, tmp_path, monkeypatch):
         result.plot().savefig(tmp_path / f"{k}.svg")
         assert (tmp_path / f"{k}.svg").stat().st_size > 5000
     assert not importlib.import_module("matplotlib.pyplot").get_fignums()
+
+
+@pytest.mark.parametrize("worst, labels", [(1.04, ["0.5", "1", "2"]), (480.0, ["1", "10", "100"])])
+def test_errors_near_the_noise_are_drawn_on_an_axis_on_which_they_look_alike(worst, labels):
+    pyplot = pytest.importorskip("matplotlib.pyplot", reason="comes with the extra plot")
+    comparison = Compared.of(fake_comparison())
+    errors = np.linspace(0.97, worst, len(comparison.models[0].channels))
+
+    def scaled(model):
+        pairs = zip(model.channels.items(), errors, strict=True)
+        return {n: dataclasses.replace(c, horizons={**c.horizons, "0.1": e * c.noise_sigma}) for (n, c), e in pairs}
+
+    models = tuple(dataclasses.replace(m, channels=scaled(m)) for m in comparison.models)
+    figure, axes = pyplot.subplots()
+    dataclasses.replace(comparison, models=models).draw(axes)
+    low, high = axes.get_ylim()
+    assert low <= 0.5 and high >= max(3.0, worst)
+    assert [label.get_text() for label in axes.get_yticklabels()] == labels
+    pyplot.close(figure)
 
 
 def test_a_figure_is_drawn_into_axes_that_are_given(results):

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -59,6 +60,9 @@ def test_the_demo_tells_the_story_and_leaves_its_files(quick, capsys):
     assert {path.name for path in Path("here").iterdir()} == WRITTEN
     assert {path.name for path in Path().iterdir()} == {"here", "found.json"}
     assert set(json.loads(Path("found.json").read_text())) == {"discovery", "truth"}
+    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\"demo/([\w.]+)\"", readme))
+    assert {"train.mcap", "test.mcap"} <= named <= WRITTEN  # its lines of Python go on from here
     assert load_robot("here/found.yaml").parameter("joint1.bearing_flexibility.compliance_x").value == 3.9e-4
 
 

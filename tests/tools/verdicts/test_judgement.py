@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from fake_results import fake_calibration
 
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.findings import findings
+from jointscope.robots.files.effects_at_once import add_effects
+from jointscope.tools.verdicts.held_values import values_from_data
 from jointscope.tools.verdicts.judgement import Judgement, judge
 
 NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
@@ -73,6 +76,42 @@ def test_a_guess_of_which_the_recordings_tell_nothing_is_no_result(good):
         level(judge(with_parameter(good, "joint2.stiffness", sigma=0.09 * value, prior_sigma=0.1 * value)), HELD)
         == "warn"
     )
+
+
+def held_with(result, label, name):
+    """The result of a robot with an effect, one parameter of which no recording has moved."""
+    robot = add_effects(result.robot, [label]).robot
+    full = f"{label.partition('@')[2]}.{label.partition('@')[0]}.{name}"
+    p = robot.parameters[full]
+    row = (full, p.value, p.prior_sigma, p.unit, p.value, p.prior, p.prior_sigma)
+    held = ParameterEstimate(*row, note="held by its prior")
+    return dataclasses.replace(result, robot=robot, parameters=(*result.parameters, held))
+
+
+@pytest.mark.parametrize(
+    "label, name, expected",
+    [
+        ("encoder_eccentricity@joint1", "order", "info"),  # once per turn: the encoder is built so
+        ("bearing_flexibility@joint1", "product_xz", "info"),  # declared weak; the sigmas of the others include it
+        ("bearing_flexibility@joint1", "damping_x", "bad"),  # a shape that the motion must show
+        ("cogging@joint1", "order", "bad"),  # a guess among many
+        ("link_mass@joint1", "mass", "warn"),  # weak, but a size: its value is what the user wants
+    ],
+)
+def test_what_an_effect_leaves_to_its_prior_on_purpose_is_no_doubt(good, label, name, expected):
+    determined = with_parameter(good, "joint3.coulomb_torque", sigma=0.01)
+    found, text = values_from_data(held_with(determined, label, name))
+    assert found == expected
+    assert name in text  # said in any case
+
+
+def test_every_check_is_there_for_machines_with_its_reason(good):
+    judgement = judge(with_chi2(good, 4.0))
+    content = judgement.to_json()
+    assert content["verdict"] == {"level": "bad", "text": judgement.headline}
+    assert len(content["checks"]) == len(judgement.checks) == 11
+    (noise,) = (check for check in content["checks"] if check["name"] == NOISE)
+    assert noise["verdict"] == "bad" and noise["why"].startswith(f"{CHANNEL} has χ² per sample 4")
 
 
 def following(result, left):
