@@ -138,9 +138,10 @@ def _calibrated(
         calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
-    solved = stage.solve(problems, noise, calibrations)
-    if not biases_only and not standstill:
-        solved = asked_at_standstill(stage, solved)
+    if biases_only or standstill:
+        solved = stage.solve(problems, noise, calibrations)
+    else:
+        solved = asked_at_standstill(stage, problems, noise, calibrations)
         notices += sticking_joints(robot, solved.robot)
         robot = replace(robot, parameters=solved.robot.parameters)
     # the file that will be written says in which posture its values were found
