@@ -148,10 +148,12 @@ def _calibrated(
     stated = {e.name: e.sigmas for e in (seen.motor_encoder, seen.link_encoder) if e is not None}
     anew = near is None and not biases_only
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated)
-    solved = stage.solve(problems, noise, calibrations)
+    if biases_only or standstill:
+        solved = stage.solve(problems, noise, calibrations)
+    else:
+        solved = asked_at_standstill(stage, problems, noise, calibrations)
     solved = solved_with_filters(stage, solved, filters) if filters else solved
     if not biases_only and not standstill:
-        solved = asked_at_standstill(stage, solved)
         notices += sticking_joints(robot, solved.robot)
         robot = replace(robot, parameters=solved.robot.parameters)
     # the file that will be written says in which posture its values were found
