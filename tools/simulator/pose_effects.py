@@ -18,9 +18,11 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "bearing_flexibility": {"compliance_x": 5.0e-6, "compliance_y": 5.0e-6},  # [rad/(N m)] beside the robot file's
     "payload": {"mass": 2.0},  # [kg] at the target
     "link_mass": {"mass": 2.0},  # [kg] more than in the URDF, at the centre of mass of the link behind the joint
+    "torque_constant_error": {"share": 0.05},  # motors make that much more torque than they say
+    "torque_delay": {"seconds": 1.0e-3},  # [s] by which the torques of all motors are late; nothing at rest
     "tracker_drift": {"x": 1.0e-4, "y": 0.0, "z": 5.0e-5},  # [m] from the first pose to the last
 }
-OF_ROBOT = ("payload", "tracker_drift")
+OF_ROBOT = ("payload", "torque_delay", "tracker_drift")
 
 
 @dataclass(frozen=True)

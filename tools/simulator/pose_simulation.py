@@ -12,22 +12,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError, SimulationError
-from jointscope.robots.geometry.error_parameters import error_names, is_length
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
+from jointscope.tools.simulator.arm.arm_bodies import ArmBodies, true_values
 from jointscope.tools.simulator.pose_effects import PoseEffect, pose_effects
-from jointscope.tools.simulator.world.inertia import full_inertia
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.random_streams import random_stream
-from jointscope.tools.simulator.world.specification import joint_axis, quaternion_wxyz
 
 Array = NDArray[np.float64]
-LENGTH, ANGLE = 2.5e-4, 5e-4  # [m], [rad] 1 sigma of the errors that are drawn
-VARIATION = 0.2  # of stiffnesses about those of the robot file, 1 sigma of the logarithm
 ENCODER = 1e-6  # [rad]
 REACH = 0.7  # share of each joint's range that poses fill
 ROUNDS = 6  # of the equilibrium; each is a thousand times nearer
@@ -73,7 +68,7 @@ def simulate_poses(
         raise RobotError(f"{robot.path.name} has no section `poses`; see docs/poses.md")
     if count < 1:
         raise SimulationError(f"number of poses: expected 1 or more, got {count}")
-    values = _true_values(robot, seed, conditions)
+    values = true_values(robot, seed, conditions.values, conditions.perfect)
     effects = pose_effects(conditions.effects, robot.joints)
     arm, rng = _Arm(robot, values, effects), random_stream(seed, session)
     low, high = np.nan_to_num(robot.tree.limits.T, posinf=np.pi, neginf=-np.pi)
@@ -99,29 +94,13 @@ def simulate_poses(
     return Poses("simulation", "", names, read, measured, torque=torques), truth
 
 
-def _true_values(robot: Robot, seed: int, conditions: PoseConditions) -> dict[str, float]:
-    unknown = next((name for name in conditions.values if name not in robot.parameters), None)
-    if unknown:
-        raise RobotError(f"robot {robot.name!r} has no parameter {unknown!r}")
-    rng, values = random_stream(seed, "arm"), {}
-    for name in error_names(robot.joints):
-        size = (LENGTH if is_length(name) else ANGLE) * rng.standard_normal()
-        values[name] = 0.0 if conditions.perfect else float(size)
-    for name, parameter in robot.parameters.items():
-        if name not in values:
-            drawn = parameter.prior * float(np.exp(VARIATION * rng.standard_normal()))
-            values[name] = drawn if parameter.positive else parameter.prior
-    return {**values, **conditions.values}
-
-
 class _Arm:
     """A compiled model and the springs of its hinges."""
 
     def __init__(self, robot: Robot, values: Mapping[str, float], effects: Iterable[PoseEffect]):
-        self._mujoco, self._robot, self._values = load_mujoco(), robot, values
-        self._of = {(effect.id, effect.owner): effect.parameters for effect in effects}
-        drift = self._of.get(("tracker_drift", "robot"), {})
-        self.drift = np.array([drift.get(axis, 0.0) for axis in "xyz"])
+        self._mujoco, self._robot = load_mujoco(), robot
+        self._bodies = ArmBodies(robot, values, effects)
+        self.drift = np.array([self._bodies.size("tracker_drift", "robot", axis) for axis in "xyz"])
         self._model = self._built().compile()
         self._data = self._mujoco.MjData(self._model)
         self._places = {
@@ -154,76 +133,29 @@ class _Arm:
 
     def _waves(self, joint: str, angle: float) -> float:
         """What encoder and gear are off at an angle of the motor [rad]."""
-        encoder = self._of.get(("encoder_eccentricity", joint), {})
-        gear = self._of.get(("gear_ripple", joint), {})
-        wave = encoder.get("cos", 0.0) * np.cos(angle) + encoder.get("sin", 0.0) * np.sin(angle)
-        return float(
-            wave + gear.get("amplitude", 0.0) * np.cos(gear.get("order", 0.0) * angle + gear.get("phase", 0.0))
-        )
+        cos, sin = (self._bodies.size("encoder_eccentricity", joint, part) for part in ("cos", "sin"))
+        size, order, phase = (self._bodies.size("gear_ripple", joint, part) for part in ("amplitude", "order", "phase"))
+        return float(cos * np.cos(angle) + sin * np.sin(angle) + size * np.cos(order * angle + phase))
 
     def _deflection(self, joint: str, pull: float) -> float:
         """How far a drive gives way under a torque [rad]: the root of k x + k3 x^3 = pull, and half a gap."""
-        k = self._values.get(f"{joint}.stiffness", np.inf)
-        soft = self._of.get(("joint_elasticity", joint), {}).get("compliance", 0.0)
-        compliance = 1.0 / k + soft
+        compliance = self._bodies.compliance(joint)
         x = pull * compliance
-        cubic = self._of.get(("spring_cubic", joint), {}).get("stiffness", 0.0)
+        cubic = self._bodies.size("spring_cubic", joint, "stiffness")
         for _ in range(20 if cubic else 0):
             x -= (x / compliance + cubic * x**3 - pull) / (1.0 / compliance + 3.0 * cubic * x**2)
-        gap = self._of.get(("backlash", joint), {}).get("half_gap", 0.0) - self._values.get(f"{joint}.backlash", 0.0)
+        gap = self._bodies.size("backlash", joint, "half_gap") - self._bodies.value(joint, "backlash")
         return float(x + gap * np.sign(pull))
 
     def _tilt(self, joint: str, axis: str, pull: float) -> float:
-        k = self._values.get(f"{joint}.bearing.stiffness_{axis}", np.inf)
-        soft = self._of.get(("bearing_flexibility", joint), {}).get(f"compliance_{axis}", 0.0)
-        return float(pull * (1.0 / k + soft))
+        return float(pull * self._bodies.tilt_compliance(joint, axis))
 
     def _built(self) -> Any:
-        mujoco, robot = self._mujoco, self._robot
-        spec, tree = mujoco.MjSpec(), robot.tree
-        spec.option.gravity = tree.gravity
+        mujoco = self._mujoco
+        spec = mujoco.MjSpec()
+        spec.option.gravity = self._robot.tree.gravity
         spec.compiler.balanceinertia = False
-        parent = spec.worldbody
-        for j in range(1, tree.model.njoints):
-            name, inertia = tree.model.names[j], tree.model.inertias[j]
-            place, (axis, _) = tree.model.jointPlacements[j], joint_axis(tree.model, j)
-            x = np.eye(3)[1] if abs(axis[0]) > 0.9 else np.eye(3)[0]
-            y = np.cross(axis, x)
-            turn = pin.exp3(self._value(name, "mis_y") * y) @ pin.exp3(self._value(name, "mis_x") * x)
-            turn = place.rotation @ turn @ pin.exp3(self._value(name, "offset") * axis)
-            shift = [self._value(name, part) for part in ("lx", "ly", "lz")]
-            parent = parent.add_body(
-                name=f"{name}.link",
-                pos=place.translation + shift,
-                quat=quaternion_wxyz(turn),
-                explicitinertial=True,
-                mass=max(inertia.mass + self._of.get(("link_mass", name), {}).get("mass", 0.0), 1e-9),
-                ipos=inertia.lever,
-                fullinertia=full_inertia(inertia.inertia + 1e-9 * np.eye(3)),
-            )
-            hinge = mujoco.mjtJoint.mjJNT_HINGE
-            for suffix, about in (("", axis), (".y", y), (".x", x)):
-                parent.add_joint(name=f"{name}{suffix}", type=hinge, axis=about)
-        self._add_target(spec, parent)
+        for name, (body, axes) in self._bodies.add_to(spec).items():
+            for suffix, about in axes.items():
+                body.add_joint(name=f"{name}{suffix}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=about)
         return spec
-
-    def _add_target(self, spec: Any, body: Any) -> None:
-        setup, tree = self._robot.poses, self._robot.tree
-        assert setup is not None
-        placement = tree.model.frames[tree.frame_id(setup.link)].placement
-        error = [self._value("tool", part) for part in ("lx", "ly", "lz")]
-        at = placement.act(setup.at + np.array(error))
-        body.add_site(name="target", pos=at)
-        payload = self._of.get(("payload", "robot"))
-        if payload is not None:
-            body.add_body(
-                name="payload",
-                pos=at,
-                ipos=np.zeros(3),
-                mass=payload["mass"],
-                explicitinertial=True,
-                inertia=[1e-6] * 3,
-            )
-
-    def _value(self, owner: str, part: str) -> float:
-        return self._values.get(f"{owner}.{part}", 0.0)
