@@ -21,12 +21,12 @@ graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.transmiss
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
 tools.bags.at_poses
-tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator
+tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator.arm tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text
 tools.presentation tools.terminal tools.report.page tools.report.sections.calibration tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
-tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.notebook tools.verbs tools
+tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verb_parts.simulations tools.notebook tools.verbs tools
 """.split()
 """All rooms in the order of their imports: a module imports from its own room and from those before it."""
 MOST_FILES = 16

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.tools.simulator.arm.arm_bodies import true_values
 from jointscope.tools.simulator.arm.multisine import CARRIER, Multisine
+from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.arm.shaken_arm import STEP, ShakenArm
-from jointscope.tools.simulator.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.pose_simulation import PoseConditions
 from jointscope.tools.simulator.world.random_streams import random_stream
 
@@ -115,7 +116,7 @@ def simulate_frequency(
     excitation = multisine.excitation(shaking.periods, BETWEEN)
     found, told = [], progress or (lambda share: None)
     for k, (arm, pose) in enumerate(zip(arms, poses, strict=True)):
-        samples = _experiments(arm, multisine, excitation, shaking, lambda share, k=k: told((k + share) / len(arms)))
+        samples = _experiments(arm, multisine, excitation, shaking, partial(_share, told, k, len(arms)))
         rng = random_stream(seed, session, f"noise {k}")
         found.append(_recording(robot, f"frequency_{k + 1}", np.asarray(pose), samples, excitation, effects, rng))
     truth = {
@@ -128,6 +129,10 @@ def simulate_frequency(
         "poses": {r.name: np.asarray(pose).tolist() for r, pose in zip(found, poses, strict=True)},
     }
     return found, multisine, truth
+
+
+def _share(told: Callable[[float], None], done: int, of: int, share: float) -> None:
+    told((done + share) / of)
 
 
 def _check(robot: Robot, shaking: Shaking) -> None:
@@ -203,7 +208,9 @@ def _late(torques: Array, seconds: float, excitation: Excitation, times: Array) 
     """Torques as they were some time before, experiment by experiment, which are steady and so repeat themselves."""
     step, found = float(np.median(np.diff(times))), torques.copy()
     for e in excitation.experiments:
-        rows = np.flatnonzero((times > e.start - 0.5 * step) & (times < e.start + e.periods / excitation.f0 - 0.5 * step))
+        rows = np.flatnonzero(
+            (times > e.start - 0.5 * step) & (times < e.start + e.periods / excitation.f0 - 0.5 * step)
+        )
         X, f = np.fft.rfft(torques[rows], axis=0), np.fft.rfftfreq(len(rows), step)
         found[rows] = np.fft.irfft(X * np.exp(-2j * np.pi * f * seconds)[:, None], len(rows), axis=0)
     return found

@@ -18,7 +18,7 @@ from jointscope.robots.errors import RobotError, SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies, true_values
-from jointscope.tools.simulator.pose_effects import PoseEffect, pose_effects
+from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.random_streams import random_stream
 

@@ -17,6 +17,7 @@ from jointscope.tools.simulator import DEFAULT_SECONDS, Simulation, simulate_und
 from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
+from jointscope.tools.verb_parts.simulations.shaken import add_shaking_options, simulate_shaken
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
@@ -24,6 +25,7 @@ EXAMPLE = """example:
   jointscope simulate doggy -o train.mcap --seed 3 --friction smooth --effect bearing_flexibility@joint1
   jointscope simulate doggy -o test.mcap --motion moves --seed 3 --friction smooth --effect bearing_flexibility@joint1
   jointscope simulate tx90l --kind poses -o poses.csv --seed 3 --effect encoder_eccentricity@joint4
+  jointscope simulate tx90l --kind frequency -o shaken --seed 3 --pose 0.1,0.72,0.62,1.2,1.0,0.3 --pose 0,0.5,1.8,0,1,0
 
 The same seed is the same robot; the truth is written beside the bag as train.truth.json."""
 
@@ -44,11 +46,13 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--kind",
-        choices=("motion", "poses"),
-        help="motion: a bag; poses: a table (.csv) of an arm at rest with a tracker; default: what the robot has",
+        choices=("motion", "poses", "frequency"),
+        help="motion: a bag; poses: a table (.csv) of an arm at rest with a tracker; frequency: a folder of bags of an "
+        "arm that is shaken; default: what the robot has",
     )
-    parser.add_argument("--count", type=int, default=40, metavar="N", help="number of poses; default 40")
+    parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, of shaken ones 2")
     parser.add_argument("--session", default="poses", metavar="NAME", help="another name: other poses of the same arm")
+    add_shaking_options(parser)
     parser.add_argument(
         "--motion",
         choices=list(DEFAULT_SECONDS),
@@ -69,8 +73,9 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.output if args.output.suffix else None, truth_file, args.json], inputs=args.effects)
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
-    if (args.kind or ("motion" if robot.motion else "poses")) == "poses":
-        return _poses(robot, args, truth_file)
+    kind = args.kind or ("motion" if robot.motion else "poses")
+    if kind != "motion":
+        return (_poses if kind == "poses" else simulate_shaken)(robot, args, truth_file)
     with progress_bar() as progress:
         simulation = _simulate(robot, args, lambda share: progress("simulating", share))
     write_bag(args.output, simulation.recording, robot)
@@ -95,7 +100,7 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
     if args.output.suffix.lower() != ".csv":
         raise SimulationError(f"{args.output}: poses are written as a table; expected a name that ends with .csv")
     conditions = PoseConditions(assignments(args.set), args.effect)
-    poses, truth = simulate_poses(robot, args.count, args.seed, conditions, args.session)
+    poses, truth = simulate_poses(robot, args.count or 40, args.seed, conditions, args.session)
     with whole_file(args.output) as path:
         path.write_text(pose_table(poses, robot), encoding="utf-8")
     write_json(truth_file, truth)

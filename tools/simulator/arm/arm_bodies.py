@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.error_parameters import error_names, is_length
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.simulator.pose_effects import PoseEffect
+from jointscope.tools.simulator.arm.pose_effects import PoseEffect
 from jointscope.tools.simulator.world.inertia import full_inertia
 from jointscope.tools.simulator.world.random_streams import random_stream
 from jointscope.tools.simulator.world.specification import joint_axis, link_body, quaternion_wxyz

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies
-from jointscope.tools.simulator.pose_effects import PoseEffect
+from jointscope.tools.simulator.arm.pose_effects import PoseEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.specification import (
     add_dry_friction,
