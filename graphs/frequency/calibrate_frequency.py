@@ -2,8 +2,7 @@
 """Stiffnesses and dampings of drives and bearings from frequency responses, with sigmas that hold what is in doubt.
 
 First the logarithm of the response matrices, which finds the way from far; then the torque balance, stage after stage,
-until the values stay. Sigmas are those of the residuals, or of their bands of neighbouring lines where these are of one
-cause, and hold what velocities above half of their band are worth in the friction.
+until the values stay. Then the responses become the Gaussian factor that holds what is in doubt, alone or with poses.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
@@ -31,7 +31,7 @@ from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.signals import Excitation, Signals
 
 Array = NDArray[np.float64]
-MOST_STAGES = 10
+MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
 AGREES = 0.3  # [sigma] that no value may move in a stage any more
 MOST_ITERATIONS = 80
 TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
@@ -123,9 +123,12 @@ def calibrate_frequency(
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     problems = [first_stage(robot, ShakenPose.of(*recording)) for recording in recordings]
     problems, solution, iterations, stages = settled_stages(problems, [], report)
-    calibration = solution.estimate.calibrations[0]
+    summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])
+    start = Estimate(solution.estimate.states[:1], solution.estimate.calibrations[:1])
+    settled = solve([summary], start, max_iterations=MOST_ITERATIONS)
+    calibration = settled.estimate.calibrations[0]
     index = calibration.columns[DYNAMICS]
-    covariance = honest_covariance(problems, problems, solution)[index, index]
+    covariance = np.asarray(posteriors([summary], settled)[1])[index, index]
     sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
     found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
     told = dict(zip(calibration.names, sigmas.tolist(), strict=True))
@@ -165,8 +168,8 @@ def settled_stages(
         solution = solve(everything, estimate, max_iterations=MOST_ITERATIONS)
         iterations += len(solution.iterations)
         report(f"stage {stage + 1}, cost {solution.cost:.6g}", (stage + 1) / MOST_STAGES)
-        if not (solution.converged or solution.flat):
-            break
+        if stage > 0 and not (solution.converged or solution.flat):
+            break  # the logarithm need not settle: it is where the torque balance begins
         known = solution.estimate.calibrations[0]
         common = known.carried_to(common)
         if before is not None:
@@ -180,22 +183,3 @@ def settled_stages(
         f"no convergence after {iterations} iterations and {stage + 1} stages over {len(problems)} poses; torques, "
         "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
     )
-
-
-def honest_covariance(problems: Sequence[FrequencySet], everything: Sequence[Any], solution: Solution) -> Array:
-    """Covariance of all shared coordinates of a solution, what is in doubt included, shape (p, p).
-
-    Args:
-        problems: poses at their last stage.
-        everything: these and recordings of other kinds, as they were solved; poses come first.
-        solution: theirs.
-    """
-    covariance = np.asarray(posteriors(list(everything), solution)[1])
-    pairs = list(zip(problems, solution.estimate.calibrations, strict=False))
-    index = pairs[0][1].columns[DYNAMICS]
-    slopes = np.vstack([problem.slopes(calibration) for problem, calibration in pairs])[:, index]
-    doubt = np.sum([problem.doubt(calibration) for problem, calibration in pairs], axis=0)[index]
-    banded = covariance[:, index] @ (slopes.T @ slopes) @ covariance[index]
-    shift = covariance[:, index] @ doubt
-    widen = np.sqrt(np.maximum(np.diag(banded) / np.diag(covariance), 1.0))
-    return np.asarray(covariance * np.outer(widen, widen) + np.outer(shift, shift))

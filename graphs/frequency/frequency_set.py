@@ -128,11 +128,22 @@ class FrequencySet:
         each = np.einsum("lk,lkp->lp", r, J)
         return np.array([part.sum(axis=0) for part in np.array_split(each, max(len(each) // BAND, 1))])
 
-    def doubt(self, calibration: Calibration) -> Array:
-        """Slope of the cost that friction of the other size it may have would add, shape (p,)."""
+    def noise_slopes(self, calibration: Calibration) -> Array:
+        """Slopes of the cost by the noise of each experiment, which its periods show, shape (s, p)."""
+        values = self.values(calibration)
+        Z = self.with_friction(self.stiffness(values).Z, values)
+        torques, positions, friction = self.pose.changes(self.sharpness(values))
+        r = np.einsum("lij,selj->seli", Z, positions) + self._each(values, COULOMB) * friction - torques
+        r = np.sqrt(2.0) * np.einsum("lij,selj->seli", self.stage.whiten @ np.linalg.inv(Z), r)
+        J = self.rows(calibration)[1].reshape(len(Z), 2, *self.pose.torques.shape[::2], calibration.size)
+        g = [np.einsum("seli,leip->sep", part, J[:, i]) for i, part in enumerate((r.real, r.imag))]
+        return np.asarray((g[0] + g[1]).reshape(-1, calibration.size))
+
+    def doubt(self, calibration: Calibration, share: float = 1.0) -> Array:
+        """Slope of the cost by what the upper half of a share of the band is worth in the friction, shape (p,)."""
         values = self.values(calibration)
         inverse = np.linalg.inv(self.with_friction(self.stiffness(values).Z, values))
-        column = self._each(values, COULOMB) * self.pose.friction_doubt(self.sharpness(values))
+        column = self._each(values, COULOMB) * self.pose.friction_doubt(self.sharpness(values), share)
         d = np.einsum("lij,elj->eli", self.stage.whiten @ inverse, column)
         d = np.sqrt(2.0) * np.swapaxes(d, 0, 1).reshape(len(inverse), -1)
         _, J = self.rows(calibration)

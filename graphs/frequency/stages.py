@@ -17,7 +17,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, Stage
 from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.graphs.responses.response_matrix import over_neighbours
+from jointscope.graphs.responses.response_matrix import neighbours, over_neighbours
 from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
@@ -66,9 +66,14 @@ def _shift(arm: FlexibleArm, pose: ShakenPose, Z: Complex, values: Mapping[str, 
 
 
 def _covariance(r: Complex) -> Complex:
-    """Of residuals at each line, shape (l, nu, nu), by those of its neighbours."""
+    """Of residuals at each line, shape (l, nu, nu), by those of its neighbours.
+
+    The inverse of a covariance of n samples is n / (n - nu) too large in the mean, and the information with it.
+    """
     each = np.einsum("eli,elj->lij", r, r.conj()) / len(r)
     mean = over_neighbours(each)
+    count = len(r) * neighbours(r.shape[1])
+    mean = mean * (count / np.maximum(count - r.shape[2], 1.0))[:, None, None]
     floor = 1e-6 * np.real(np.trace(mean, axis1=1, axis2=2))[:, None, None] * np.eye(r.shape[2])
     return np.asarray(mean + floor)
 

@@ -124,10 +124,19 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
 
 def over_neighbours(covariance: Complex) -> Complex:
     """Mean of each line, shape (l, ...), and its neighbours, fewer at the ends."""
-    n = len(covariance)
     sums = np.concatenate([np.zeros_like(covariance[:1]), np.cumsum(covariance, axis=0)])
-    low, high = np.maximum(np.arange(n) - NEIGHBOURS, 0), np.minimum(np.arange(n) + NEIGHBOURS + 1, n)
+    low, high = _window(len(covariance))
     return np.asarray((sums[high] - sums[low]) / (high - low)[:, None, None])
+
+
+def neighbours(lines: int) -> Array:
+    """How many lines `over_neighbours` takes together, shape (l,)."""
+    low, high = _window(lines)
+    return np.asarray(high - low, dtype=np.float64)
+
+
+def _window(lines: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.maximum(np.arange(lines) - NEIGHBOURS, 0), np.minimum(np.arange(lines) + NEIGHBOURS + 1, lines)
 
 
 def _about_neighbours(G: Complex) -> Complex:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect
@@ -98,6 +99,9 @@ class ShakenArm:
 
         Returns:
             Shape (2, samples, n): [rad], [N m].
+
+        Raises:
+            SimulationError: the integration breaks down.
         """
         inertia, hold = self.inertias, self._at_rest()
         stiff = inertia * (2.0 * np.pi * SERVO) ** 2
@@ -135,6 +139,13 @@ class ShakenArm:
                 self._mujoco.mj_step(self._model, data, every)
         finally:
             self._mujoco.set_mjcb_passive(None)
+        kinds = self._mujoco.mjtWarning
+        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        if any(data.warning[int(kind)].number for kind in bad):
+            raise SimulationError(
+                f"the engine cannot follow this arm in steps of {1e3 * STEP:g} ms; a spring is too stiff for what "
+                "hangs on it, or a damper too strong"
+            )
         return np.swapaxes(np.array(found), 0, 1)
 
     def _more_pull(self, d: Array, q: Array) -> tuple[Array, Array]:
