@@ -20,19 +20,23 @@ from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage
+from jointscope.graphs.responses.response_matrix import NEIGHBOURS
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
+from jointscope.robots.geometry.error_parameters import STIFFNESS
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.signals import Excitation, Signals
 
 Array = NDArray[np.float64]
 MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
-AGREES = 0.3  # [sigma] that no value may move in a stage any more
+TRIALS = 2  # stages after which begins are told apart
+AGREES = 0.1  # [sigma] that no value may move in a stage any more
+ALIKE, MOST_RATIO = 0.5, 0.95  # squared cosine of steps in one direction, and how slowly they may fall
 MOST_ITERATIONS = 80
 TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
 
@@ -160,26 +164,75 @@ def settled_stages(
     Raises:
         SolveError: no convergence.
     """
-    common, iterations, before = Calibration.of(problems[0].robot), 0, None
+    problems, common, iterations = _best_begin(problems, others)
+    at, step = common.dynamics, None  # where the poses were linearised, and the step of the stage before
     for stage in range(MOST_STAGES):
-        everything = [*problems, *others]
-        starts = [problem.start(common) for problem in everything]
-        estimate = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts))
-        solution = solve(everything, estimate, max_iterations=MOST_ITERATIONS)
+        solution, common = _solved(problems, others, common)
         iterations += len(solution.iterations)
         report(f"stage {stage + 1}, cost {solution.cost:.6g}", (stage + 1) / MOST_STAGES)
-        if stage > 0 and not (solution.converged or solution.flat):
-            break  # the logarithm need not settle: it is where the torque balance begins
+        if not (solution.converged or solution.flat):
+            break
         known = solution.estimate.calibrations[0]
+        index = known.columns[DYNAMICS]
+        sigmas = np.sqrt(np.diag(posteriors([*problems, *others], solution)[1])[index])
+        moved, narrow = (known.dynamics - at) / sigmas, problems[0].stage.width == NEIGHBOURS
+        if narrow and np.max(np.abs(moved)) < AGREES:
+            return problems, solution, iterations, stage + 1
+        ahead = _ahead(moved, None if step is None else step / sigmas)
+        at, step = known.dynamics + ahead * sigmas, known.dynamics - at if narrow and not np.any(ahead) else None
+        known = known.with_points({DYNAMICS: at})
         common = known.carried_to(common)
-        if before is not None:
-            index = known.columns[DYNAMICS]
-            sigmas = np.sqrt(np.diag(posteriors(everything, solution)[1])[index])
-            if np.max(np.abs(known.dynamics - before) / sigmas) < AGREES:
-                return problems, solution, iterations, stage + 1
-        before = None if stage == 0 else known.dynamics
         problems = [next_stage(problem, known) for problem in problems]
     raise SolveError(
         f"no convergence after {iterations} iterations and {stage + 1} stages over {len(problems)} poses; torques, "
         "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
     )
+
+
+def _ahead(step: Array, before: Array | None) -> Array:
+    """What all stages to come will add if their steps go on as two did: covariances follow values slowly.
+
+    Args:
+        step: of this stage, shape (p,) [sigma].
+        before: of the stage before, if both were plain.
+    """
+    if before is None:
+        return np.zeros_like(step)
+    ratio = float(step @ before) / max(float(before @ before), 1e-300)
+    alike = float(step @ before) ** 2 > ALIKE * float(step @ step) * float(before @ before)
+    return step * (min(ratio, MOST_RATIO) / (1.0 - min(ratio, MOST_RATIO)) if alike and ratio > 0.0 else 0.0)
+
+
+def _best_begin(
+    problems: Sequence[FrequencySet], others: Sequence[SetProblem]
+) -> tuple[list[FrequencySet], Calibration, int]:
+    """Poses at a stage of the torque balance, values, and iterations: the begin whose residuals are the likeliest.
+
+    The logarithm finds stiffnesses from far, but takes friction for damping, and may lead away what was nearly right.
+    """
+    given = Calibration.of(problems[0].robot)
+    solution, logarithm = _solved(problems, others, given)
+    iterations = len(solution.iterations)
+    springs = np.array([STIFFNESS in name for name in given.names])
+    mixed = given.with_points({DYNAMICS: np.where(springs, logarithm.dynamics, given.dynamics)})
+    found = []
+    for begin in (logarithm, mixed, given):
+        at, now = begin, [next_stage(problem, begin.only([DYNAMICS])) for problem in problems]
+        for _ in range(TRIALS):
+            solution, at = _solved(now, others, at)
+            iterations += len(solution.iterations)
+            now = [next_stage(problem, at.only([DYNAMICS])) for problem in now]
+        found.append((sum(problem.stage.unlikely for problem in now), now, at))
+    _, best, common = min(found, key=lambda each: each[0])
+    return best, common, iterations
+
+
+def _solved(
+    problems: Sequence[FrequencySet], others: Sequence[SetProblem], common: Calibration
+) -> tuple[Solution, Calibration]:
+    """The solution from these values on, and what it says of all shared values."""
+    everything = [*problems, *others]
+    starts = [problem.start(common) for problem in everything]
+    estimate = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts))
+    solution = solve(everything, estimate, max_iterations=MOST_ITERATIONS)
+    return solution, solution.estimate.calibrations[0].carried_to(common)

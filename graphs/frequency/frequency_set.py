@@ -44,6 +44,8 @@ class Stage:
         geometry: columns of geometric errors by name, shape (e, l, nu), about `values`.
         values: at which all this was found.
         logarithm: whether the response matrix counts, not the torques.
+        width: lines on each side whose residuals tell the covariance of one.
+        unlikely: minus twice the logarithm of the likelihood of the residuals at `values`, but for a constant.
     """
 
     parts: tuple[Array, Array, Array]
@@ -54,6 +56,8 @@ class Stage:
     geometry: Mapping[str, Complex]
     values: Mapping[str, float]
     logarithm: bool
+    width: int
+    unlikely: float = 0.0
 
 
 @dataclass(frozen=True)
