@@ -37,6 +37,7 @@ MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
 TRIALS = 2  # stages after which begins are told apart
 AGREES = 0.1  # [sigma] that no value may move in a stage any more
 ALIKE, MOST_RATIO = 0.5, 0.95  # squared cosine of steps in one direction, and how slowly they may fall
+UNEXPLAINED = 0.5  # of the torques, rms: an arm of other springs than the model's leaves less
 MOST_ITERATIONS = 80
 TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
 
@@ -177,6 +178,7 @@ def settled_stages(
         sigmas = np.sqrt(np.diag(posteriors([*problems, *others], solution)[1])[index])
         moved, narrow = (known.dynamics - at) / sigmas, problems[0].stage.width == NEIGHBOURS
         if narrow and np.max(np.abs(moved)) < AGREES:
+            _check_left(problems, known)
             return problems, solution, iterations, stage + 1
         ahead = _ahead(moved, None if step is None else step / sigmas)
         at, step = known.dynamics + ahead * sigmas, known.dynamics - at if narrow and not np.any(ahead) else None
@@ -187,6 +189,23 @@ def settled_stages(
         f"no convergence after {iterations} iterations and {stage + 1} stages over {len(problems)} poses; torques, "
         "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
     )
+
+
+def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
+    """Complains where the balance settled, but explains nothing.
+
+    Raises:
+        SolveError: it leaves most of the torques.
+    """
+    for problem in problems:
+        values = problem.values(known)
+        left = problem.torque_balance(values, problem.stiffness(values))
+        share = float(np.linalg.norm(left) / np.linalg.norm(problem.pose.torques))
+        if share > UNEXPLAINED:
+            raise SolveError(
+                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; their sign, "
+                "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+            )
 
 
 def _ahead(step: Array, before: Array | None) -> Array:

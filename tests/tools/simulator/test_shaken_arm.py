@@ -53,8 +53,8 @@ def test_the_same_seed_is_the_same_arm_in_both_kinds_and_rotors_are_as_the_file_
 
 def test_a_rigid_motor_feels_what_its_arm_weighs(robot):
     """Far below all resonances torque over acceleration is the inertia of rotor and arm together."""
-    stiff = {f"joint{j}.{part}": 3e6 for j in (1, 2, 3) for part in ("stiffness", "bearing.stiffness_x")}
-    stiff |= {f"joint{j}.bearing.stiffness_y": 3e6 for j in (1, 2, 3)}
+    stiff = {f"joint{j}.{part}": 1e6 for j in (1, 2, 3) for part in ("stiffness", "bearing.stiffness_x")}
+    stiff |= {f"joint{j}.bearing.stiffness_y": 1e6 for j in (1, 2, 3)}
     stiff |= {f"joint{j}.{part}": 1e-9 for j in (1, 2, 3) for part in ("coulomb_torque", "motor_viscous.coefficient")}
     (made,), _, _ = shaken(robot, 0, values=stiff, perfect=True)
     out = made.signals.outputs
@@ -66,9 +66,9 @@ def test_a_rigid_motor_feels_what_its_arm_weighs(robot):
     rotors = [robot.parameters[f"joint{j}.inertia"].value for j in (1, 2, 3)]
     w = 2.0 * np.pi * found.frequencies
     seen = np.linalg.inv(found.G) / -(w[:, None, None] ** 2)
-    middle = (found.frequencies > 4.0) & (found.frequencies < 12.0)
+    middle = (found.frequencies > 1.5) & (found.frequencies < 5.5)
     expected = M[:3, :3] + np.diag(rotors)
-    np.testing.assert_allclose(seen.real[middle].mean(axis=0), expected, atol=0.03 * np.max(expected))
+    np.testing.assert_allclose(seen.real[middle].mean(axis=0), expected, atol=0.05 * np.max(expected))
 
 
 def test_torques_that_are_late_turn_phases_and_say_nothing_else(robot):
