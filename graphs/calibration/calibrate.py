@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.calibration.calibration_summary import summarize
+from jointscope.graphs.calibration.calibration_summary import Solved, summarize
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.friction_at_standstill import asked_at_standstill, sticking_joints
@@ -29,6 +29,8 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -77,7 +79,8 @@ def calibrate(
             slow motion are looked for; else what these moments say is left out.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
         sets: recordings of other kinds than motion, which share the robot's values.
-        memory: whether random torques may last, where the recordings say so; they are white otherwise.
+        memory: whether random torques may last, where the recordings say so, and effects that would change the values
+            are asked for; without, random torques are white, as a search for effects wants them.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -144,13 +147,12 @@ def _calibrated(
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        moving = solved.of_motions
-        result = replace(result, timing=drive_timing(*moving), masses=wrong_masses(*moving))
+        result = _asked_for_causes(result, solved, effects=memory)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
                 other = summarize(robot, lasting, tuple(history.records), notices, hold)
-                result = replace(other, timing=result.timing, masses=result.masses)
+                result = replace(other, timing=result.timing, masses=result.masses, lacking=result.lacking)
         regressed = regressed_values(result.robot, recordings)
         said = (*result.findings, *on_their_word(result.robot, regressed))
         result = replace(result, regressed=regressed, findings=said)
@@ -158,6 +160,13 @@ def _calibrated(
         factors = _standing(solved.problems[0].dynamics.steps.noise, noise, result.noise.n_lasting)
         result = replace(result, robot=replace(result.robot, noise=scaled(result.noise, factors)))
     return result
+
+
+def _asked_for_causes(result: CalibrationResult, solved: Solved, effects: bool) -> CalibrationResult:
+    """With what a linear step says of late signals, of masses and, where it is wanted, of the whole catalogue."""
+    test = ScoreTest.of(*solved.of_motions)
+    lacking = lacking_effects(test) if effects else ()
+    return replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

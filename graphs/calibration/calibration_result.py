@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
+from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
@@ -170,6 +171,7 @@ class CalibrationResult:
         unsettled: last step, where the iterations ended before it was next to nothing [sigma]; else zero.
         masses: what the recordings say about the mass of each link, surest first.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
+        lacking: effects of the catalogue that the recordings ask for, surest first.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
@@ -195,6 +197,7 @@ class CalibrationResult:
     unsettled: float = 0.0
     timing: DriveTiming | None = None
     masses: tuple[WrongMass, ...] = ()
+    lacking: tuple[LackingEffect, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()

@@ -148,7 +148,8 @@ class ComparisonResult:
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
-        return {"models": {model.label: _model_json(model) for model in self.models}}
+        used = {"kind": "bags", "path": self.recording.path, "sha256": self.recording.sha256}
+        return {"models": {model.label: _model_json(model) for model in self.models}, "recordings": [used]}
 
 
 def _model_json(model: ModelComparison) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.gap import gap_hypotheses
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
-from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
+from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores, best_shapes
 from jointscope.graphs.scoring.order_scan import scan_orders
 from jointscope.graphs.scoring.score_system import Segment
 from jointscope.graphs.scoring.score_test import ScoreTest
@@ -34,7 +34,6 @@ MOST_AT_LEVELS = 25  # candidates that are scored at other levels of noise
 BEST = 5  # candidates named at each level of noise
 PLACEBOS = 18
 SHIFTS = (0.31, 0.57)  # of the recording by which placebo regressors are moved in time
-INDEPENDENT = 0.1  # [s] stretches of this length count as samples where parameters are paid for
 SIGNIFICANT = 0.01  # probability, over all candidates together, of a score this large by chance
 
 
@@ -87,20 +86,15 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
     """Scores the whole catalogue on the training recordings."""
     segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
     test, scan = ScoreTest(segments), scan_orders(segments)
-    best, tried = dict[str, HypothesisScore](), Counter[str]()
-    hidden = gap_hypotheses([segment.signals for segment in segments])
-    for score in test.each([*hypotheses_of(base.robot, scan.orders), *hidden]):
-        label = score.hypothesis.label
+    hidden, tried = gap_hypotheses([segment.signals for segment in segments]), Counter[str]()
+    scores = test.each([*hypotheses_of(base.robot, scan.orders), *hidden])
+    for label in (score.hypothesis.label for score in scores):
         tried[label] += scan.searched.get(label, 1)
-        if label not in best or score.plausible[0] > best[label].plausible[0]:
-            best[label] = score
-    samples = sum(float(np.ptp(segment.signals.ticks)) for segment in segments) / INDEPENDENT
 
     def worth(score: HypothesisScore) -> float:
-        """Plausible score less what its sizes cost, with the other sign."""
-        return float(score.dof * np.log(samples) - score.plausible[0])
+        return score.worth(test.seconds)
 
-    ordered = sorted(best.values(), key=worth)
+    ordered = sorted(best_shapes(scores).values(), key=worth, reverse=True)
     hypotheses = [score.hypothesis for score in ordered[:MOST_TOGETHER]]
     if not hypotheses:
         return ScoredCandidates([], {}, 0.0)
@@ -117,11 +111,11 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
         order = np.argsort(-alike[i]) if i < len(hypotheses) else np.zeros(0, np.intp)
         others = [hypotheses[j].label for j in order if alike[i, j] > ALIKE][:MOST_ALIKE]
         found.append(ScoredCandidate(score, score.plausible[0], float(p_values[i]), float(chances[i]), tuple(others)))
-    found.sort(key=lambda candidate: worth(candidate.best))
+    found.sort(key=lambda candidate: worth(candidate.best), reverse=True)
     levels = {1.0: tuple(c.label for c in found[:BEST])}
     for level in NOISE_LEVELS[1:]:
         scores = _at_noise(level, segments, [c.best.hypothesis for c in found[:MOST_AT_LEVELS]])
-        levels[level] = tuple(score.hypothesis.label for score in sorted(scores, key=worth)[:BEST])
+        levels[level] = tuple(score.hypothesis.label for score in sorted(scores, key=worth, reverse=True)[:BEST])
     placebo = test.placebo([_placebos(segment.signals) for segment in segments])
     return ScoredCandidates(found, levels, float(np.max(placebo)))
 

@@ -28,7 +28,14 @@ NUMERICS = "it is a choice of the computation, which torques averaged over many 
 BEHIND = "torques averaged over many steps do not tell it behind a spring whose link no sensor sees"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
-SIMPLEST = ("motor_viscous", "torque_offset", "asymmetric_friction", "friction_by_direction", "gravity_imbalance")
+SIMPLEST = (
+    "motor_viscous",
+    "torque_offset",
+    "asymmetric_friction",
+    "friction_by_direction",
+    "gravity_imbalance",
+    "parallel_spring",
+)
 MOST_SMALL = 4  # that are named
 DRIVE_LATE, SEEN_LATE = ("command_delay", "motor_lag"), ("clock_offset", "encoder_delay")
 EQUAL = 0.02  # difference of shares that decides nothing

@@ -32,7 +32,7 @@ ABSOLUTE = 0.003  # of the drive: what is taken away must be larger
 WORTH = 0.01  # of the drive: what is taken away need not be larger than the random torque beside it
 SMALL = "there, but small"  # how a refusal begins of what is significant and not worth a parameter
 GAUGE = 1e-4  # of a column's square outside the base columns
-DRIVEN = ("pwm_deadband", "command_delay", "motor_lag")  # built from the command, which the loop bends to disturbances
+DRIVEN = ("pwm_deadband", "truncated_command", "command_delay", "motor_lag")  # the loop bends commands to disturbances
 
 
 @dataclass(frozen=True)

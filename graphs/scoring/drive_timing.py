@@ -12,16 +12,14 @@ joints does the same to its joint alone, and is asked for, too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.score_system import Segment
+from jointscope.graphs.scoring.hypothesis_score import HypothesisStep
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
@@ -84,17 +82,13 @@ class DriveTiming:
         return [n for n, d in changes.items() if d > sigmas * found[n].sigma and d > share * abs(found[n].value)]
 
 
-def drive_timing(
-    problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
-) -> DriveTiming | None:
+def drive_timing(test: ScoreTest) -> DriveTiming | None:
     """The delay that a solved calibration asks for; None where the model has times of its own, or no commands.
 
     Args:
-        problems: whole recordings with the noise used.
-        states: their solution.
-        calibrations: the values found, with the biases of each recording.
+        test: of the whole recordings, linearised at their solution with the noise used.
     """
-    robot = problems[0].robot
+    robot = test.robot
     if robot.choices.link_dynamics != "model" or _has(robot, TimeShift):
         return None
     asked = [] if _has(robot, CommandEffect) else [(EFFECT, OWNER)]
@@ -104,11 +98,7 @@ def drive_timing(
         return None
     here = [EffectAt(catalogue()[effect], owner) for effect, owner in asked]
     hypotheses = [EffectHypothesis(at, at.effect.parameters_at(robot, at.owner)) for at in here]
-    segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
-    found = [
-        _timing(step.sizes, step.sigmas, step.response, owner, calibrations[0])
-        for step, (_, owner) in zip(ScoreTest(segments).steps(hypotheses), asked, strict=True)
-    ]
+    found = [_timing(test, step) for step in test.steps(hypotheses)]
     drive = next((timing for timing in found if timing is not None and not timing.joint), None)
     encoders = [timing for timing in found if timing is not None and timing.joint]
     # of two that say nearly the same, a late encoder is the usual one
@@ -118,13 +108,14 @@ def drive_timing(
     return drive
 
 
-def _timing(sizes: Array, sigmas: Array, response: Array, owner: str, found: Calibration) -> DriveTiming | None:
+def _timing(test: ScoreTest, step: HypothesisStep) -> DriveTiming | None:
     """What one step says; None where it tells nothing."""
-    delay, sigma = float(sizes[0]), float(sigmas[0])
+    delay, sigma = float(step.sizes[0]), float(step.sigmas[0])
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
-    moved = found.retract({DYNAMICS: response[: len(found.names), 0] * delay})
-    changes = dict(zip(found.names, (moved.values - found.values).tolist(), strict=True))
+    start, owner = test.calibration, step.hypothesis.here.owner
+    before = dict(zip(start.names, start.values.tolist(), strict=True))
+    changes = {name: value - before[name] for name, value in test.values_with(step).items()}
     return DriveTiming(delay, sigma, changes, "" if owner == OWNER else owner)
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -14,6 +15,7 @@ from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 
 Array = NDArray[np.float64]
 
+INDEPENDENT = 0.1  # [s] stretches of this length count as samples where sizes are paid for
 DETERMINED = 0.5  # [prior sigma] a size known better than this is determined by the recordings
 
 
@@ -42,6 +44,10 @@ class HypothesisScore:
         prior = np.array([size.prior_sigma for size in self.hypothesis.sizes])
         determined = self.sigma < DETERMINED * prior
         return max(int(np.sum(determined[list(self.plausible[1])])), 1)
+
+    def worth(self, seconds: float) -> float:
+        """Plausible score less what its sizes cost, dof log samples, in recordings of a length [s]."""
+        return float(self.plausible[0] - self.dof * np.log(seconds / INDEPENDENT))
 
     @cached_property
     def plausible(self) -> tuple[float, tuple[int, ...]]:
@@ -102,6 +108,16 @@ class HypothesisStep:
     sigmas: Array
     response: Array
     p_value: float
+
+
+def best_shapes(scores: Iterable[HypothesisScore]) -> dict[str, HypothesisScore]:
+    """The best score of each label, of all the shapes that were tried."""
+    best: dict[str, HypothesisScore] = {}
+    for score in scores:
+        label = score.hypothesis.label
+        if label not in best or score.plausible[0] > best[label].plausible[0]:
+            best[label] = score
+    return best
 
 
 def fit(S: Array, s: Array) -> tuple[Array, float]:

@@ -134,7 +134,7 @@ def rows_of(segment: Segment, columns: Sequence[Column]) -> list[ScoreRows]:
                     by_size[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
             if in_steps:
                 by_size[:, :, in_steps] = _defects(factor.steps, stacked[1][ticks], stacked[1][ticks])
-        elif reading:
+        elif reading and _reads_channels(segment, factor):
             part = _sensor_part(segment, factor, ticks, linear, stamps)
             by_size = np.zeros((*r.shape, len(columns)))
             for i in reading:
@@ -228,6 +228,11 @@ def _stacked(parts: list[Array | None]) -> Array:
     return np.stack(there, axis=2) if there else np.zeros((0, 0, 0))
 
 
+def _reads_channels(segment: Segment, factor: Factor) -> bool:
+    """Whether rows are channels of a sensor, not combinations of them, of which errors of channels are not known."""
+    return set(factor.rows) <= set(segment.problem.robot.sensors[factor.name].channels)
+
+
 def _sensor_part(
     segment: Segment, factor: Factor, ticks: NDArray[np.intp], linear: Linearization, stamps: Array
 ) -> SensorPart:
@@ -237,7 +242,8 @@ def _sensor_part(
     stream = segment.problem.recording.streams[factor.name]
     measured = stream.values[np.searchsorted(stream.times, stamps)][:, channels]
     biases = segment.calibration.biases
-    offset = biases[factor.name] if factor.name in biases else getattr(sensor, "zero", 0.0)
+    zero = biases[factor.name] if factor.name in biases else getattr(sensor, "zero", 0.0)
+    offset = np.broadcast_to(zero, len(sensor.channels))
     motion = sum((J @ rate[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
-    reading = linear.residual + measured - np.asarray(offset)[channels]
+    reading = linear.residual + measured - offset[channels]
     return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion))

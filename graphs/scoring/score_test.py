@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import fdtrc
 
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.priors import shared_priors
+from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep, JointScores, fit
@@ -25,6 +27,7 @@ from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -42,6 +45,32 @@ class ScoreTest:
     def __init__(self, segments: Sequence[Segment]):
         self._segments = segments
         self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
+
+    @staticmethod
+    def of(problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]) -> ScoreTest:
+        """The test on whole recordings.
+
+        Args:
+            problems: their factors.
+            states: their solution.
+            calibrations: the values found, with the biases of each recording.
+        """
+        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
+
+    @property
+    def seconds(self) -> float:
+        """Length of all recordings together [s]."""
+        return sum(float(np.ptp(s.signals.ticks)) for s in self._segments)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the base model."""
+        return self._segments[0].problem.robot
+
+    @property
+    def calibration(self) -> Calibration:
+        """The values of the base model, with the biases of the first recording."""
+        return self._segments[0].calibration
 
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""
@@ -74,6 +103,12 @@ class ScoreTest:
             p_value = _robust_p(score, blocks[:, c], own)
             found.append(HypothesisStep(hypothesis, score.estimate, sigmas, response[:, c], p_value))
         return found
+
+    def values_with(self, step: HypothesisStep) -> dict[str, float]:
+        """Each shared value of the dynamics where a step with a hypothesis leads, by name."""
+        start = self.calibration
+        moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
+        return dict(zip(start.names, moved.values.tolist(), strict=True))
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""

@@ -9,16 +9,13 @@ wrong, not which: a load further out has moments of inertia that no link of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.score_system import Segment
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -64,32 +61,26 @@ class WrongMass:
         return shares if self.p_value <= BY_CHANCE and max(map(abs, shares.values()), default=0.0) >= MOVED else {}
 
 
-def wrong_masses(
-    problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]
-) -> tuple[WrongMass, ...]:
+def wrong_masses(test: ScoreTest) -> tuple[WrongMass, ...]:
     """What a solved calibration says of each link's mass, surest first.
 
     Without gravity, nothing is said.
 
     Args:
-        problems: whole recordings with the noise used.
-        states: their solution.
-        calibrations: the values found, with the biases of each recording.
+        test: of the whole recordings, linearised at their solution with the noise used.
     """
-    robot, effect = problems[0].robot, catalogue()[EFFECT]
+    robot, effect = test.robot, catalogue()[EFFECT]
     if robot.choices.link_dynamics != "model" or not np.any(robot.tree.gravity):
         return ()
     here = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
     hypotheses = [
         EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)
     ]
-    segments = [Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)]
-    test, start, found = ScoreTest(segments), calibrations[0], []
+    start, found = dict(zip(test.calibration.names, test.calibration.values.tolist(), strict=True)), []
     for step in test.steps(hypotheses):
         if not (np.all(np.isfinite(step.sizes)) and np.all(np.isfinite(step.sigmas))):
             continue
-        moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
-        changes = dict(zip(start.names, (moved.values - start.values).tolist(), strict=True))
+        changes = {name: value - start[name] for name, value in test.values_with(step).items()}
         found.append(
             WrongMass(step.hypothesis.here.owner, float(step.sizes[0]), float(step.sigmas[0]), step.p_value, changes)
         )

@@ -128,10 +128,14 @@ def _stops_of(joint: str, cells: MotionCells, j: int, signals: Array, equation: 
 
 
 def _missing_torque(signals: Array, values: Mapping[str, float], width: float, h: float) -> Array:
-    """What drives the joint and is not used, under the window that suits the noise, shape (m,) [N m]."""
+    """What drives the joint and is not used, by windows that suit the noise; zero at the edges; shape (m,) [N m]."""
     weights = [values[GAIN], -1.0, *(-values.get(law, 0.0) for law in (VISCOUS, DRY, INERTIA))]
     length = max(round(width / h), 1)
-    return np.asarray(convolve1d(signals @ np.array(weights), smooth_window(length) / length, mode="nearest"))
+    missing = np.asarray(convolve1d(signals @ np.array(weights), smooth_window(length) / length, mode="nearest"))
+    # a window that hangs over the ends of the recording averages over what nobody has seen
+    half = length // 2
+    missing[:half], missing[len(missing) - half :] = 0.0, 0.0
+    return missing
 
 
 def _contacts(at_end: Flags, pressed: Flags) -> Flags:

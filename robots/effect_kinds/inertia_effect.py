@@ -33,8 +33,8 @@ class InertiaEffect(Effect):
     last_only: bool = False
 
     def owners_of(self, robot: RobotView) -> tuple[str, ...]:
-        """All joints, or the last one."""
-        owners = super().owners_of(robot)
+        """Joints whose links have an equation of their own, beside those of rotors; all of them, or the last joint."""
+        owners = (joint for joint in super().owners_of(robot) if joint not in robot.tree.massless)
         return tuple(joint for joint in owners if not self.last_only or joint == robot.joints[-1])
 
 

@@ -37,6 +37,7 @@ EFFECT = JointTorque(
             "torque_offset": "while the motor moves both are a constant torque",
             "gravity_imbalance": "near one position the weight is a constant torque, too",
             "pwm_deadband": "while accelerating, a lost command is more friction",
+            "truncated_command": "while accelerating, a larger command is less friction",
             "friction_by_direction": "at one speed the viscous difference is a dry one",
         },
     ),

@@ -42,6 +42,7 @@ EFFECT = GravityDirection(
         excitation="slow motion in several postures; the first joint must turn to tell the base from its encoder",
         look_alikes={
             "encoder_offset": "at a joint with a level axis a turned base and a turned zero are the same",
+            "parallel_spring": "near one posture a turned weight changes with the angle, too",
             "gravity_imbalance": "at one joint a turned weight is a sine of the angle",
             "torque_offset": "near one posture the weight is a constant torque",
         },

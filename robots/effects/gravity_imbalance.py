@@ -37,6 +37,7 @@ EFFECT = JointTorque(
         typical="5 to 20 % of the weight's largest torque; exact for one joint whose axis is level",
         excitation="slow motion and rests over the whole range of the joint",
         look_alikes={
+            "parallel_spring": "near one position the weight changes with the angle as a spring's torque does",
             "torque_offset": "near one position the weight is a constant torque",
             "asymmetric_friction": "near one position the weight is a constant torque, as friction is while moving",
             "cogging": "at order 1 both are a sine of the position",

@@ -37,10 +37,6 @@ def change(body: Array) -> dict[str, Array]:
 class LinkMass(InertiaEffect):
     """Sizes on the scale of the link's own mass and length."""
 
-    def owners_of(self, robot: RobotView) -> tuple[str, ...]:
-        """Joints whose links have an equation of their own, beside those of rotors."""
-        return tuple(joint for joint in super().owners_of(robot) if joint not in robot.tree.massless)
-
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With priors of a few times what the URDF has."""
         body = robot.tree.model.inertias[robot.tree.model.getJointId(owner)].toDynamicParameters()

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.command_effect import CommandEffect, in_command_unit
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 DUTY_START = 0.02  # [1] share of the full command
-USUAL_VOLTAGE = 24.0  # [V] where the robot file names no supply
+SHARE_OF_FRICTION = 0.1  # of the dry friction, where the command is a torque or a current
 
 
 def law(edges: Array, commands: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
@@ -34,15 +34,8 @@ class PwmDeadband(CommandEffect):
 
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """With unit and start of the robot's command."""
-        unit = robot.command.unit
-        if unit == "duty":
-            return self.parameters
-        if unit == "V":
-            start = DUTY_START * robot.constants.get("motor.supply_voltage", USUAL_VOLTAGE)
-        else:
-            start = 0.1 * robot.parameter(f"{owner}.coulomb_torque").value
         (width,) = self.parameters
-        return (replace(width, unit=unit, start=start, prior_sigma=3.0 * start),)
+        return (in_command_unit(width, robot, owner, SHARE_OF_FRICTION),)
 
 
 EFFECT = PwmDeadband(
@@ -64,6 +57,7 @@ EFFECT = PwmDeadband(
         look_alikes={
             "motor_stribeck": "both take torque away where the command is small",
             "asymmetric_friction": "while accelerating, a lost command is more friction",
+            "truncated_command": "the same with the other sign",
         },
     ),
 )

@@ -34,6 +34,7 @@ EFFECT = JointTorque(
         excitation="rests and slow motion in both directions at several positions",
         look_alikes={
             "asymmetric_friction": "while the motor moves both are a constant torque",
+            "parallel_spring": "near one position the spring is a constant torque",
             "gravity_imbalance": "near one position the weight is a constant torque, too",
             "gravity_direction": "near one posture the weight is a constant torque",
             "friction_by_direction": "while the motor moves both are nearly a constant torque",

@@ -123,11 +123,21 @@ class Recording:
         return self.streams["command"]
 
     @property
+    def span(self) -> tuple[float, float]:
+        """Times of the first and the last sample of any stream [s]."""
+        streams = [stream for stream in self.streams.values() if len(stream.times)]
+        return min(float(s.times[0]) for s in streams), max(float(s.times[-1]) for s in streams)
+
+    @property
     def duration(self) -> float:
         """Time from the first to the last sample of any stream [s]."""
-        return max(float(s.times[-1]) for s in self.streams.values()) - min(
-            float(s.times[0]) for s in self.streams.values()
-        )
+        first, last = self.span
+        return last - first
+
+    def shares_samples_with(self, other: Recording) -> bool:
+        """Whether both are of one bag and at one time, as two parts of a recording are not."""
+        (first, last), (begins, ends) = self.span, other.span
+        return bool(self.sha256) and self.sha256 == other.sha256 and first <= ends and begins <= last
 
     @property
     def sample_count(self) -> int:

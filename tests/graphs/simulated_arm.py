@@ -96,6 +96,7 @@ def moved(
     sticks: bool = False,
     push: tuple[float, float, int, float] | None = None,
     stop: tuple[int, float, float] | None = None,
+    cable: float = 0.0,
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -110,6 +111,7 @@ def moved(
         sticks: whether dry friction truly holds a joint that stands; else it turns over within a few mrad/s.
         push: from and to [s], joint, torque [N m] of a hand.
         stop: joint, and from where to where it can move from its middle [rad].
+        cable: stiffness of a cable that pulls each joint to its zero [N m/rad].
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
     text = arm.urdf.format(options='<mujoco><compiler balanceinertia="false"/></mujoco>')
@@ -117,6 +119,7 @@ def moved(
     model.opt.timestep, model.opt.gravity[:] = STEP, arm.gravity
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     model.dof_armature[:], model.dof_damping[:] = arm.inertia, arm.viscous
+    model.jnt_stiffness[:] = cable
     dry = np.array(arm.dry)
     if sticks:  # stiff enough that nothing is seen to creep
         model.dof_frictionloss[:], dry = arm.dry, np.zeros(n)

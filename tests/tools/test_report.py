@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.report import calibration_report, comparison_report
 from jointscope.tools.report.page.decimate import min_max
@@ -20,6 +19,7 @@ from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, path, plo
 from jointscope.tools.report.page.scale import log_ticks, nice_ticks
 from jointscope.tools.report.page.sparse_series import joined
 from jointscope.tools.terminal.calibration_text import calibration_text
+from jointscope.tools.verdicts.judgement import judge
 
 FAKES = runpy.run_path(str(Path(__file__).with_name("fake_results.py")))
 VOID = {"meta", "br", "link", "img", "input", "hr"}

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.errors import RecordingError
+from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.recording import Notice
@@ -46,6 +46,29 @@ def needed_streams(robot: Robot) -> list[StreamSource]:
     robot.need_motion()
     command = StreamSource("command", robot.command, tuple(f"{joint}.command" for joint in robot.joints))
     return [command, *(StreamSource(s.name, s.source, s.channels) for s in robot.sensors.values())]
+
+
+def check_same_streams(robots: Mapping[str, Robot]) -> None:
+    """All models must be about the same measurements.
+
+    Args:
+        robots: by their labels.
+
+    Raises:
+        RobotError: two robots read other topics, fields or units.
+    """
+    if len({robot.free_links for robot in robots.values()}) > 1:
+        raise RobotError(
+            f"{', '.join(robots)}: some have link_dynamics: free, some a model of their links; compare those alike"
+        )
+    (first, reference), *others = ((label, needed_streams(robot)) for label, robot in robots.items())
+    for label, needed in others:
+        if needed != reference:
+            odd = next((b.name for a, b in zip(reference, needed, strict=False) if a != b), "the number of its sensors")
+            raise RobotError(
+                f"{first} and {label} cannot be compared on one recording: they differ in {odd} (topic, type, field, "
+                "unit or names)"
+            )
 
 
 def check_topic(bag: Bag, source: Topic) -> MessageType:

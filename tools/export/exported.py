@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.groups import group_of
+from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
 
 
@@ -28,6 +29,20 @@ class Exported:
     def to_json(self) -> dict[str, object]:
         """The same for machines, without the text."""
         return {"holds": list(self.holds), "lacks": self.lacks}
+
+
+def need_masses(robot: Robot) -> None:
+    """What no format can do without.
+
+    Raises:
+        RobotError: links are free, so that their masses are not known, or the file describes no motion.
+    """
+    if robot.free_links:
+        raise RobotError(
+            f"{robot.name} has link_dynamics: free, so its masses are not known, and a URDF or MuJoCo model of motion "
+            f"needs them; what was calibrated (springs, delays, zeros) stands in {robot.path.name}"
+        )
+    robot.need_link_dynamics()
 
 
 def why_not(effect: Effect, otherwise: str) -> str:

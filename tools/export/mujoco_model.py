@@ -17,7 +17,7 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
-from jointscope.tools.export.exported import Exported, why_not
+from jointscope.tools.export.exported import Exported, need_masses, why_not
 from jointscope.tools.simulator.effects import simulated_effects
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
@@ -46,7 +46,7 @@ def mujoco_model(robot: Robot) -> Exported:
         RobotError: the robot has no equations of motion.
         SimulationError: MuJoCo is missing or cannot build it.
     """
-    robot.need_link_dynamics()
+    need_masses(robot)
     settled = bodies_as_calibrated(robot)
     plain = replace(settled, effects=())
     kept = [(here, _simulated(here, plain)) for here in settled.effects]

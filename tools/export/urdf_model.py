@@ -24,7 +24,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import inertia_changes
 from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
-from jointscope.tools.export.exported import Exported, of_drives, why_not
+from jointscope.tools.export.exported import Exported, need_masses, of_drives, why_not
 
 Array = NDArray[np.float64]
 NO_PLACE = "a URDF has no place for it"
@@ -47,7 +47,7 @@ def urdf_model(robot: Robot) -> Exported:
         move_joints(root, robot)
     if not robot.motion:
         return Exported(urdf_text(root), ("geometry",), {**_sag(robot), **_effects(robot, set())})
-    robot.need_link_dynamics()
+    need_masses(robot)
     joints = {element.get("name", ""): element for element in root.findall("joint")}
     links = {element.get("name", ""): element for element in root.findall("link")}
     _change_bodies(robot, joints, links)

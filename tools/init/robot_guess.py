@@ -20,12 +20,13 @@ from jointscope.robots.urdf.urdf_bodies import UrdfBodies
 from jointscope.robots.urdf.usable_joints import moving_joints
 from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.open_bag import Progress
-from jointscope.tools.init.estimates.drive_values import TYPED, Drives, DriveValues, find_drives, find_signs
+from jointscope.tools.init.estimates.drive_values import EXPLAINED, TYPED, Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
+from jointscope.tools.init.estimates.wiring_by_torques import Exchange, wiring_by_torques
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
 from jointscope.tools.init.streams.sample_times import guess_sample_times
@@ -74,6 +75,7 @@ class RobotGuess:
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
         held_command: whether each value of the command acts until the next one; else it was measured.
+        exchanged: two joints that seem to have each other's columns.
     """
 
     name: str
@@ -99,6 +101,7 @@ class RobotGuess:
     gravity: tuple[float, ...] = GRAVITY
     gravity_reason: str = ""
     held_command: bool = True
+    exchanged: Exchange | None = None
 
     @property
     def free_links(self) -> bool:
@@ -144,7 +147,12 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
     elastic = _seen(tree, gyros) if masses else ()
-    drive = drives(turned, elastic)
+    drive, exchanged = drives(turned, elastic), None
+    if masses and not robot.gyros and robot.links is None:
+        others, exchanged = _by_torques(robot, turned, drive)
+        if others is not None:
+            signs = others
+            drive = drives(replace(encoder, values=encoder.values * np.array(signs.signs)))
     left_out += _unused(signals, roles, masses)
     return RobotGuess(
         name=typed.name or typed.urdf.stem,
@@ -159,6 +167,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         gravity=tuple(drive.gravity.tolist()),
         gravity_reason=drive.gravity_reason,
         held_command=drive.held,
+        exchanged=exchanged,
         encoder_noise=noises,
         link_noise=None if roles.link_encoder is None else robot.noise(roles.link_encoder),
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
@@ -192,6 +201,14 @@ def _drives(
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     held = not measured if told is None else told
     return find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
+
+
+def _by_torques(robot: MeasuredRobot, encoder: Stream, drive: Drives) -> tuple[SignGuess | None, Exchange | None]:
+    """What the torques say of the joints' wiring, where they say otherwise than URDF and names."""
+    if drive.gravity_reason and min(joint.explained for joint in drive.joints) > EXPLAINED:
+        return None, None  # a base that hangs or stands otherwise explains it
+    command = role_stream(robot.roles.command, robot.roles.joints)
+    return wiring_by_torques(robot.tree, encoder, command, held=drive.held)
 
 
 def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:

@@ -13,7 +13,10 @@ from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.comparison.compare import compare as compare_motion
 from jointscope.graphs.discovery.diagnose import diagnose as diagnose_motion
+from jointscope.graphs.discovery.discover import Save
 from jointscope.graphs.discovery.discover import discover as discover_motion
+from jointscope.graphs.discovery.discovery_result import SavedStep
+from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
@@ -21,36 +24,44 @@ from jointscope.graphs.transmission.calibrate_links import calibrate_links
 from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
-from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.effects_at_once import add_effects
-from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.acceptance.evaluation import check_models
+from jointscope.tools.bags.needed_streams import check_same_streams
 from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
-from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed
+from jointscope.tools.notebook.given import (
+    AnyLimits,
+    AnyRecording,
+    AnyRobot,
+    labelled,
+    limits_of,
+    recordings_of,
+    robot_of,
+    to_learn_from,
+)
+from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed, Simulated
 from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
-from jointscope.tools.simulator.simulation import Simulation
 from jointscope.tools.simulator.simulation import simulate as simulate_motion
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.rest_runs import weighted_rests
 
-AnyRobot = Robot | str | Path
-AnyRecording = Recording | str | Path
 
-
-def read(bag: str | Path, robot: AnyRobot) -> Recording:
+def read(bag: str | Path, robot: AnyRobot, *, leave_out: Sequence[tuple[float, float]] = ()) -> Recording:
     """Reads what a robot needs from a bag, in SI units, each stream at its own times.
 
     Args:
         bag: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
         robot: says which topics, fields, units and joint names.
+        leave_out: first and last second of each stretch in which something acted that does not belong to the robot.
 
     Raises:
         RecordingError: the bag cannot be read, or does not hold what the robot needs.
     """
-    return read_recording(bag, _robot(robot))
+    recording = read_recording(bag, robot_of(robot))
+    return recording.leaving_out(leave_out) if leave_out else recording
 
 
 def calibrate(
@@ -59,6 +70,7 @@ def calibrate(
     *,
     rests: Sequence[str | Path] = (),
     sets: Sequence[SetProblem] = (),
+    accept: AnyLimits = (),
     biases_only: bool = False,
     solver: Solver = solve,
     progress: Progress | None = None,
@@ -70,6 +82,7 @@ def calibrate(
         recordings: of motion; parameters and mountings are shared, states and biases are each recording's own.
         rests: bags in which the robot stands, with weights on it or without, for the same estimate.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
+        accept: limits that the result must keep (docs/accept.md); `result.accepted` says whether it does.
         biases_only: leave dynamics and mountings as they are.
         solver: minimises the cost of all samples.
         progress: called with a text and the share done, from 0 to 1.
@@ -78,19 +91,22 @@ def calibrate(
         RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
         SolveError: no convergence, or a value that nothing determines.
     """
-    model = _robot(robot)
-    read_ones = _recordings(recordings, model)
+    model, limits = robot_of(robot), limits_of(accept)
+    read_ones = recordings_of(recordings, model)
     if model.free_links:
-        return Calibrated.of(calibrate_links(model, read_ones, progress=progress))
-    all_sets = [*sets, *weighted_rests(model, [Path(path) for path in rests], progress or _quiet)]
-    options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
-    return Calibrated.of(calibrate_motion(model, read_ones, **options))
+        found = calibrate_links(model, read_ones, progress=progress)
+    else:
+        all_sets = [*sets, *weighted_rests(model, [Path(path) for path in rests], progress or _quiet)]
+        options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
+        found = calibrate_motion(model, read_ones, **options)
+    return Calibrated.of(found, acceptance=check_models(limits, {model.name: found.to_json()} if limits else {}))
 
 
 def compare(
     robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot],
     recording: AnyRecording,
     *,
+    accept: AnyLimits = (),
     progress: Progress | None = None,
 ) -> Compared:
     """Predicts a recording with one or more models, and tells how far off they are, where and when.
@@ -98,17 +114,19 @@ def compare(
     Args:
         robots: one, several, or several with labels.
         recording: one that no model was fitted to.
+        accept: limits that each model must keep (docs/accept.md); `result.accepted` says whether they do.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
-        RobotError: two robots have the same name and no labels.
+        RobotError: two robots have the same name and no labels, or read different topics.
         RecordingError: the recording cannot be a measurement of these robots.
     """
-    several = [robots] if isinstance(robots, Robot | str | Path) else robots
-    models = _labelled(several)
+    models, limits = labelled(robots), limits_of(accept)
+    check_same_streams(models)
     first = next(iter(models.values()))
-    (read_one,) = _recordings(recording, first)
-    return Compared.of((compare_links if first.free_links else compare_motion)(models, read_one, progress=progress))
+    (read_one,) = recordings_of([recording], first)
+    found = (compare_links if first.free_links else compare_motion)(models, read_one, progress=progress)
+    return Compared.of(found, acceptance=check_models(limits, found.to_json()["models"] if limits else {}))
 
 
 def diagnose(
@@ -117,6 +135,7 @@ def diagnose(
     holdout: AnyRecording | None = None,
     *,
     missing_torque: bool = True,
+    side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
 ) -> Diagnosed:
     """Ranks the physical effects that a model may lack, each with its evidence.
@@ -126,16 +145,18 @@ def diagnose(
         recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
         holdout: is scored and reported, and never chooses.
         missing_torque: estimate the torque that the model lacks, for the pictures.
+        side_by_side: processes that fit the candidates; this one alone if not given.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    model, learnt, held = _to_learn_from(robot, recordings, holdout)
+    model, learnt, held = to_learn_from(robot, recordings, holdout)
     if model.free_links:
         return Diagnosed.of(diagnosis_of(diagnose_links(model, learnt, held, progress=progress), learnt, held))
-    found = diagnose_motion(model, learnt, held, missing_torque=missing_torque, progress=progress)
+    options: dict[str, Any] = {"missing_torque": missing_torque, "side_by_side": side_by_side, "progress": progress}
+    found = diagnose_motion(model, learnt, held, **options)
     return Diagnosed.of(diagnosis_of(found, learnt, held))
 
 
@@ -145,14 +166,33 @@ def discover(
     holdout: AnyRecording | None = None,
     *,
     missing_torque: bool = True,
+    save: Save | None = None,
+    resume: Sequence[SavedStep] | None = None,
+    side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
 ) -> Discovered:
-    """Calibrates, diagnoses, adds what is missing, and repeats until nothing helps; arguments as of `diagnose`."""
-    model, learnt, held = _to_learn_from(robot, recordings, holdout)
+    """Calibrates, diagnoses, adds what is missing, and repeats until nothing helps.
+
+    Args:
+        robot: the base model.
+        recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
+        holdout: is scored once per step, and never chooses.
+        missing_torque: estimate the torque that each model lacks, for the pictures.
+        save: called with the number of each finished step and the step; returns the robot file it wrote.
+        resume: finished steps of an earlier run; the search goes on after the last.
+        side_by_side: processes that fit the candidates; this one alone if not given.
+        progress: called with a text and the share done, from 0 to 1.
+
+    Raises:
+        RecordingError: a recording cannot be a measurement of this robot.
+        SolveError: the base model cannot be calibrated.
+    """
+    model, learnt, held = to_learn_from(robot, recordings, holdout)
+    options: dict[str, Any] = {"save": save, "resume": resume, "progress": progress}
     if model.free_links:
-        return Discovered.of(discovery_of(discover_links(model, learnt, held, progress=progress), learnt, held))
-    found = discover_motion(model, learnt, held, missing_torque=missing_torque, progress=progress)
-    return Discovered.of(discovery_of(found, learnt, held))
+        return Discovered.of(discovery_of(discover_links(model, learnt, held, **options), learnt, held))
+    options |= {"missing_torque": missing_torque, "side_by_side": side_by_side}
+    return Discovered.of(discovery_of(discover_motion(model, learnt, held, **options), learnt, held))
 
 
 def add(robot: AnyRobot, *effects: str) -> Robot:
@@ -165,7 +205,7 @@ def add(robot: AnyRobot, *effects: str) -> Robot:
     Raises:
         EffectError: an effect is unknown, is there already, or cannot act there.
     """
-    return add_effects(_robot(robot), effects).robot
+    return add_effects(robot_of(robot), effects).robot
 
 
 def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replayed:
@@ -179,7 +219,7 @@ def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replay
     Raises:
         RecordingError: the recording cannot be a measurement of this robot.
     """
-    model = _robot(robot)
+    model = robot_of(robot)
     if isinstance(recording, Recording):
         return Replayed.of(replay_messages(model, recording, lag))
     model, _ = robot_as_recorded(model, Path(recording))
@@ -207,7 +247,7 @@ def simulate(
     seed: int = 0,
     effects: Iterable[str] = (),
     **conditions: Any,
-) -> Simulation:
+) -> Simulated:
     """A recording from an engine that is independent of the estimator's own model.
 
     Args:
@@ -222,45 +262,11 @@ def simulate(
     Raises:
         SimulationError: MuJoCo is missing, or an option is impossible.
     """
-    model = _robot(robot)
+    model = robot_of(robot)
     found = simulate_motion(model, motion, seconds, seed, effects=effects, **conditions)
     if bag is not None:
         write_bag(Path(bag), found.recording, model)
-    return found
-
-
-def _robot(robot: AnyRobot) -> Robot:
-    return robot if isinstance(robot, Robot) else load_robot(robot)
-
-
-def _recordings(recordings: AnyRecording | Sequence[AnyRecording], robot: Robot) -> list[Recording]:
-    several = [recordings] if isinstance(recordings, Recording | str | Path) else recordings
-    return [each if isinstance(each, Recording) else read_recording(each, robot) for each in several]
-
-
-def _to_learn_from(
-    robot: AnyRobot, recordings: AnyRecording | Sequence[AnyRecording], holdout: AnyRecording | None
-) -> tuple[Robot, list[Recording], Recording | None]:
-    """What is learnt from and what is held out.
-
-    Raises:
-        RecordingError: the held-out recording is also learnt from.
-    """
-    model = _robot(robot)
-    learnt = _recordings(recordings, model)
-    held = None if holdout is None else _recordings(holdout, model)[0]
-    if held is not None and held.sha256 and held.sha256 in {recording.sha256 for recording in learnt}:
-        raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
-    return model, learnt, held
-
-
-def _labelled(robots: Sequence[AnyRobot] | Mapping[str, AnyRobot]) -> dict[str, Robot]:
-    if isinstance(robots, Mapping):
-        return {label: _robot(robot) for label, robot in robots.items()}
-    labels = [robot.name if isinstance(robot, Robot) else Path(robot).stem for robot in robots]
-    if len(set(labels)) < len(labels):
-        raise RobotError(f"{', '.join(labels)}: two models have one name; give labels: {{'before': ..., 'after': ...}}")
-    return dict(zip(labels, map(_robot, robots), strict=True))
+    return Simulated.of(found)
 
 
 def _quiet(text: str, share: float) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 import numpy as np
@@ -14,14 +14,18 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.graphs.fixed_lag.window.state_names import state_names
-from jointscope.robots.errors import RobotError
+from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.acceptance.evaluation import FAIL, OPEN, PASS, AcceptedBy
 from jointscope.tools.notebook.shown import Row, Shown
-from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.model_answer import diagnosis_answer, discovery_answer
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.replay_judgement import judge_replay
+from jointscope.tools.report.page.acceptance import acceptance
+from jointscope.tools.simulator.simulation import Simulation
 from jointscope.tools.verb_parts import result_files
 from jointscope.tools.verb_parts.result_files import ResultFiles
+from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.replay_judgement import judge_replay
+from jointscope.tools.writing.whole_file import write_json
 
 TOLD = 12  # candidates in a figure
 
@@ -30,13 +34,34 @@ class _Found(Shown):
     """Made from a result of the computation."""
 
     @classmethod
-    def of(cls, found: Any) -> Self:
-        """The same result, which shows itself."""
-        return cls(**{field.name: getattr(found, field.name) for field in fields(found)})
+    def of(cls, found: Any, **more: Any) -> Self:
+        """The same result, which shows itself, with what it has beside."""
+        return cls(**{field.name: getattr(found, field.name) for field in fields(found)}, **more)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Limited(_Found):
+    """A result that may be held against limits.
+
+    Attributes:
+        acceptance: each limit with its outcome, by the label of the model; empty if none were given.
+    """
+
+    acceptance: AcceptedBy = field(default_factory=dict)
+
+    @property
+    def accepted(self) -> str:
+        """The worst of all lines: "pass", "fail", or "not evaluated", as where no limits were given."""
+        outcomes = {line.outcome for lines in self.acceptance.values() for line in lines}
+        return FAIL if FAIL in outcomes else OPEN if OPEN in outcomes or not outcomes else PASS
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows, the limits below."""
+        return super()._repr_html_() + "".join(section.body for section in acceptance(self.acceptance))
 
 
 @dataclass(frozen=True)
-class Calibrated(_Found, CalibrationResult):
+class Calibrated(_Limited, CalibrationResult):
     """A calibration; `result["joint1.stiffness"]` is one of its parameters."""
 
     def __getitem__(self, name: str) -> ParameterEstimate:
@@ -73,11 +98,11 @@ class Calibrated(_Found, CalibrationResult):
 
     def write(self, files: ResultFiles) -> None:
         """Robot file, report, viewer recording, JSON."""
-        result_files.write_calibration(self, files)
+        result_files.write_calibration(self, files, self.acceptance)
 
 
 @dataclass(frozen=True)
-class Compared(_Found, ComparisonResult):
+class Compared(_Limited, ComparisonResult):
     """Models against a recording."""
 
     def answer(self) -> str:
@@ -109,7 +134,7 @@ class Compared(_Found, ComparisonResult):
 
     def write(self, files: ResultFiles) -> None:
         """Report, viewer recording, JSON."""
-        result_files.write_comparison(self, files)
+        result_files.write_comparison(self, files, self.acceptance)
 
 
 @dataclass(frozen=True)
@@ -209,3 +234,42 @@ class Replayed(_Found, ReplayResult):
     def write(self, files: ResultFiles) -> None:
         """Report, viewer recording, JSON."""
         result_files.write_replay(self, files)
+
+
+@dataclass(frozen=True)
+class Simulated(_Found, Simulation):
+    """A simulated recording and its truth."""
+
+    def answer(self) -> str:
+        """What was simulated."""
+        effects = ", ".join(f"{each['effect']}@{each['owner']}" for each in self.truth["effects"]) or "none"
+        return (
+            f"{self.truth['seconds']:g} s of {self.truth['robot']}, motion {self.truth['motion']}, "
+            f"seed {self.truth['seed']}, {self.truth['friction']} friction, effects: {effects}"
+        )
+
+    def rows(self) -> list[Row]:
+        """A record for each stream."""
+        return [
+            {"stream": stream.name, "samples": len(stream), "channels": ", ".join(stream.channels)}
+            for stream in self.recording.streams.values()
+        ]
+
+    def draw(self, axes: Any) -> None:
+        """True positions of the links."""
+        joints = self.recording.command.channels
+        positions = self.states[:, : len(joints)]
+        for name, values in zip(joints, positions.T, strict=True):
+            axes.plot(self.state_times, values, linewidth=0.8, label=name.removesuffix(".command"))
+        axes.set(xlabel="time [s]", ylabel="position of the link [rad], [m]")
+        axes.legend(fontsize="x-small", ncols=3)
+
+    def write(self, files: ResultFiles) -> None:
+        """The truth as JSON; a bag is written by `simulate`.
+
+        Raises:
+            JointscopeError: another file is asked for.
+        """
+        if files.robot or files.report or files.rrd or files.figures or not files.json:
+            raise JointscopeError("a simulation is saved as save(json=...); its bag: simulate(robot, 'recording.mcap')")
+        write_json(files.json, self.truth)

@@ -21,6 +21,7 @@ from jointscope.tools.report.sections.calibration.rest_pictures import rest_pict
 from jointscope.tools.report.sections.calibration.states import states
 from jointscope.tools.report.sections.calibration.verdict import verdict
 from jointscope.tools.report.sections.calibration.weak_directions import weak_directions
+from jointscope.tools.writing.origin import other_kinds
 
 
 def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMITS) -> str:
@@ -48,7 +49,7 @@ def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMIT
         *([noise(result), states(result)] if motion else []),
         convergence(result),
         notices(recordings),
-        provenance(recordings, [result.robot], result.wall_seconds),
+        provenance(recordings, [result.robot], result.wall_seconds, other_kinds(result)),
     ]
     names = ", ".join(recording.path for recording in recordings)
     return page(f"Calibration of {result.robot.name}", f"{names} · {result.robot.description}", sections)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -25,12 +26,15 @@ SIGMAS = 2.0  # half width of the bands that are drawn
 SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
 
 
-def frequency_report(result: FrequencyCalibration, checked: AcceptedBy = NO_LIMITS) -> str:
+def frequency_report(
+    result: FrequencyCalibration, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()
+) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         checked: limits that the user has declared, as they came out.
+        more: sections at the end.
     """
     paths = ", ".join(problem.pose.path for problem in result.problems)
     items = [matrix_sentence(result), identifiable_sentence(result), *one_realisation(result)]
@@ -40,6 +44,7 @@ def frequency_report(result: FrequencyCalibration, checked: AcceptedBy = NO_LIMI
         *acceptance(checked),
         _values(result),
         *response_sections(result),
+        *more,
     ]
     return page(f"{result.robot.name}: drives and bearings from frequency responses", paths, sections)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
@@ -19,18 +20,19 @@ from jointscope.tools.report.page.page import Section, page
 from jointscope.tools.report.poses_report import pose_sections
 
 
-def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS) -> str:
+def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         checked: limits that the user has declared, as they came out.
+        more: sections at the end.
     """
     responses = result.frequency
     paths = [p.poses.path for p in result.poses.problems] + [p.pose.path for p in responses.problems]
     said = [matrix_sentence(responses), identifiable_sentence(responses), *one_realisation(responses)]
-    headline, *more = kinds_sentences(result)
-    items = "".join(f"<li>{escape(item)}</li>" for item in [*more, *said])
+    headline, *others_said = kinds_sentences(result)
+    items = "".join(f"<li>{escape(item)}</li>" for item in [*others_said, *said])
     verdict, *others = pose_sections(result.poses)
     sections = [
         Section("kinds", "Do the kinds agree?", f"<ul>{items}</ul>", headline),
@@ -38,5 +40,6 @@ def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS) -> s
         *acceptance(checked),
         *others,
         *response_sections(responses),
+        *more,
     ]
     return page(f"{result.robot.name}: poses and frequency responses", ", ".join(paths), sections)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 
@@ -15,31 +16,37 @@ from jointscope.graphs.poses.discover_poses import PoseDiscovery
 from jointscope.graphs.poses.tip_errors import parts_of, summary
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import significant, with_sigma
-from jointscope.tools.presentation.pose_judgement import judge_poses
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
 from jointscope.tools.terminal.pose_discovery_text import step_table
+from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 Array = NDArray[np.float64]
 BINS = 30
 MM, MICRO = 1e3, 1e6
 
 
-def poses_report(result: PoseCalibration, found: PoseDiscovery | None = None, checked: AcceptedBy = NO_LIMITS) -> str:
+def poses_report(
+    result: PoseCalibration,
+    found: PoseDiscovery | None = None,
+    checked: AcceptedBy = NO_LIMITS,
+    more: Sequence[Section] = (),
+) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         found: the discovery whose last step it is.
         checked: limits that the user has declared, as they came out.
+        more: sections at the end.
     """
     paths = ", ".join(problem.poses.path for problem in result.problems)
     sections = pose_sections(result)
     if found is not None:
         sections.insert(1, _steps(found))
     sections[1:1] = acceptance(checked)
-    return page(f"{result.robot.name}: geometry and sag from poses", paths, sections)
+    return page(f"{result.robot.name}: geometry and sag from poses", paths, [*sections, *more])
 
 
 def pose_sections(result: PoseCalibration) -> list[Section]:

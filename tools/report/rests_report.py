@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
@@ -14,17 +15,18 @@ from jointscope.tools.report.sections.calibration.rest_pictures import rest_pict
 from jointscope.tools.terminal.rests_text import verdict
 
 
-def rests_report(result: RestCalibration, checked: AcceptedBy = NO_LIMITS) -> str:
+def rests_report(result: RestCalibration, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         checked: limits that the user has declared, as they came out.
+        more: sections at the end.
     """
     problems = [problem.of_robot(result.robot) for problem in result.problems]
     paths = ", ".join(problem.rests.path for problem in problems)
     sections = [_verdict(result), *acceptance(checked), *rest_pictures(problems, result.covariance), _values(result)]
-    return page(f"{result.robot.name}: springs, friction and weight from rests", paths, sections)
+    return page(f"{result.robot.name}: springs, friction and weight from rests", paths, [*sections, *more])
 
 
 def _verdict(result: RestCalibration) -> Section:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.presentation.sensor_signals import bag_name
 from jointscope.tools.rerun_log.entities.covariance_picture import covariance_views, send_covariance
 from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_robot
@@ -16,6 +15,7 @@ from jointscope.tools.rerun_log.entities.sensor_lines import send_sensors, senso
 from jointscope.tools.rerun_log.entities.state_lines import send_states, state_views
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
+from jointscope.tools.verdicts.judgement import judge
 
 if TYPE_CHECKING:
     import rerun as rr

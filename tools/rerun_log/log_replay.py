@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from jointscope.graphs.fixed_lag.replay.replay_result import CovarianceSeries, ReplayResult, StateSeries
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.presentation.replay_judgement import diagnose_command, judge_replay, suspects
 from jointscope.tools.presentation.tip_ellipsoid import link_coordinates
 from jointscope.tools.rerun_log.entities.correlation_over_time import correlation_view, send_correlations
 from jointscope.tools.rerun_log.entities.estimate_lines import (
@@ -27,6 +26,7 @@ from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 from jointscope.tools.rerun_log.log_calibration import SIGNS
+from jointscope.tools.verdicts.replay_judgement import diagnose_command, judge_replay, suspects
 
 if TYPE_CHECKING:
     import rerun as rr

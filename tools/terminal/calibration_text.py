@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
-from jointscope.tools.presentation.judgement import Judgement, judge
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.judgement import Judgement, judge
 
 SHOWN_FINDINGS = 6  # the report has them all
 SHOWN_DIRECTIONS = 3

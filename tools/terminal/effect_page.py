@@ -15,8 +15,12 @@ What a model may lack, part by part. `diagnose` and `discover` try all of them a
 `jointscope add ROBOT ID@OWNER -o OUT.yaml` puts one into a model; [an effect of your own](your_own_effect.md) takes one
 file. At its null values an effect is exactly absent.
 
-`jointscope effects --page docs/catalogue.md` writes this page from the cards that `jointscope effects ID` prints, and
-draws the laws."""
+The drawings show the law of an effect, where it is a torque, and its signature: what a model without the effect leaves
+in its residuals while a ready robot moves along sines. The upper curve of a signature is the speed of the joint; below
+is what the equations of motion or the readings of the sensors lack, before other parameters take their part of it.
+
+`jointscope effects --page docs/catalogue.md` writes this page and draws its pictures from the cards that
+`jointscope effects ID` prints."""
 
 
 def effect_page(effects: Iterable[Effect], drawn: Container[str] = (), folder: str = "") -> str:
@@ -24,7 +28,7 @@ def effect_page(effects: Iterable[Effect], drawn: Container[str] = (), folder: s
 
     Args:
         effects: in any order.
-        drawn: ids of those that have a picture ID.svg.
+        drawn: names of the pictures that there are, ID.svg of laws and ID.signature.svg.
         folder: of the pictures, from the page on.
     """
     groups: dict[str, list[Effect]] = {group: [] for group in GROUPS}
@@ -37,12 +41,12 @@ def effect_page(effects: Iterable[Effect], drawn: Container[str] = (), folder: s
         parts += [
             f"## {group[:1].upper()}{group[1:]}",
             table,
-            *(_card(e, folder if e.id in drawn else "") for e in members),
+            *(_card(e, drawn, folder) for e in members),
         ]
     return "\n\n".join(parts) + "\n"
 
 
-def _card(effect: Effect, pictures: str) -> str:
+def _card(effect: Effect, drawn: Container[str], folder: str) -> str:
     card = effect.card
     rows = {
         "acts on": ", ".join(effect.owners),
@@ -52,8 +56,11 @@ def _card(effect: Effect, pictures: str) -> str:
         "note": "a defect of the computation, not physics" if card.numerics else "",
     }
     parts = [f"### {effect.id}", f"**{card.title}.** {card.explanation}", f"```\n{card.law}\n```"]
-    if pictures:
-        parts.append(f"![{effect.id}: its torque, drawn]({pictures}/{effect.id}.svg)")
+    pictures = {
+        f"{effect.id}.svg": "its torque, drawn",
+        f"{effect.id}.signature.svg": "what it leaves in the residuals",
+    }
+    parts += [f"![{effect.id}: {said}]({folder}/{name})" for name, said in pictures.items() if name in drawn]
     parts.append("| | |\n| --- | --- |" + "".join(f"\n| {k} | {_cell(v)} |" for k, v in rows.items() if v))
     if effect.parameters:
         lines = (

@@ -9,8 +9,8 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.tools.presentation.numbers import significant, with_sigma
-from jointscope.tools.presentation.pose_judgement import judge_poses
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 SHOWN_OUT, SHOWN_COMBINATIONS = 5, 18
 

@@ -8,8 +8,8 @@ import numpy as np
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.graphs.fixed_lag.window.state_names import state_names, state_unit
 from jointscope.tools.presentation.numbers import prefixed, significant
-from jointscope.tools.presentation.replay_judgement import diagnose_command, judge_replay, suspects
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.replay_judgement import diagnose_command, judge_replay, suspects
 
 SIGNS = {"good": "ok", "info": "--", "warn": "! ", "bad": "!!"}
 SHOWN_EVENTS = 6

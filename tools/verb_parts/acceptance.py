@@ -16,7 +16,7 @@ def add_accept_option(parser: argparse.ArgumentParser) -> None:
         "--accept",
         type=Path,
         metavar="LIMITS.yaml",
-        help="limits that the result must keep (docs/accept.md); exit code 3 if one is broken, 4 if one cannot be told",
+        help="limits that the result must keep (docs/accept.md); exit code 3 if one fails, 4 if one is not evaluated",
     )
 
 

@@ -107,7 +107,7 @@ def _last_part_held_out(
 
 def _check_apart(recordings: Sequence[Recording], holdout: Recording) -> None:
     for recording in recordings:
-        if recording.sha256 and recording.sha256 == holdout.sha256:
+        if holdout.shares_samples_with(recording):
             raise RecordingError(
                 f"--holdout {holdout.path} is also a training recording ({recording.path}); hold out one that the "
                 "model has not seen"

@@ -20,7 +20,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.verb_parts.result_files import step_provenance
+from jointscope.tools.writing.origin import step_provenance
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
 FORMAT = 1

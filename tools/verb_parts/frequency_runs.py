@@ -16,7 +16,8 @@ from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, 
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.writing.origin import made_from
 
 
 def add_frequency_option(parser: argparse.ArgumentParser) -> None:

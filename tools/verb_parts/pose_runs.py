@@ -15,7 +15,8 @@ from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.writing.origin import made_from
 from jointscope.tools.writing.whole_file import write_json
 
 
@@ -138,9 +139,9 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
     from jointscope.tools.terminal.poses_text import pose_errors_text
 
     by_label: dict[str, dict[str, TipErrors]] = {}
-    count = 0
+    count, sessions = 0, list[Poses]()
     for label, robot in robots.items():
-        sessions: list[Poses] = [read_poses(path, robot) for path in paths]
+        sessions = [read_poses(path, robot) for path in paths]
         count = sum(map(len, sessions))
         _, problems = placed(robot, sessions)
         each = [parts_of(problem) for problem in problems]
@@ -149,7 +150,8 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
         label: {"poses": parts["whole model"].to_json() | {"parts": {p: e.to_json() for p, e in parts.items()}}}
         for label, parts in by_label.items()
     }
-    return pose_errors_text(by_label, count), {"models": content}
+    used = [{"kind": "poses", "path": poses.path, "sha256": poses.sha256} for poses in sessions]
+    return pose_errors_text(by_label, count), {"models": content, "recordings": used}
 
 
 def run_pose_search(

@@ -15,7 +15,8 @@ from jointscope.robots.recordings.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, made_from, other_kinds, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.writing.origin import made_from, other_kinds
 
 
 def add_rests_option(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +80,7 @@ def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: 
     from jointscope.graphs.rests.rest_set import RestSet
     from jointscope.tools.terminal.rests_text import rest_errors_text
 
-    by_label, content, count = {}, {}, 0
+    by_label, content, count, recordings = {}, {}, 0, list[Rests]()
     for label, robot in robots.items():
         recordings = read_all_rests(paths, robot, progress)
         count = sum(map(len, recordings))
@@ -91,4 +92,5 @@ def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: 
             "channels": found.to_json(robot),
             "rests": {"torque_rms": found.torques(robot), "friction_beyond": found.beyond(robot)},
         }
-    return rest_errors_text(by_label, robots, count), {"models": content}
+    used = [{"kind": "rests", "path": rests.path, "sha256": rests.sha256} for rests in recordings]
+    return rest_errors_text(by_label, robots, count), {"models": content, "recordings": used}

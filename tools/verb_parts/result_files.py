@@ -4,21 +4,18 @@
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import jointscope
 from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.outside_modules import need_module
-from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json
+from jointscope.tools.writing.origin import provenance, recordings_of, step_provenance
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 
@@ -198,7 +195,7 @@ def write_still(
     files: ResultFiles,
     robot: Robot,
     made: dict[str, Any],
-    report: Callable[[], str],
+    report: Callable[..., str],
     content: dict[str, Any],
     others: Mapping[Path, str] | None = None,
 ) -> None:
@@ -208,8 +205,8 @@ def write_still(
         files: where to.
         robot: that was found.
         made: where its numbers come from.
-        report: makes the page.
-        content: of the JSON.
+        report: makes the page, and takes further sections as `more`.
+        content: of the JSON; recordings with their hashes are added.
         others: texts of further files.
 
     Raises:
@@ -219,9 +216,11 @@ def write_still(
         write_robot(stack, files, robot, made)
         for path, text in (others or {}).items():
             stack.enter_context(whole_file(path)).write_text(text, encoding="utf-8")
-        write_report(stack, files, report)
+        from jointscope.tools.report.page.provenance import provenance_without_motion
+
+        write_report(stack, files, lambda: report(more=[provenance_without_motion(made, robot)]))
         if files.json is not None:
-            write_json(stack.enter_context(whole_file(files.json)), content)
+            write_json(stack.enter_context(whole_file(files.json)), content | {"recordings": recordings_of(made)})
 
 
 def write_robot(stack: ExitStack, files: ResultFiles, robot: Robot, made: dict[str, Any]) -> None:
@@ -247,51 +246,3 @@ def write_report(stack: ExitStack, files: ResultFiles, report: Callable[[], str]
         files.figures.mkdir(exist_ok=True)
         for name, svg in report_figures(html).items():
             stack.enter_context(whole_file(files.figures / name)).write_text(svg, encoding="utf-8")
-
-
-def provenance(result: Any) -> dict[str, Any]:
-    """Where the numbers of a calibrated robot file come from: version, date, start model, bags with hashes."""
-    return {
-        **origin(result.start.path.name, [bag.recording for bag in result.bags]),
-        **other_kinds(result),
-        "samples": int(result.samples),
-        "cost": float(result.cost),
-    }
-
-
-def other_kinds(result: Any) -> dict[str, Any]:
-    """Rests that a calibration used beside motion."""
-    rests = [problem.rests for problem, _ in result.sets if problem.kind == "rests"]
-    found = [{"path": each.path, "sha256": each.sha256, "count": len(each)} for each in rests]
-    return {"rests": found} if found else {}
-
-
-def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
-    """Where a step of a discovery comes from: the same, and what was changed."""
-    errors = {"train_error": step.train_error, "heldout_error": step.heldout_error, "floor": step.floor}
-    return {
-        **origin(start, recordings),
-        "discovery_step": index,
-        **{name: label for name, label in (("added", step.added), ("removed", step.removed)) if label},
-        **{name: float(f"{value:.6g}") for name, value in errors.items() if math.isfinite(value)},
-    }
-
-
-def origin(start: str, recordings: Sequence[Recording]) -> dict[str, Any]:
-    """Version, date, name of the start model's file, and bags with hashes."""
-    return made_from(start) | {
-        "bags": [
-            {"path": recording.path, "sha256": recording.sha256, "seconds": round(recording.duration, 3)}
-            | ({"left_out": [list(stretch) for stretch in recording.left_out]} if recording.left_out else {})
-            for recording in recordings
-        ],
-    }
-
-
-def made_from(start: str) -> dict[str, Any]:
-    """Version, date, name of the start model's file."""
-    return {
-        "version": jointscope.__version__,
-        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "start": start,
-    }

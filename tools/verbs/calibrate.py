@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.tools.acceptance.evaluation import AcceptedBy, check_models
+from jointscope.tools.acceptance.evaluation import AcceptedBy
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, progress_bar, reading
@@ -23,7 +23,7 @@ from jointscope.tools.verb_parts.frequency_runs import (
 )
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_calibration
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
 
@@ -68,7 +68,7 @@ def add_parser(subparsers: Any) -> None:
     add_poses_option(parser)
     add_rests_option(parser)
     add_frequency_option(parser)
-    parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry that poses told")
+    parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry found from poses")
     add_accept_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
@@ -89,9 +89,9 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.notebook.calls import calibrate
-    from jointscope.tools.presentation.judgement import judge
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look
+    from jointscope.tools.verdicts.judgement import judge
 
     load_user_effects(args.effects)
     robot, limits = load_robot(args.robot), limits_of(args)
@@ -113,18 +113,18 @@ def run(args: argparse.Namespace) -> int:
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
         seen = None if args.incremental else progress  # what is printed and a bar would write into each other
-        result = calibrate(robot, recordings, rests=args.rests, solver=_solver(args, robot), progress=seen)
+        solver = _solver(args, robot)
+        result = calibrate(robot, recordings, rests=args.rests, accept=limits, solver=solver, progress=seen)
         if files.pictures:
             progress("writing", 1.0)
-        checked = check_models(limits, {robot.name: result.to_json()})
-        write_calibration(result, files, checked)
+        result.write(files)
     judgement = judge(result)
     print(calibration_text(result, judgement))
     files.tell()
     if judgement.level != "good":
         bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
         print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
-    return print_acceptance(checked)
+    return print_acceptance(result.acceptance)
 
 
 def _still_kinds(

@@ -16,7 +16,7 @@ from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, compare_rests
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_comparison
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
@@ -75,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
         files.all, inputs=[*([] if poses or rests else [args.bag]), *poses, *rests, *robot_files, *args.effects]
     )
     from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.bags.needed_streams import check_same_streams
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.notebook.calls import compare
     from jointscope.tools.terminal.comparison_text import comparison_text
@@ -86,18 +87,17 @@ def run(args: argparse.Namespace) -> int:
         return _on_poses(robots, poses, files, limits)
     if rests:
         return _on_rests(robots, rests, files, limits)
-    check_same_streams(robots)
+    check_same_streams(robots)  # before the bag is read for the first of them
     for robot in robots.values():
         check_viewer(robot, files)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
         (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
-        result = compare(robots, recording, progress=progress)
-        checked = check_models(limits, result.to_json()["models"])
-        write_comparison(result, files, checked)
+        result = compare(robots, recording, accept=limits, progress=progress)
+        result.write(files)
     print(comparison_text(result))
     files.tell()
-    return print_acceptance(checked)
+    return print_acceptance(result.acceptance)
 
 
 def _on_poses(robots: dict[str, Any], poses: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
@@ -140,25 +140,3 @@ def labels(robots: Sequence[str]) -> list[str]:
         if names.count(name) > 1:
             raise JointscopeError(f"the robot {name} is named twice; name each model once")
     return names
-
-
-def check_same_streams(robots: dict[str, Any]) -> None:
-    """All models must be about the same measurements.
-
-    Raises:
-        RobotError: two robots read other topics, fields or units.
-    """
-    from jointscope.tools.bags.needed_streams import needed_streams
-
-    if len({robot.free_links for robot in robots.values()}) > 1:
-        raise RobotError(
-            f"{', '.join(robots)}: some have link_dynamics: free, some a model of their links; compare those alike"
-        )
-    (first, reference), *others = ((label, needed_streams(robot)) for label, robot in robots.items())
-    for label, needed in others:
-        if needed != reference:
-            odd = next((b.name for a, b in zip(reference, needed, strict=False) if a != b), "the number of its sensors")
-            raise RobotError(
-                f"{first} and {label} cannot be compared on one recording: they differ in {odd} (topic, type, field, "
-                "unit or names)"
-            )

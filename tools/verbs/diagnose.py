@@ -8,9 +8,8 @@ from typing import Any
 
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
-from jointscope.tools.verb_parts.named_recordings import diagnosis_of
 from jointscope.tools.verb_parts.pose_runs import run_pose_search
-from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_diagnosis
+from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
@@ -43,9 +42,8 @@ def run(args: argparse.Namespace) -> int:
     check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
-    from jointscope.graphs.discovery.diagnose import diagnose
-    from jointscope.graphs.transmission.diagnose_links import diagnose_links
     from jointscope.robots.files.robot_file import load_robot
+    from jointscope.tools.notebook.calls import diagnose
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
@@ -56,16 +54,12 @@ def run(args: argparse.Namespace) -> int:
     check_viewer(robot, files)
     with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
-        if robot.free_links:
-            found = diagnose_links(robot, recordings, holdout, progress=progress)
-        else:
-            found = diagnose(
-                robot, recordings, holdout, missing_torque=files.pictures, side_by_side=workers, progress=progress
-            )
-        result = diagnosis_of(found, recordings, holdout)
+        result = diagnose(
+            robot, recordings, holdout, missing_torque=files.pictures, side_by_side=workers, progress=progress
+        )
         if files.pictures:
             progress("writing", 1.0)
-        write_diagnosis(result, files)
+        result.write(files)
     print(diagnosis_text(result))
     files.tell()
     return 0

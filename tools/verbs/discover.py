@@ -13,7 +13,6 @@ from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
-from jointscope.tools.verb_parts.named_recordings import discovery_of
 from jointscope.tools.verb_parts.pose_runs import run_pose_search
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
 from jointscope.tools.verb_parts.user_effects import load_user_effects
@@ -27,7 +26,6 @@ EXAMPLE = """example:
 Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
 after the last finished step; found.discovery.json remembers what it started from."""
 
-MAX_STEPS = 8
 MOST_STEPS = 12  # of robots with free links, whose sensors show one effect for each joint and gyro
 
 
@@ -84,8 +82,7 @@ def _discover(
     args: argparse.Namespace, robot: Robot, recordings: Sequence[Any], holdout: Any, progress: Progress
 ) -> Any:
     """The computation; whatever ends it, finished steps stay on disk."""
-    from jointscope.graphs.discovery.discover import discover
-    from jointscope.graphs.transmission.discover_links import discover_links
+    from jointscope.tools.notebook.calls import discover
     from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
     hashes = hashes_of(robot, recordings, holdout, args.effects)
@@ -93,20 +90,15 @@ def _discover(
     saved = () if args.restart else state.resume()
     if saved:
         print(f"Continuing after step {len(saved) - 1}, {saved[-1].robot_file}; --restart starts anew.\n", flush=True)
-    resume = saved or None
     try:
-        if robot.free_links:
-            result = discover_links(robot, recordings, holdout, save=state.save, resume=resume, progress=progress)
-            return discovery_of(replace(result, robot_file=str(args.output)), recordings, holdout)
         with workers_of(args) as workers:
             result = discover(
                 robot,
                 recordings,
                 holdout,
-                save=state.save,
-                resume=resume,
-                max_steps=MAX_STEPS,
                 missing_torque=ResultFiles.of(args).pictures,
+                save=state.save,
+                resume=saved or None,
                 side_by_side=workers,
                 progress=progress,
             )
@@ -114,4 +106,4 @@ def _discover(
         if not state.count:
             raise
         raise JointscopeError(f"interrupted after step {state.count - 1}; the same command continues there") from None
-    return discovery_of(replace(result, robot_file=str(args.output)), recordings, holdout)
+    return replace(result, robot_file=str(args.output))

@@ -40,7 +40,7 @@ def add_parser(subparsers: Any) -> None:
         "--page",
         type=Path,
         metavar="F.md",
-        help=f"write the whole catalogue as a page of markdown, with drawings of the laws in {PICTURES} beside it",
+        help=f"write the catalogue as a page of markdown; drawings of laws and of signatures go to {PICTURES}",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
     parser.set_defaults(run=run)
@@ -70,13 +70,16 @@ def run(args: argparse.Namespace) -> int:
 def _write_page(path: Path, effects: Sequence[Effect]) -> None:
     """The page, and beside it the folder of its pictures."""
     from jointscope.tools.report.law_picture import law_picture
+    from jointscope.tools.report.signature_picture import signature_picture
     from jointscope.tools.terminal.effect_page import effect_page
 
-    pictures = {effect.id: svg for effect in effects if (svg := law_picture(effect)) is not None}
+    drawn = {f"{effect.id}.svg": law_picture(effect) for effect in effects}
+    drawn |= {f"{effect.id}.signature.svg": signature_picture(effect) for effect in effects}
+    pictures = {name: svg for name, svg in drawn.items() if svg is not None}
     folder = path.parent / PICTURES
     folder.mkdir(parents=True, exist_ok=True)
     for name, svg in pictures.items():
-        with whole_file(folder / f"{name}.svg") as file:
+        with whole_file(folder / name) as file:
             file.write_text(svg, encoding="utf-8")
     with whole_file(path) as page:
         page.write_text(effect_page(effects, pictures, PICTURES), encoding="utf-8")

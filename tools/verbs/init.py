@@ -11,6 +11,7 @@ from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 if TYPE_CHECKING:
+    from jointscope.tools.init.robot_guess import RobotGuess
     from jointscope.tools.init.streams.named_signal import Wish
 
 EXAMPLE = """example:
@@ -62,7 +63,6 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
     from jointscope.robots.files.robot_file import load_robot, urdf_reference
     from jointscope.tools.bags.describe_bag import describe_bag
-    from jointscope.tools.init.estimates.drive_values import EXPLAINED
     from jointscope.tools.init.robot_guess import guess_robot
     from jointscope.tools.init.streams.other_joints import Typed
     from jointscope.tools.init.text.drive_table import drive_content, drive_table
@@ -104,7 +104,23 @@ def run(args: argparse.Namespace) -> int:
     if not description.usable:
         print(f"\nWrote {args.output}; the recording cannot be used with it: {description.problem}")
         return 0
-    poor = [joint for joint, drive in zip(guess.roles.joints, guess.drives, strict=True) if drive.explained < EXPLAINED]
+    _say_whether_usable(args, guess)
+    calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
+    better = args.output.with_name(f"{args.output.stem}_better.yaml")
+    print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
+    print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {better}")
+    return 0
+
+
+def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:
+    """Whether the regression explains the recording; what to look at where it does not."""
+    from jointscope.tools.init.estimates.drive_values import EXPLAINED
+
+    poor = [
+        joint
+        for joint, drive in zip(guess.roles.joints, guess.drives, strict=True)
+        if drive.explained < EXPLAINED or drive.is_impossible
+    ]
     if poor and not guess.free_links:
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
@@ -112,13 +128,10 @@ def run(args: argparse.Namespace) -> int:
             "missing; look at it first (a base that is not level: jointscope add "
             f"{args.output} gravity_direction@robot -o {args.output})"
         )
+        if guess.exchanged is not None:
+            print(guess.exchanged.sentence(str(args.urdf), str(args.bag), str(args.output), guess.roles.joints))
     else:
         print(f"\nWrote {args.output}; the recording can be used with it")
-    calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
-    better = args.output.with_name(f"{args.output.stem}_better.yaml")
-    print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
-    print(f"What it lacks: jointscope discover {args.output} {args.bag} --holdout-share 0.33 -o {better}")
-    return 0
 
 
 def _check_order(urdf: Path, bag: Path) -> None:

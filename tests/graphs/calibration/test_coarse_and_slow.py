@@ -9,7 +9,7 @@ from slow_pendulum import TRUTH, pendulum, recorded, swing
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.robot_writer import robot_text
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 STEP = 2.0 * np.pi / 4096.0
 

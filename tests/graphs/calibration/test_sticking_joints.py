@@ -13,7 +13,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 pytestmark = pytest.mark.slow
 

@@ -20,7 +20,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.pose_section import with_poses
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
-from jointscope.tools.presentation.pose_judgement import judge_poses
+from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 pytestmark = pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project")
 

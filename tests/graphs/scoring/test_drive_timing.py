@@ -15,7 +15,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 SIGMA, EFFORT_NOISE = 1e-5, 0.002  # [rad], [1] of the largest current
 DELAY = "robot.command_delay.delay"

@@ -15,7 +15,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags.end_stops_left_out import with_end_stops_left_out
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 ARM = Arm("yx", inertia=(0.7, 0.2), dry=(2.0, 0.8), viscous=(1.5, 0.6))
 UPPER, LOWER = 0.3, -0.25  # [rad] from the middle of the motion
@@ -67,6 +67,16 @@ def test_stops_at_both_ends(robot, seed):
 )
 def test_a_joint_that_merely_turns_over_has_none(robot, how, seed):
     assert end_stops(robot, recorded(seed=seed, **how)) == ()
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+@pytest.mark.parametrize("noise", [2e-5, 3e-4])
+def test_a_recording_that_ends_at_the_end_of_a_way_shows_no_stop(robot, seed, noise):
+    recording = recorded(seed=seed, noise=noise)
+    encoder = recording.streams["encoder"]
+    late = encoder.times > 4.0
+    last = float(encoder.times[late][np.argmax(encoder.values[late, 1])])
+    assert end_stops(robot, recording.between(0.0, last + 0.02)) == ()
 
 
 def test_a_command_of_another_unit_or_that_acts_late_is_no_stop(robot):

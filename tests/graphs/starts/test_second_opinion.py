@@ -13,7 +13,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 VISCOUS = "swing.motor_viscous.coefficient"
 

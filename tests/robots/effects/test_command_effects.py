@@ -103,6 +103,22 @@ def test_the_deadband_swallows_small_commands():
     assert np.array_equal(by["width"], [1, 0, 0, 0, -1])
 
 
+def test_what_is_cut_off_is_measured_in_the_unit_of_the_command():
+    effect = catalogue()["truncated_command"]
+    for unit, start in (("duty", 0.005), ("V", 0.16), ("N m", 0.1)):
+        robot = replace(DOGGY, command=replace(DOGGY.command, unit=unit))
+        (lost,) = effect.parameters_of(robot, "joint1")
+        assert lost.start == pytest.approx(start) and lost.prior_sigma == pytest.approx(20.0 * start)
+
+
+def test_a_driver_that_cuts_to_whole_numbers_loses_half_a_step_on_average():
+    asked = np.linspace(-9.98, 9.98, 500)  # no multiple of the step, nothing below one
+    asked = asked[np.abs(asked) > 1.0]
+    acting, by = catalogue()["truncated_command"].law(np.arange(len(asked) + 1.0), np.trunc(asked), {"lost": 0.5})
+    assert abs(np.mean((acting - asked) * np.sign(asked))) < 0.01
+    assert np.array_equal(by["lost"], np.sign(asked))
+
+
 def test_the_deadband_is_measured_in_the_unit_of_the_command():
     effect = catalogue()["pwm_deadband"]
     for unit, start in (("duty", 0.02), ("V", 0.64), ("N m", 0.2)):

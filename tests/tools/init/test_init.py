@@ -22,8 +22,8 @@ from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.init.robot_guess import guess_robot
 from jointscope.tools.init.streams.other_joints import Typed
 from jointscope.tools.init.streams.sensor_noise import guess_noise
-from jointscope.tools.presentation.judgement import judge
 from jointscope.tools.verbs import init
+from jointscope.tools.verdicts.judgement import judge
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"

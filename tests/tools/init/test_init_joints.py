@@ -352,6 +352,7 @@ def test_a_finger_without_a_mass_has_that_of_its_rotor(moving, tmp_path, capsys)
     robot = load_robot(tmp_path / "a.yaml")
     assert robot.tree.massless == ("finger",) and robot.command.unit == "N m"
     assert catalogue()["link_mass"].owners_of(robot) == moving[:-1]  # others are asked for theirs
+    assert catalogue()["inertia_error"].owners_of(robot) == moving[:-1] and not catalogue()["payload"].owners_of(robot)
     start = {name: parameter.value for name, parameter in robot.parameters.items()}
     assert start["finger.inertia"] == pytest.approx(0.05, rel=0.05)  # the commands are held
     assert start["finger.coulomb_torque"] == pytest.approx(0.3, rel=0.05)

@@ -21,14 +21,29 @@ BLOCK = re.compile(
 @pytest.mark.slow
 def test_the_example_of_the_page_runs_and_leaves_its_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (code,) = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
-    names: dict = {}
-    exec(compile(code, str(PAGE), "exec"), names)
+    names = run_block(0)
     told, replayed = capsys.readouterr().out.splitlines()
     assert re.match(r"Error 0.1 s ahead, calibrated: [\d.]+ sigma \(floor [\d.]+\), one more: [\d.]+ sigma", told)
     assert replayed == names["replayed"].answer()
     assert {file.name for file in tmp_path.iterdir()} == {"train.mcap", "calibrated.yaml", "calibration.html"}
     assert js.load_robot("calibrated.yaml").parameters["joint2.stiffness"].sigma is not None
+
+
+@pytest.mark.slow
+def test_the_example_of_a_discovery_finds_what_was_hidden(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    run_block(1)
+    diagnosed, steps = capsys.readouterr().out.splitlines()
+    assert diagnosed == "The model is not adequate: it lacks motor_viscous@joint2."
+    assert steps == "['base model', '+ motor_viscous@joint2']"
+    assert {file.name for file in tmp_path.iterdir()} == {"seen.mcap", "unseen.mcap", "found.yaml", "story.html"}
+
+
+def run_block(number: int) -> dict:
+    """Runs a block of the page; returns its names."""
+    names: dict = {}
+    exec(compile(BLOCK.findall(PAGE.read_text(encoding="utf-8"))[number], str(PAGE), "exec"), names)
+    return names
 
 
 def test_every_name_of_the_facade_stands_on_the_page():

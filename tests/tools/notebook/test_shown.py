@@ -14,9 +14,12 @@ import pytest
 from fake_diagnosis import fake_diagnosis, fake_discovery
 from fake_results import fake_calibration, fake_comparison
 
+import jointscope as js
 from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.tools.acceptance.evaluation import check_models
+from jointscope.tools.notebook.given import limits_of
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
 from jointscope.tools.notebook.shown import SHOWN_ROWS
 
@@ -27,9 +30,15 @@ def calibrated():
 
 
 @pytest.fixture(scope="module")
-def results(calibrated):
+def simulated():
+    pytest.importorskip("mujoco", reason="comes with the extra sim")
+    return js.simulate("doggy", seconds=2.0, seed=1, effects=["cogging@joint1"])
+
+
+@pytest.fixture(scope="module")
+def results(calibrated, simulated):
     comparison = Compared.of(fake_comparison())
-    return [calibrated, comparison, Diagnosed.of(fake_diagnosis()), Discovered.of(fake_discovery())]
+    return [calibrated, comparison, Diagnosed.of(fake_diagnosis()), Discovered.of(fake_discovery()), simulated]
 
 
 def test_a_result_is_still_the_result_of_the_computation(calibrated):
@@ -113,3 +122,46 @@ def test_saving_writes_what_the_verb_writes(calibrated, tmp_path):
     calibrated.save(tmp_path / "a.yaml", report=tmp_path / "a.html", json=tmp_path / "a.json")
     assert json.loads((tmp_path / "a.json").read_text())["parameters"]["joint2.stiffness"]["unit"] == "N m/rad"
     assert {file.name for file in tmp_path.iterdir()} == {"a.yaml", "a.html", "a.json"}
+
+
+def test_a_simulation_says_what_it_is_and_saves_its_truth_alone(simulated, tmp_path):
+    assert simulated.answer().startswith("2 s of doggy, motion calibration, seed 1, ")
+    assert simulated.answer().endswith("effects: cogging@joint1")
+    assert {row["stream"]: row["samples"] for row in simulated.rows()}["command"] == len(simulated.recording.command)
+    simulated.save(json=tmp_path / "truth.json")
+    assert json.loads((tmp_path / "truth.json").read_text())["seed"] == 1
+    with pytest.raises(JointscopeError, match=r"its bag: simulate\(robot, 'recording\.mcap'\)"):
+        simulated.save(report=tmp_path / "no.html")
+
+
+def limited(found, folder, *lines: str):
+    """A made-up result held against limits, as `calibrate` and `compare` do it."""
+    (folder / "limits.yaml").write_text("limits:\n" + "".join(f"  - {{{line}, because: a bench}}\n" for line in lines))
+    limits = limits_of(folder / "limits.yaml")
+    return Calibrated.of(found, acceptance=check_models(limits, {"doggy": found.to_json()}))
+
+
+def test_without_limits_a_result_is_not_evaluated_and_never_accepted_by_silence(calibrated):
+    assert calibrated.accepted == "not evaluated" and calibrated.acceptance == {}
+    assert "Accepted" not in calibrated._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("lines", "outcome", "said"),
+    [
+        (["parameter: joint2.stiffness, at_least: 1"], "pass", "Accepted: all 1 limits are kept."),
+        (
+            ["parameter: joint2.stiffness, at_least: 1", "parameter: joint2.stiffness, at_most: 1"],
+            "fail",
+            "Not accepted: 1 of 2 limits",
+        ),
+        (["parameter: joint2.stiffness, at_least: 1", "poses: all, p90_mm: 1"], "not evaluated", "Undecided: 1 of 2"),
+    ],
+)
+def test_limits_are_shown_and_saved_with_the_result(lines, outcome, said, tmp_path):
+    result = limited(fake_calibration(), tmp_path, *lines)
+    assert result.accepted == outcome
+    assert said in result._repr_html_()
+    result.save(report=tmp_path / "r.html", json=tmp_path / "r.json")
+    assert said in (tmp_path / "r.html").read_text()
+    assert outcome in {line["outcome"] for line in json.loads((tmp_path / "r.json").read_text())["acceptance"]["doggy"]}

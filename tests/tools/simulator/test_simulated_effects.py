@@ -31,6 +31,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "motor_lag": ("joint, robot", "time_constant"),
     "command_delay": ("joint, robot", "delay"),
     "pwm_deadband": ("joint", "width"),
+    "truncated_command": ("joint", "lost"),
     "spring_cubic": ("elastic joint", "stiffness"),
     "spring_curve": ("elastic joint", "quadratic cubic"),
     "backlash": ("elastic joint", "half_gap"),
@@ -39,6 +40,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "link_viscous": ("joint", "coefficient"),
     "link_coulomb": ("joint", "torque"),
     "gravity_imbalance": ("joint", "cos sin"),
+    "parallel_spring": ("joint", "stiffness torque"),
     "payload": ("last joint", "inertia"),
     "inertia_error": ("joint", "ixx iyy izz"),
     "bearing_flexibility": (

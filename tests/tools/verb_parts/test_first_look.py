@@ -55,7 +55,7 @@ def test_verbs_that_take_long_say_it_before_they_begin(verb, doggy, swapped, tmp
 
     bag = tmp_path / "odd.mcap"
     write_bag(bag, swapped, doggy)
-    place = "tools.notebook.calls.calibrate_motion" if verb == "calibrate" else f"graphs.discovery.{verb}.{verb}"
+    place = f"tools.notebook.calls.{verb}_motion"
     monkeypatch.setattr(f"jointscope.{place}", begin)
     output = ["-o", str(tmp_path / "out.yaml")] if verb != "diagnose" else []
     assert main([verb, "doggy", str(bag), *output]) == 1

@@ -21,7 +21,7 @@ from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main, verbs
 from jointscope.tools.notebook import calls
-from jointscope.tools.presentation.judgement import judge
+from jointscope.tools.verdicts.judgement import judge
 
 IMPORT_COST = {"numpy", "gtsam", "pinocchio", "rerun", "rosbags", "scipy", "mujoco"}
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from fake_diagnosis import BEARING, fake_diagnosis, fake_inputs, fake_steps
@@ -16,6 +14,7 @@ from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags import read_recording as read_module
 from jointscope.tools.command_line import main
+from jointscope.tools.notebook import calls
 from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
 DIAGNOSE = ["diagnose", "doggy", "a.mcap"]
@@ -47,14 +46,14 @@ def quick(tmp_path, monkeypatch):
     _, _, _, train, test, _ = fake_inputs(0.5)
     known = {"a.mcap": train, "b.mcap": test}
     monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: known[Path(path).name])
-    fake = SimpleNamespace(diagnose=lambda robot, recordings, holdout, **_: fake_diagnosis(0.5, held_out=False))
-    monkeypatch.setitem(sys.modules, "jointscope.graphs.discovery.diagnose", fake)
+    found = fake_diagnosis(0.5, held_out=False)
+    monkeypatch.setattr(calls, "diagnose_motion", lambda robot, recordings, holdout, **_: found)
 
 
 @pytest.fixture
 def discover(monkeypatch):
     computation = FakeDiscover()
-    monkeypatch.setitem(sys.modules, "jointscope.graphs.discovery.discover", SimpleNamespace(discover=computation))
+    monkeypatch.setattr(calls, "discover_motion", computation)
     return computation
 
 

@@ -51,6 +51,9 @@ def test_robot_file_urdf_report_and_json_are_written(calibrated):
     assert content["rank"] == 29 and len(content["undetermined"]) == 18
     assert content["parameters"]["joint3.stiffness"]["unit"] == "N m/rad"
     assert content["samples"] == 40 and content["wall_seconds"] > 0.0
+    (used,) = content["recordings"]
+    assert used["kind"] == "poses" and used["count"] == 40
+    assert all(used["sha256"] in (calibrated / name).read_text() for name in ("arm.yaml", "arm.html"))
 
 
 @needs_poses

@@ -19,11 +19,11 @@ from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
-from jointscope.tools.presentation.replay_judgement import judge_replay
 from jointscope.tools.report.replay_report import replay_report
 from jointscope.tools.rerun_log.live_replay import live_replay
 from jointscope.tools.rerun_log.log_replay import log_replay
 from jointscope.tools.terminal.replay_text import replay_text
+from jointscope.tools.verdicts.replay_judgement import judge_replay
 
 SECTIONS = "verdict nis residuals states covariance batch latency messages events provenance"
 SECONDS = 1.5

@@ -33,6 +33,7 @@ from jointscope.tools.init.estimates.gravity_guess import clearer_gravity
 Array = NDArray[np.float64]
 
 OPPOSITE = 10.0  # [sigma] from which a motor turns against its command
+IMPOSSIBLE = 3.5  # [sigma] below zero from which a value cannot be
 TOLD = 2.0  # [sigma] above zero from which a value is one
 SMALLEST = 0.02  # of the rms torque that a start value explains at least: it must be above zero
 MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least where springs hide it, or nothing tells
@@ -72,10 +73,20 @@ class DriveValues:
     unknown_scale: bool = False
     sharpness: float | None = None
 
+    @property
+    def is_impossible(self) -> bool:
+        """Whether the regression says something that is surely below zero, as no inertia and no friction is."""
+        return is_impossible(self.found)
+
     def is_lost(self, name: str) -> bool:
         """Whether the regression cannot tell a value from zero."""
         value = self.found.get(name)
         return value is None or self.unknown_scale or value.value <= TOLD * value.sigma
+
+
+def is_impossible(found: Mapping[str, Value]) -> bool:
+    """Whether an inertia or a friction among the values of a drive is surely below zero."""
+    return any(v.value < -IMPOSSIBLE * v.sigma for law, v in found.items() if law in PLACES)
 
 
 @dataclass(frozen=True)

@@ -34,11 +34,13 @@ class SignGuess:
         signs: of the joints, 1 where nothing speaks against it, shape (n,).
         others: other signs with which the gyroscopes agree as well, with as few turned joints.
         mirrored: whether a gyroscope that no rotation explains shall be taken for left-handed.
+        by_torques: whether torques say so, not gyroscopes.
     """
 
     signs: Signs
     others: tuple[Signs, ...] = ()
     mirrored: bool = True
+    by_torques: bool = False
 
 
 def encoder_signs(tree: RigidTree, gyros: Sequence[SeenRate], drives: Callable[[Signs], Sequence[float]]) -> SignGuess:

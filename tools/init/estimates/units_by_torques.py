@@ -13,12 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.drive_regression import GAIN, Driven, drive_equations
-from jointscope.graphs.starts.drive_signal import open_torque
+from jointscope.graphs.starts.drive_regression import GAIN
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
+from jointscope.tools.init.estimates.open_share import equations_of, open_share
 from jointscope.tools.init.estimates.position_units import COUNTS, LARGEST, UnitGuess
 
 Array = NDArray[np.float64]
@@ -48,7 +47,8 @@ def unit_by_torques(
         return found
 
     def left(factor: Array) -> float:
-        return _left(tree, replace(encoder, values=encoder.values * factor), command, held)
+        equations = equations_of(tree, replace(encoder, values=encoder.values * factor), command, held)
+        return open_share([equation for equation in equations if GAIN in equation.solve()])
 
     usual, span = left(found.factor), np.ptp(encoder.values, axis=0)
     if usual > POOR:
@@ -69,16 +69,6 @@ def unit_by_torques(
         return found
     reason = f"{BY_TORQUES}: they are measured before gears of {1.0 / ratio:.4g}"
     return UnitGuess(("rad",) * tree.n, reason, (ratio,) * tree.n)
-
-
-def _left(tree: RigidTree, encoder: Stream, command: Stream, held: bool) -> float:
-    """Root mean square share of the torques that regression leaves open; infinite where it tells nothing."""
-    try:
-        equations = drive_equations(tree, [Driven(encoder, command)], np.zeros(tree.n), held=held)
-    except RecordingError:
-        return np.inf
-    shares = [min(open_torque(equation)[1], 1.0) for equation in equations if GAIN in equation.solve()]
-    return float(np.sqrt(np.mean(np.square(shares)))) if shares else np.inf
 
 
 def _common_gear(left: Callable[[float], float], degree: float) -> tuple[float, float]:

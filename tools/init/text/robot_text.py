@@ -129,6 +129,9 @@ def _stamps(chosen: Chosen, guess: RobotGuess) -> list[str]:
 
 def _turned_joints(found: SignGuess) -> str:
     others = " or ".join(_list(signs) for signs in found.others)
+    if found.by_torques:
+        also = f"; with {others} as well" if others else ""
+        return f"only so do the masses of the URDF explain the commands{also}: its axis points the other way"
     return f"so do the gyroscopes agree; as well with {others}" if others else "only so do the gyroscopes agree"
 
 

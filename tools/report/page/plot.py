@@ -198,6 +198,8 @@ def _draw(mark: Mark, x_scale: Scale, y_scale: Scale, height: float) -> str:
         return f'<path class="band {mark.colour}" d="{outline}z"/>' if outline else ""
     x, y = min_max(mark.x[seen], mark.y[seen], mark.points)
     cls = f"{mark.style} {mark.colour}"
+    if mark.style == "dots":  # nothing between them
+        x, y = (np.column_stack([values, np.full(len(values), np.nan)]).ravel() for values in (x, y))
     return f'<path class="{cls}" data-name="{name}" d="{path(x_scale(x), y_scale(y))}"/>'
 
 

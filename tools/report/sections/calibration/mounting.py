@@ -10,9 +10,9 @@ import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.robots.parts.sensors import Gyro
-from jointscope.tools.presentation.judgement import is_held
 from jointscope.tools.presentation.numbers import minus, with_sigma
 from jointscope.tools.report.page.page import Section, foldable, table
+from jointscope.tools.verdicts.judgement import is_held
 
 
 def mounting(result: CalibrationResult) -> Section:

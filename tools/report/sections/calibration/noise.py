@@ -9,13 +9,13 @@ import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult
 from jointscope.robots.model.lasting_torques import lasting_torques
-from jointscope.tools.presentation.judgement import equation_names
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.sensor_signals import COLOURS
-from jointscope.tools.presentation.whiteness import strength
 from jointscope.tools.report.page.page import Key, Section, figure, table
 from jointscope.tools.report.page.plot import Axes, Curve, plot
 from jointscope.tools.report.sections.calibration.per_bag import per_bag
+from jointscope.tools.verdicts.judgement import equation_names
+from jointscope.tools.verdicts.whiteness import strength
 
 
 def noise(result: CalibrationResult) -> Section:

@@ -10,10 +10,10 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ResidualSeries
 from jointscope.tools.presentation.numbers import percent, prefixed, significant
 from jointscope.tools.presentation.sensor_signals import COLOURS, points_per_curve
-from jointscope.tools.presentation.whiteness import autocorrelation
 from jointscope.tools.report.page.page import Section, figure, table
 from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, Mark, plot
 from jointscope.tools.report.sections.calibration.per_bag import per_bag
+from jointscope.tools.verdicts.whiteness import autocorrelation
 
 EDGES = np.linspace(-5.0, 5.0, 41)  # [sigma]
 GAUSS = np.linspace(-5.0, 5.0, 121)

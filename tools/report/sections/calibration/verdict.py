@@ -8,9 +8,9 @@ from html import escape
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.tools.presentation.judgement import Check, judge, largest_relative_sigma
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.report.page.page import Section, foldable, sentence
+from jointscope.tools.verdicts.judgement import Check, judge, largest_relative_sigma
 
 SIGNS = {"good": "✓", "info": "i", "warn": "!", "bad": "✕"}
 FINDINGS = 5  # more than these go below a fold

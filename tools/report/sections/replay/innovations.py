@@ -10,9 +10,9 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import ResidualSeries
 from jointscope.graphs.fixed_lag.replay.replay_result import InnovationSeries, ReplayResult
 from jointscope.tools.presentation.numbers import prefixed, significant
-from jointscope.tools.presentation.replay_judgement import nis_level
 from jointscope.tools.report.page.page import Section, figure, table
 from jointscope.tools.report.sections.calibration.residuals import histogram, memory, over_time
+from jointscope.tools.verdicts.replay_judgement import nis_level
 
 POINTS = 1000
 

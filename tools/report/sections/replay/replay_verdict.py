@@ -7,9 +7,9 @@ from html import escape
 
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.replay_judgement import diagnose_command, judge_replay, suspects
 from jointscope.tools.report.page.page import Section
 from jointscope.tools.report.sections.calibration.verdict import check_line
+from jointscope.tools.verdicts.replay_judgement import diagnose_command, judge_replay, suspects
 
 
 def replay_verdict(result: ReplayResult) -> Section:

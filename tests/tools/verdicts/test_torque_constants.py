@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from jointscope.tools.command_line import main
-from jointscope.tools.presentation.torque_constants import suspicious_constants
+from jointscope.tools.verdicts.torque_constants import suspicious_constants
 
 CASES = Path(__file__).resolve().parents[3].parent / "shared" / "cases"
 needs_cases = pytest.mark.skipif(not CASES.is_dir(), reason="shared/cases is not beside the project")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
-from jointscope.tools.presentation.judgement import LEVELS, Check, Judgement
 from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.tools.verdicts.judgement import LEVELS, Check, Judgement
 
 NIS = (1.25, 2.0)  # per degree of freedom: fine up to the first, bad beyond the second
 SMALL_NIS = (0.8, 0.4)  # below the first the sigmas are larger than they need be; a quantized encoder at rest is there

@@ -11,7 +11,7 @@ import pytest
 from fake_results import fake_calibration
 
 from jointscope.graphs.calibration.findings import findings
-from jointscope.tools.presentation.judgement import Judgement, judge
+from jointscope.tools.verdicts.judgement import Judgement, judge
 
 NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
 HELD = "Values from data, not from priors"

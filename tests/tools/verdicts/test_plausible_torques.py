@@ -22,8 +22,8 @@ from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
-from jointscope.tools.presentation.judgement import judge
-from jointscope.tools.presentation.plausible_torques import plausible_torques
+from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.plausible_torques import plausible_torques
 
 JOINTS = ("shoulder", "elbow")
 QUESTION = "Masses and torques that go together"

@@ -10,9 +10,11 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.plausible_torques import plausible_torques
-from jointscope.tools.presentation.torque_constants import suspicious_constants
-from jointscope.tools.presentation.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
+from jointscope.tools.verdicts.missing_effects import missing_effects
+from jointscope.tools.verdicts.plausible_torques import plausible_torques
+from jointscope.tools.verdicts.same_time import same_time
+from jointscope.tools.verdicts.torque_constants import suspicious_constants
+from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
 LEVELS = ("good", "info", "warn", "bad")
 ANSWERS = {
@@ -29,7 +31,6 @@ INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 UNDETERMINED = 0.5  # median relative sigma of the parameters from which nothing is known
-FAR = 0.02  # share of a value by which a delay that is not in the model may change it
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -53,7 +54,7 @@ class Judgement:
 
 def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
-    plausible = plausible_torques(result)
+    plausible, timing, missing = plausible_torques(result), same_time(result), missing_effects(result)
     checks = (
         _noise_as_stated(result),
         _white(result),
@@ -61,10 +62,11 @@ def judge(result: CalibrationResult) -> Judgement:
         _determined(result),
         _held(result),
         _honest_sigmas(result),
-        _same_time(result),
+        Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         _two_ways(result),
         _constants(result),
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
+        Check(missing[0], "Values that no missing effect would change", missing[1]),
     )
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
@@ -212,28 +214,6 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
         name,
         f"Blocks of the recording scatter up to {significant(factor, 2)} times more than white noise "
         f"would ({worst}); the sigmas shown include it.",
-    )
-
-
-def _same_time(result: CalibrationResult) -> Check:
-    """A delay of a fraction of a millisecond is friction that is not there, and no residual shows it."""
-    name, timing = "Drive signal and sensors at the same time", result.timing
-    if timing is None:
-        return Check("info", name, "The model has times of its own, or this was not looked at.")
-    delay, sigma = abs(timing.delay), timing.sigma
-    if not (names := timing.moved(result.found)):
-        text = f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
-        return Check("good", name, text)
-    worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
-    other = worst.value + timing.changes[worst.name]
-    side = "after" if timing.delay > 0.0 and not timing.joint else "before"
-    level = "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn"
-    return Check(
-        level,
-        name,
-        f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
-        f"with which {worst.name} would be {significant(other)} instead of {significant(worst.value)} {worst.unit}: "
-        f"{timing.cure(result.start.path.name)}.",
     )
 
 

@@ -9,8 +9,8 @@ from scipy.special import gammaincc
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.robots.geometry.error_parameters import BACKLASH
-from jointscope.tools.presentation.judgement import ANSWERS, LEVELS, Check, Judgement
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.judgement import ANSWERS, LEVELS, Check, Judgement
 
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for

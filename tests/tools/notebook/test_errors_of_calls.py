@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Functions and verbs refuse the same things with the same line, and no function ends the program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fake_results import fake_recording, sinusoids
+
+import jointscope as js
+from jointscope.tools.bags.write_bag import write_bag
+from jointscope.tools.command_line import main
+from jointscope.tools.notebook import calls
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A bag, a bag that is none, a robot file with a mistake, and limits with a mistake."""
+    import numpy as np
+
+    place = tmp_path_factory.mktemp("bad")
+    robot, t = js.load_robot("doggy"), np.arange(0.0, 2.0, 0.01)
+    write_bag(place / "good.mcap", fake_recording(robot, sinusoids(t, robot), t, np.random.default_rng(0)), robot)
+    (place / "broken.mcap").write_bytes(b"no bag at all")
+    (place / "odd.yaml").write_text("name: odd\njionts: []\n")
+    (place / "limits.yaml").write_text("limits:\n  - {parameter: joint1.stiffness, at_mots: 3, because: bench}\n")
+    return place
+
+
+CASES = {
+    "unknown robot": (["calibrate", "dogy", "good.mcap", "-o", "o.yaml"], lambda: js.calibrate("dogy", "good.mcap")),
+    "mistake in a robot file": (["diagnose", "odd.yaml", "good.mcap"], lambda: js.diagnose("odd.yaml", "good.mcap")),
+    "no file": (["discover", "doggy", "no.mcap", "-o", "o.yaml"], lambda: js.discover("doggy", "no.mcap")),
+    "no bag": (["compare", "doggy", "broken.mcap"], lambda: js.compare("doggy", "broken.mcap")),
+    "no such topic": (["compare", "hebi_5r", "good.mcap"], lambda: js.compare("hebi_5r", "good.mcap")),
+    "other streams": (
+        ["compare", "doggy", "kr300", "good.mcap"],
+        lambda: js.compare(["doggy", "kr300"], "good.mcap"),
+    ),
+    "limits": (
+        ["compare", "doggy", "good.mcap", "--accept", "limits.yaml"],
+        lambda: js.compare("doggy", "good.mcap", accept="limits.yaml"),
+    ),
+    "unknown effect": (["add", "doggy", "clogging@joint1", "-o", "o.yaml"], lambda: js.add("doggy", "clogging@joint1")),
+    "impossible owner": (["add", "doggy", "cogging@imu1", "-o", "o.yaml"], lambda: js.add("doggy", "cogging@imu1")),
+    "not for the estimator": (["replay", "kr300", "good.mcap"], lambda: js.replay("kr300", "good.mcap")),
+    "hidden effect": (
+        ["simulate", "doggy", "-o", "o.mcap", "--effect", "x@y"],
+        lambda: js.simulate("doggy", effects=["x@y"]),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_function_raises_the_line_that_the_command_line_prints(case, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    arguments, call = CASES[case]
+    assert main(arguments) == 1
+    said = capsys.readouterr().err
+    with pytest.raises(js.JointscopeError) as raised:
+        call()
+    assert said == f"jointscope: error: {raised.value}\n"
+    assert not Path("o.yaml").exists()
+
+
+def test_nothing_given_is_told():
+    with pytest.raises(js.errors.RecordingError, match=r"^no recording is given; expected a path"):
+        js.calibrate("doggy", [])
+    with pytest.raises(js.errors.RobotError, match=r"^no robot is given; expected one"):
+        js.compare([], "good.mcap")
+
+
+@pytest.mark.parametrize("verb", ["calibrate", "compare", "diagnose", "discover"])
+def test_verb_and_function_do_the_same_computation(verb, folder, monkeypatch, capsys):
+    """With one stand-in for the computation, which both must reach."""
+
+    class Reached(js.errors.SolveError):
+        pass
+
+    def begin(*args, **kwargs):
+        raise Reached("here it begins")
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(calls, f"{verb}_motion", begin)
+    with pytest.raises(Reached):
+        getattr(js, verb)("doggy", "good.mcap")
+    assert main([verb, "doggy", "good.mcap", *(["-o", "o.yaml"] if verb in ("calibrate", "discover") else [])]) == 1
+    assert "here it begins" in capsys.readouterr().err

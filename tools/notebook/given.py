@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a caller may give: robots by name, path or object, recordings by path or object, limits by path or as read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+from jointscope.tools.acceptance.limits import Limit, read_limits
+from jointscope.tools.bags.read_recording import read_recording
+
+AnyRobot = Robot | str | Path
+AnyRecording = Recording | str | Path
+AnyLimits = str | Path | Sequence[Limit]
+
+
+def robot_of(robot: AnyRobot) -> Robot:
+    """The robot itself.
+
+    Raises:
+        RobotError: there is none of that name, or its file has a mistake.
+    """
+    return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
+def recordings_of(recordings: AnyRecording | Sequence[AnyRecording], robot: Robot) -> list[Recording]:
+    """One or several recordings as a list.
+
+    Raises:
+        RecordingError: none is given, or a bag cannot be read.
+    """
+    several = [recordings] if isinstance(recordings, Recording | str | Path) else recordings
+    if not several:
+        raise RecordingError("no recording is given; expected a path, a recording, or a list of them")
+    return [each if isinstance(each, Recording) else read_recording(each, robot) for each in several]
+
+
+def to_learn_from(
+    robot: AnyRobot, recordings: AnyRecording | Sequence[AnyRecording], holdout: AnyRecording | None
+) -> tuple[Robot, list[Recording], Recording | None]:
+    """The robot, what is learnt from, and what is held out.
+
+    Raises:
+        RecordingError: the held-out recording is also learnt from.
+    """
+    model = robot_of(robot)
+    learnt = recordings_of(recordings, model)
+    held = None if holdout is None else recordings_of(holdout, model)[0]
+    if held is not None and any(held.shares_samples_with(recording) for recording in learnt):
+        raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
+    return model, learnt, held
+
+
+def labelled(robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot]) -> dict[str, Robot]:
+    """One or several robots by their labels; those without one are called by their names or files.
+
+    Raises:
+        RobotError: none is given, or two have one name.
+    """
+    several = [robots] if isinstance(robots, Robot | str | Path) else robots
+    if not several:
+        raise RobotError("no robot is given; expected one, a list of them, or a dict of labels and robots")
+    if isinstance(several, Mapping):
+        return {label: robot_of(robot) for label, robot in several.items()}
+    labels = [robot.name if isinstance(robot, Robot) else Path(robot).stem for robot in several]
+    if len(set(labels)) < len(labels):
+        raise RobotError(f"{', '.join(labels)}: two models have one name; give labels: {{'before': ..., 'after': ...}}")
+    return dict(zip(labels, map(robot_of, several), strict=True))
+
+
+def limits_of(limits: AnyLimits) -> tuple[Limit, ...]:
+    """The lines of a file of limits, or those given.
+
+    Raises:
+        RobotError: the file has a mistake.
+    """
+    return read_limits(Path(limits)) if isinstance(limits, str | Path) else tuple(limits)

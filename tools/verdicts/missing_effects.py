@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether values would be others with an effect that the model lacks: no residual need show it, a score test does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.tools.presentation.numbers import significant
+
+MOST_ALIKE = 2
+LONG = 0.5  # of a value, beyond which one linear step does not say where it ends
+
+
+def missing_effects(result: CalibrationResult) -> tuple[str, str]:
+    """A level of `judgement.LEVELS` and a sentence."""
+    if result.robot.free_links:
+        return "info", "Without masses nothing tells."
+    found = result.found
+    asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
+    within = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found, sigmas=0.0))]
+    if not within:
+        return "good", "None of the catalogue, as far as one step with each can tell."
+    first, shares = (asked or within)[0]
+    worst = max(shares, key=lambda name: abs(first.with_it[name] - found[name].value) / found[name].sigma)
+    others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
+    alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
+    covered = "" if asked else ", which its sigma covers"
+    return "bad" if asked else "warn", (
+        f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
+        f"{_change(result, first, worst)}{covered}. Which it is, and whether it predicts better: "
+        f"`{_discover(result)}`."
+    )
+
+
+def _discover(result: CalibrationResult) -> str:
+    """The command that looks for effects, with a part of one recording, or the last of several, held out."""
+    start, bags = result.start.path, [Path(bag.recording.path).name for bag in result.bags] or ["BAG"]
+    *learnt, last = bags
+    held = f"{' '.join(learnt)} --holdout {last}" if learnt else f"{last} --holdout-share 0.33"
+    return f"jointscope discover {start.name} {held} -o {start.stem}_better.yaml"
+
+
+def _change(result: CalibrationResult, effect: LackingEffect, name: str) -> str:
+    """What a value would be; a step that is very long only says that it would be another."""
+    value, other = result.found[name].value, effect.with_it[name]
+    if abs(other - value) > LONG * abs(value):
+        return f"{name} would change by more than half"
+    unit = next(p.unit for p in result.parameters if p.name == name)
+    return f"{name} would be about {significant(other)} instead of {significant(value)} {unit}"

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether drive signal and sensors were stamped by one clock.
+
+A delay of a fraction of a millisecond is friction that is not there, and no residual shows it;
+`graphs/scoring/drive_timing.py` does.
+"""
+
+from __future__ import annotations
+
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.tools.presentation.numbers import significant
+
+FAR = 0.02  # share of a value by which a delay that is not in the model may change it
+
+
+def same_time(result: CalibrationResult) -> tuple[str, str]:
+    """A level of `judgement.LEVELS` and a sentence."""
+    timing = result.timing
+    if timing is None:
+        return "info", "The model has times of its own, or this was not looked at."
+    delay, sigma = abs(timing.delay), timing.sigma
+    if not (names := timing.moved(result.found)):
+        return "good", f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+    worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
+    other = worst.value + timing.changes[worst.name]
+    side = "after" if timing.delay > 0.0 and not timing.joint else "before"
+    return (
+        "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
+        f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
+        f"with which {worst.name} would be {significant(other)} instead of {significant(worst.value)} {worst.unit}: "
+        f"{timing.cure(result.start.path.name)}.",
+    )
