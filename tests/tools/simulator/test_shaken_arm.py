@@ -32,6 +32,12 @@ def shaken(robot, seed=0, shaking=SHORT, **conditions):
     return simulate_frequency(robot, seed, PoseConditions(**conditions), shaking)
 
 
+@pytest.fixture(scope="module")
+def plain(robot):
+    """One arm without effects."""
+    return shaken(robot, 1)[0][0]
+
+
 def test_experiments_of_a_realisation_are_orthogonal_and_signs_are_opposite():
     made = Multisine.drawn(0.5, 20.0, np.array([3.0, 2.0, 1.0]), 2, 0, "any")
     waves = np.array([made.torque(1, e, 1, 1e-3) for e in range(3)])
@@ -71,8 +77,7 @@ def test_a_rigid_motor_feels_what_its_arm_weighs(robot):
     np.testing.assert_allclose(seen.real[middle].mean(axis=0), expected, atol=0.05 * np.max(expected))
 
 
-def test_torques_that_are_late_turn_phases_and_say_nothing_else(robot):
-    (plain,), _, _ = shaken(robot, 1)
+def test_torques_that_are_late_turn_phases_and_say_nothing_else(robot, plain):
     (late,), _, truth = shaken(robot, 1, effects=["torque_delay@robot:seconds=0.001"])
     np.testing.assert_array_equal(plain.signals.outputs.values, late.signals.outputs.values)
     count = round(1.0 / plain.excitation.f0 * 1000.0)
@@ -82,16 +87,15 @@ def test_torques_that_are_late_turn_phases_and_say_nothing_else(robot):
     assert truth["effects"][0]["effect"] == "torque_delay"
 
 
-def test_a_torque_constant_scales_the_torque_that_is_told(robot):
-    (plain,), _, _ = shaken(robot, 1)
+def test_a_torque_constant_scales_the_torque_that_is_told(robot, plain):
     (other,), _, _ = shaken(robot, 1, effects=["torque_constant_error@joint2:share=0.25"])
     ratio = plain.signals.inputs.values.std(axis=0) / other.signals.inputs.values.std(axis=0)
     np.testing.assert_allclose(ratio, [1.0, 1.25, 1.0], rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["backlash@joint3:half_gap=1e-3", "spring_cubic@joint3:stiffness=1e12"])
-def test_what_is_not_linear_changes_the_motion(effect, robot):
-    (plain,), _, _ = shaken(robot, 1)
+def test_what_is_not_linear_changes_the_motion(effect, robot, plain):
     (odd,), _, _ = shaken(robot, 1, effects=[effect])
     q = [r.signals.outputs.values[:, 2] - r.signals.outputs.values[:, 2].mean() for r in (plain, odd)]
     assert np.std(q[1] - q[0]) > 0.01 * np.std(q[0])
