@@ -35,11 +35,13 @@ from jointscope.robots.recordings.signals import Excitation, Signals
 Array = NDArray[np.float64]
 MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
 TRIALS = 2  # stages after which begins are told apart
+SAME = 1.0  # of minus twice the logarithm of the likelihood: begins that differ by less led to the same place
 AGREES = 0.1  # [sigma] that no value may move in a stage any more
 ALIKE, MOST_RATIO = 0.5, 0.95  # squared cosine of steps in one direction, and how slowly they may fall
 UNEXPLAINED = 0.5  # of the torques, rms: an arm of other springs than the model's leaves less
 MOST_ITERATIONS = 80
 TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
+WELL = 0.1  # of itself, by how much a positive value that is told may be wrong (Janot et al. 2014, "well identified")
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,12 @@ class FrequencyCalibration:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Names of the parameters that the responses tell."""
-        sigmas, parameters = np.sqrt(np.diag(self.covariance)), self.robot.parameters
-        return tuple(
-            n for n, s in zip(self.names, sigmas.tolist(), strict=True) if s < TOLD * parameters[n].coordinate_sigma
-        )
+        """Names of the parameters that the responses tell: well within their priors, positive ones to a tenth, too."""
+        sigmas = dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+        parameters = [self.robot.parameters[name] for name in self.names]
+        most = {p.name: TOLD * p.coordinate_sigma for p in parameters}
+        most |= {p.name: min(most[p.name], WELL) for p in parameters if p.positive}
+        return tuple(name for name in self.names if sigmas[name] < most[name])
 
     @property
     def silent(self) -> tuple[str, ...]:
@@ -228,6 +231,7 @@ def _best_begin(
     """Poses at a stage of the torque balance, values, and iterations: the begin whose residuals are the likeliest.
 
     The logarithm finds stiffnesses from far, but takes friction for damping, and may lead away what was nearly right.
+    Where two begins lead to the same place, the third is not asked.
     """
     given = Calibration.of(problems[0].robot)
     solution, logarithm = _solved(problems, others, given)
@@ -235,13 +239,15 @@ def _best_begin(
     springs = np.array([STIFFNESS in name for name in given.names])
     mixed = given.with_points({DYNAMICS: np.where(springs, logarithm.dynamics, given.dynamics)})
     found = []
-    for begin in (logarithm, mixed, given):
+    for begin in (mixed, logarithm, given):
         at, now = begin, [next_stage(problem, begin.only([DYNAMICS])) for problem in problems]
         for _ in range(TRIALS):
             solution, at = _solved(now, others, at)
             iterations += len(solution.iterations)
             now = [next_stage(problem, at.only([DYNAMICS])) for problem in now]
         found.append((sum(problem.stage.unlikely for problem in now), now, at))
+        if len(found) == 2 and abs(found[1][0] - found[0][0]) < SAME:
+            break
     _, best, common = min(found, key=lambda each: each[0])
     return best, common, iterations
 

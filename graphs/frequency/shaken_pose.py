@@ -17,7 +17,6 @@ from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FINER = 4  # times the sampling rate: friction turns over within milliseconds, and what folds back is not of its line
-LARGE = 50.0  # beyond it 1 / cosh^2 is zero
 VELOCITY_BAND = 0.8  # of half the rate: beyond it positions tell nothing but noise of the velocity that friction sees
 
 
@@ -103,10 +102,20 @@ class ShakenPose:
         Returns:
             Shape (e, l, nu) each.
         """
+        key = sharpness.tobytes()
+        if key not in self._frictions:  # several begins ask for the same
+            self._frictions[key] = self._friction(sharpness)
+        return self._frictions[key]
 
+    @cached_property
+    def _frictions(self) -> dict[bytes, tuple[Complex, Complex]]:
+        return {}
+
+    def _friction(self, sharpness: Array) -> tuple[Complex, Complex]:
         def law(x: Array) -> Array:
             y = sharpness * self._velocity(x, VELOCITY_BAND)
-            return np.concatenate([np.tanh(y), y / np.cosh(np.minimum(np.abs(y), LARGE)) ** 2], axis=2)
+            t = np.tanh(y)
+            return np.concatenate([t, y * (1.0 - t * t)], axis=2)
 
         size, sharper = np.split(self._of_positions(law), 2, axis=2)
         return size, sharper

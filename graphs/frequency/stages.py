@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.frequency.frequency_set import FrequencySet, Stage
+from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
 from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
@@ -48,6 +48,7 @@ def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
         values,
         True,
         len(pose.lines),
+        geometry_slopes(arm, robot, pose),
     )
     return FrequencySet(robot, pose, stage)
 
@@ -57,10 +58,11 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     values, pose, robot, arm = before.values(calibration), before.pose, before.robot, before.arm
     width = max(before.stage.width // NARROWER, NEIGHBOURS)
     parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
-    geometry = _geometry(arm, robot, pose, parts, values)
+    k, slopes = motor_stiffness(arm, parts, pose.w, values), before.stage.slopes
+    columns = k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines])
+    geometry = dict(zip(slopes.names, columns, strict=True))
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
-    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False, width)
-    k = motor_stiffness(arm, parts, pose.w, values)
+    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False, width, slopes)
     if pose.step:
         stage = replace(stage, shift=_shift(arm, pose, k.Z, values))
     now = FrequencySet(robot, pose, stage)
@@ -92,17 +94,19 @@ def _covariance(r: Complex, width: int) -> Complex:
     return np.asarray(mean + floor)
 
 
-def _geometry(
-    arm: FlexibleArm, robot: Robot, pose: ShakenPose, parts: tuple[Array, Array, Array], values: Mapping[str, float]
-) -> dict[str, Complex]:
-    """Columns of the geometric errors that are parameters of the robot, shape (e, l, nu), by differences."""
-    Z, found = motor_stiffness(arm, parts, pose.w, values).Z, {}
+def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose) -> GeometrySlopes:
+    """How M, C and G follow the geometric errors that are parameters of the robot, by differences.
+
+    They change by thousandths where geometry does by millimetres, so one look serves all stages.
+    """
+    values = {name: p.value for name, p in robot.parameters.items()}
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
-    for joint in robot.joints:
-        for part, step in kinds.items():
-            name = f"{joint}.{part}"
-            if name in robot.parameters and not robot.parameters[name].fixed:
-                moved = {**values, name: values[name] + step}
-                other = motor_stiffness(arm, arm.linearised(pose.q, moved).mean, pose.w, moved).Z
-                found[name] = np.einsum("lij,elj->eli", (other - Z) / step, pose.motion[:, pose.lines])
-    return found
+    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()}
+    free = [name for name in steps if name in robot.parameters and not robot.parameters[name].fixed]
+    parts, shape = arm.linearised(pose.q, values).mean, (len(free), len(arm.springs), len(arm.springs))
+    moved = [arm.linearised(pose.q, {**values, name: values[name] + steps[name]}).mean for name in free]
+    M, C, G = (
+        np.array([(each[i] - part) / steps[name] for name, each in zip(free, moved, strict=True)]).reshape(shape)
+        for i, part in enumerate(parts)
+    )
+    return GeometrySlopes(tuple(free), (M, C, G))
