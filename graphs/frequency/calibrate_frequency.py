@@ -41,7 +41,7 @@ ALIKE, MOST_RATIO = 0.5, 0.95  # squared cosine of steps in one direction, and h
 UNEXPLAINED = 0.5  # of the torques, rms: an arm of other springs than the model's leaves less
 MOST_ITERATIONS = 80
 TOLD = 0.4  # of its prior's sigma: a value whose sigma stays above it is not identifiable
-WELL = 0.1  # of itself, by how much a positive value that is told may be wrong (Janot et al. 2014, "well identified")
+WELL = 0.1  # of itself, by how much a positive value that is told may be wrong; a tenth is usual for dynamic parameters
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,8 @@ def _ahead(step: Array, before: Array | None) -> Array:
         return np.zeros_like(step)
     ratio = float(step @ before) / max(float(before @ before), 1e-300)
     alike = float(step @ before) ** 2 > ALIKE * float(step @ step) * float(before @ before)
-    return step * (min(ratio, MOST_RATIO) / (1.0 - min(ratio, MOST_RATIO)) if alike and ratio > 0.0 else 0.0)
+    ratio = min(ratio, MOST_RATIO)  # below zero steps go to and fro, and the end is in between
+    return step * (ratio / (1.0 - ratio) if alike else 0.0)
 
 
 def _best_begin(

@@ -185,7 +185,7 @@ class FrequencySet:
         assert stage.friction is not None
         Z = self.with_friction(k.Z, values)
         r = (Z @ pose.motion[:, pose.lines].transpose(1, 2, 0)).transpose(2, 0, 1) + stage.shift - pose.torques
-        sharper = np.log(self.sharpness(values) / stage.sharpness)
+        sharper = self._sharper(values)
         r += self._each(values, COULOMB) * (stage.friction[0] + sharper * stage.friction[1])
         for name, column in stage.geometry.items():
             r += (values[name] - stage.values[name]) * column
@@ -211,12 +211,13 @@ class FrequencySet:
         springs = (k.by_spring @ moved).transpose(0, 3, 1, 2)
         for spring, column in zip(self.arm.springs, springs, strict=True):
             by_name |= {spring.stiffness: column, spring.damping: jw * column}
-        mu, sharper = self._each(values, COULOMB), np.log(self.sharpness(values) / stage.sharpness)
+        mu, sharper = self._each(values, COULOMB), self._sharper(values)
+        by_sharpness = stage.sharpness / self.sharpness(values) ** 2
         for i, joint in enumerate(self.arm.joints):
             own = np.eye(len(self.arm.joints))[i]
             by_name[f"{joint}.{VISCOUS}"] = jw * moved.transpose(2, 0, 1) * own
             by_name[f"{joint}.{COULOMB}"] = own * (stage.friction[0] + sharper * stage.friction[1])
-            by_name[f"{joint}.{SHARPNESS}"] = own * mu * stage.friction[1] / self.sharpness(values)
+            by_name[f"{joint}.{SHARPNESS}"] = own * mu * stage.friction[1] * by_sharpness
         return whitened, r, {**by_name, **stage.geometry}
 
     def response(self, values: Mapping[str, float]) -> Complex:
@@ -255,6 +256,10 @@ class FrequencySet:
     def sharpness(self, values: Mapping[str, float]) -> Array:
         """How sharply the dry friction of each motor turns over, shape (nu,) [s/rad]."""
         return np.array([self.robot.sharpness_of(joint, values) for joint in self.arm.joints])
+
+    def _sharper(self, values: Mapping[str, float]) -> Array:
+        """How far friction is from the stage's one, in derivatives by log k: it follows 1 / k once it turns sharply."""
+        return np.asarray(1.0 - self.stage.sharpness / self.sharpness(values))
 
     def _each(self, values: Mapping[str, float], part: str) -> Array:
         return np.array([values.get(f"{joint}.{part}", 0.0) for joint in self.arm.joints])
