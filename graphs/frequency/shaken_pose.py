@@ -154,7 +154,12 @@ class ShakenPose:
         return np.asarray(np.concatenate(each)[: 0 if P < 2 else None] / np.sqrt(max(P * (P - 1), 1) * len(kinds)))
 
     def _of_positions(self, law: Callable[[Array], Array]) -> Complex:
-        found, _ = steady_spectra(self.signals.outputs, self.found.excitation, self.path, law)
+        """Of the mean over periods: noise of a velocity rounds off what turns over, and the mean has less of it."""
+
+        def mean(x: Array) -> Array:
+            return law(x.mean(axis=0, keepdims=True))
+
+        found, _ = steady_spectra(self.signals.outputs, self.found.excitation, self.path, mean)
         return np.asarray(found.mean(axis=1)[:, self.lines])
 
     def _velocity(self, x: Array, band: float) -> Array:
