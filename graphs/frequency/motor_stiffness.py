@@ -30,10 +30,31 @@ class MotorStiffness:
     Attributes:
         Z: torques by turns of the motors, rotors and springs alone, shape (l, nu, nu) [N m/rad].
         by_spring: its derivative by k + j w d of each spring, shape (s, l, nu, nu).
+        turned: turns of the coordinates by turns of the motors, shape (l, n, nu).
+        pulled: torques of the motors by what pulls at the coordinates, shape (l, nu, n).
     """
 
     Z: Complex
     by_spring: Complex
+    turned: Complex
+    pulled: Complex
+
+    def by_parts(self, w: Array, slopes: tuple[Array, Array, Array], motion: Complex) -> Complex:
+        """Torques for a motion that changes of M, C and G add, by one each.
+
+        Args:
+            w: of the lines, shape (l,) [rad/s].
+            slopes: of M, C and G by some values, shape (v, n, n) each.
+            motion: of the motors, shape (e, l, nu) [rad].
+
+        Returns:
+            Shape (v, e, l, nu).
+        """
+        x = self.turned @ motion.transpose(1, 2, 0)  # (l, n, e)
+        dM, dC, dG = (np.tensordot(part, x, axes=(2, 1)) for part in slopes)  # (v, n, l, e)
+        at = w[:, None]
+        pull = -(at**2) * dM + 1j * at * dC + dG
+        return np.asarray((self.pulled @ pull.transpose(0, 2, 1, 3)).transpose(0, 3, 1, 2))
 
 
 def motor_stiffness(
@@ -59,7 +80,7 @@ def motor_stiffness(
     eye = np.eye(len(E))
     Z = own[:, :, None] * (eye - X[:, E]) - (w**2)[:, None, None] * np.diag(_inertias(arm, values))
     by_spring = np.array([_column(x, T, eye)[:, :, None] * _row(x, X, eye)[:, None, :] for x in arm.springs])
-    return MotorStiffness(Z, by_spring)
+    return MotorStiffness(Z, by_spring, X, T)
 
 
 def _column(spring: Spring, T: Complex, eye: Array) -> Complex:

@@ -15,6 +15,7 @@ from jointscope.tools.presentation.frequency_sentences import (
     identifiable_sentence,
     matrix_sentence,
     one_realisation,
+    sticking,
     value_rows,
 )
 from jointscope.tools.presentation.numbers import percent
@@ -37,7 +38,7 @@ def frequency_report(
         more: sections at the end.
     """
     paths = ", ".join(problem.pose.path for problem in result.problems)
-    items = [matrix_sentence(result), identifiable_sentence(result), *one_realisation(result)]
+    items = [matrix_sentence(result), identifiable_sentence(result), *one_realisation(result), *sticking(result)]
     verdict = "".join(f"<li>{escape(item)}</li>" for item in items)
     sections = [
         Section("verdict", "What was found", f"<ul>{verdict}</ul>", f"{len(result.problems)} poses."),

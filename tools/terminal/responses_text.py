@@ -10,6 +10,7 @@ from jointscope.tools.presentation.frequency_sentences import (
     identifiable_sentence,
     matrix_sentence,
     one_realisation,
+    sticking,
     value_rows,
 )
 from jointscope.tools.presentation.numbers import percent, with_sigma
@@ -71,7 +72,7 @@ def frequency_calibration_text(result: FrequencyCalibration) -> str:
         "",
         f"  - {matrix_sentence(result)}",
         f"  - {identifiable_sentence(result)}",
-        *(f"  - {sentence}" for sentence in one_realisation(result)),
+        *(f"  - {sentence}" for sentence in [*one_realisation(result), *sticking(result)]),
         "",
         text_table(["parameter", "start", "value", "± sigma", "unit", ""], value_rows(result), "<>>><<"),
     ]
