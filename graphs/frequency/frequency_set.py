@@ -5,8 +5,8 @@
 
 Positions are noisy, and where the motors hardly move Z makes much of it. So what counts is not this residual r, but
 Z0 Z^-1 r, with Z0 of the last stage: the positions that the torques predict less those that were measured, as torques.
-`shift` is what a motion beside the excitation adds; it and the columns of geometry change little from stage to stage
-and stay within one. Where to begin tells the logarithm of the response matrix (Neubauer et al. 2015, eq. 27).
+`shift` is what the torques change by because the arm moves; it and the columns of geometry change little from stage to
+stage and stay within one. Where to begin tells the logarithm of the response matrix (Neubauer et al. 2015, eq. 27).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Stage:
     Attributes:
         parts: M, C and G of the arm.
         whiten: of residuals in torques, Z0 included, shape (l, nu, nu); of logarithms 1 over sigma, same shape.
-        shift: of the torques by the motion that carries the excitation, shape (e, l, nu) [N m].
+        shift: of the torques because the arm moves and its inertia with it, shape (e, l, nu) [N m].
         friction: spectrum of tanh(k v), and its derivative by log k, shape (e, l, nu) each; None with logarithms.
         sharpness: k of these, shape (nu,) [s/rad].
         geometry: columns of geometric errors by name, shape (e, l, nu), about `values`.
@@ -62,6 +62,7 @@ class Stage:
         width: lines on each side whose residuals tell the covariance of one.
         slopes: of the arm by its geometry.
         unlikely: minus twice the logarithm of the likelihood of the residuals at `values`, but for a constant.
+        x: motion of the arm behind its springs, shape (b, K, n) [rad]; None with logarithms.
     """
 
     parts: tuple[Array, Array, Array]
@@ -75,6 +76,7 @@ class Stage:
     width: int
     slopes: GeometrySlopes
     unlikely: float = 0.0
+    x: Complex | None = None
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,7 @@
     tau = Z(w) m,   Z = kappa - kappa E' A^-1 E kappa - w^2 J + j w f,   A = -w^2 M + j w C + G + diag(k + j w d)
 
 kappa is k + j w d of the drives, E picks them from the coordinates of the arm. The frequency response of Neubauer et
-al. 2015, eq. 9, is -w^2 Z^-1. About a motion that carries the excitation, M, C and G change with its phase: a line then
-answers lines that are multiples of that motion beside it, and A becomes a band of blocks (Wereley, 1990).
+al. 2015, eq. 9, is -w^2 Z^-1. It is the arm under small motion; moving_arm.py has it as it moves.
 """
 
 from __future__ import annotations
@@ -15,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
 
-from jointscope.robots.geometry.flexible_arm import FlexibleArm, Linearised, Spring
+from jointscope.robots.geometry.flexible_arm import FlexibleArm, Spring
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -94,53 +92,3 @@ def _row(spring: Spring, X: Complex, eye: Array) -> Complex:
 
 def _inertias(arm: FlexibleArm, values: Mapping[str, float]) -> Array:
     return np.array([values[f"{joint}.inertia"] for joint in arm.joints])
-
-
-def carried_torque(
-    arm: FlexibleArm, about: Linearised, f0: float, step: int, motion: Complex, values: Mapping[str, float]
-) -> Complex:
-    """Torques of springs and rotors when a motion at line `step` carries the excitation.
-
-    Args:
-        arm: its springs.
-        about: the arm about that motion.
-        f0: distance of the lines [Hz].
-        step: line of the carrying motion.
-        motion: of the motors at the lines 0, 1, 2, ..., shape (e, K, nu) [rad].
-        values: of all parameters by name.
-
-    Returns:
-        Torques at the same lines, shape (e, K, nu) [N m].
-    """
-    w = np.asarray(2.0 * np.pi * f0 * np.arange(motion.shape[1]), dtype=np.float64)
-    s = 1j * w[:, None]
-    kappa = np.array([values[x.stiffness] for x in arm.springs]) + s * [values[x.damping] for x in arm.springs]
-    own = kappa[:, arm.driven]
-    pull = own * motion
-    x = np.empty((motion.shape[1], len(arm.driven), len(motion)), dtype=complex)
-    for first in range(step):
-        lines = np.arange(first, motion.shape[1], step)
-        band, width = _band(about, w[lines], kappa[lines])
-        right = np.zeros((len(lines), kappa.shape[1], len(motion)), dtype=complex)
-        right[:, arm.driven] = np.moveaxis(pull[:, lines], 0, 2)
-        solved = solve_banded((width, width), band, right.reshape(-1, len(motion)), overwrite_ab=True, overwrite_b=True)
-        x[lines] = solved.reshape(right.shape)[:, arm.driven]
-    rotors = -(w**2)[:, None] * _inertias(arm, values)
-    return np.asarray(own * (motion - np.moveaxis(x, 2, 0)) + rotors * motion)
-
-
-def _band(about: Linearised, w: Array, kappa: Complex) -> tuple[Complex, int]:
-    """Blocks of neighbouring lines as LAPACK's band, and its width."""
-    harmonics, n, count = len(about.M) // 2, about.M.shape[1], len(w)
-    width = n * harmonics + n - 1
-    band = np.zeros((2 * width + 1, n * count), dtype=complex)
-    i, j = np.divmod(np.arange(n * n), n)
-    for h in range(-harmonics, harmonics + 1):
-        columns = np.arange(max(0, -h), min(count, count - h))  # line `columns` drives line `columns + h`
-        at = w[columns][:, None, None]
-        block = -(at**2) * about.M[h + harmonics] + 1j * at * about.C[h + harmonics] + about.G[h + harmonics]
-        if h == 0:
-            block = block + kappa[:, :, None] * np.eye(n)
-        row, column = n * (columns + h)[:, None] + i, n * columns[:, None] + j
-        band[width + row - column, column] = block.reshape(len(columns), -1)
-    return band, width

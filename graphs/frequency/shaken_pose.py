@@ -89,6 +89,28 @@ class ShakenPose:
         return np.asarray(self.found.Y[:, :, :K].mean(axis=1))
 
     @cached_property
+    def motions(self) -> Complex:
+        """The same in every experiment as it was, each sign by itself, shape (b, K, nu) [rad]."""
+        common = self.found.common
+        K, signs = self.motion.shape[1], self._signs[:, :, None, None]
+        both = 0.0 if common is None else common[:, :, :K].mean(axis=1)
+        return np.asarray((both + signs * self.motion).reshape(-1, *self.motion.shape[1:]))
+
+    def both_signs(self, each: Complex) -> Complex:
+        """What every experiment has by itself, shape (b, ...), as spectra of this pose have it, shape (e, ...)."""
+        signs = self._signs
+        every = each.reshape(*signs.shape, *each.shape[1:])
+        return np.asarray(np.einsum("se,se...->e...", signs, every) / len(signs))
+
+    @property
+    def _signs(self) -> Array:
+        """Of the excitation, both of a pair, shape (2, e), or those of single experiments, shape (1, e)."""
+        order = sorted(self.found.excitation.experiments, key=lambda e: (e.realisation, e.number))
+        if self.found.common is None:
+            return np.array([[e.sign for e in order]], dtype=np.float64)
+        return np.outer([1.0, -1.0], np.ones(len(self.motion)))
+
+    @cached_property
     def torques(self) -> Complex:
         """Of the motors at the lines, shape (e, l, nu) [N m]."""
         return np.asarray(self.found.U.mean(axis=1)[:, self.lines])

@@ -8,7 +8,6 @@ of them, then ever fewer, for a resonance at the wrong place makes a few lines l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
-from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
+from jointscope.graphs.frequency.motor_stiffness import motor_stiffness
+from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
 from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
@@ -25,7 +25,6 @@ from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-HARMONICS = 2  # of the arm about the motion that carries the excitation
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
 NARROWER = 4  # times fewer lines from stage to stage
 STEP = {"length": 1e-4, "angle": 1e-4}  # [m], [rad] of the differences for columns of geometry
@@ -63,22 +62,15 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     geometry = dict(zip(slopes.names, columns, strict=True))
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
     stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False, width, slopes)
-    if pose.step:
-        stage = replace(stage, shift=_shift(arm, pose, k.Z, values))
+    moving = moving_arm(arm, pose, values, before.stage.x)
+    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, pose.lines])
+    stage = replace(stage, shift=moving.torques[:, pose.lines] - standing, x=moving.x)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
     root = np.linalg.cholesky(_covariance(r, width))
     size = 4.0 * len(r) * float(np.sum(np.log(np.einsum("lii->li", root).real)))  # real and imaginary part
     whiten = np.asarray(np.linalg.solve(root, now.with_friction(k.Z, values)), dtype=np.complex128)
     return replace(now, stage=replace(stage, whiten=whiten, unlikely=size))
-
-
-def _shift(arm: FlexibleArm, pose: ShakenPose, Z: Complex, values: Mapping[str, float]) -> Complex:
-    """Torques about the carrying motion less those of the arm that stands."""
-    excitation = pose.found.excitation
-    about = arm.linearised(pose.q, values, pose.carrier, 2.0 * np.pi * excitation.carrier, HARMONICS)
-    moving = carried_torque(arm, about, excitation.f0, pose.step, pose.motion, values)[:, pose.lines]
-    return np.asarray(moving - np.einsum("lij,elj->eli", Z, pose.motion[:, pose.lines]))
 
 
 def _covariance(r: Complex, width: int) -> Complex:
