@@ -30,7 +30,7 @@ Complex = NDArray[np.complex128]
 HARMONICS = 2  # of the arm about the motion that carries the excitation
 FINER = 3  # samples by the lines of the motion: products of two lines fold onto none of them
 MOST_ROUNDS = 8
-BALANCED = 1e-6  # of the torques of the drives, rms: what the links may leave
+BALANCED = 1e-6  # of what the links need, rms, that may be left
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class MovingArm:
     Attributes:
         torques: of springs and rotors, both signs of the excitation subtracted, shape (e, K, nu) [N m].
         x: of the arm, every experiment as it was, shape (b, K, n) [rad].
-        left: what the links leave over the torques of the drives, rms, round by round.
+        left: what the links need and do not get over what they need, rms, round by round.
     """
 
     torques: Complex
@@ -76,8 +76,9 @@ def moving_arm(
     def balance(x: Complex) -> tuple[Complex, float]:
         motion = (np.fft.irfft(part * count, count, axis=1).reshape(-1, x.shape[2]) for part in (x, s * x, s * s * x))
         torques = equations.torque(*motion).reshape(len(x), count, -1)
-        r = np.fft.rfft(torques, axis=1)[:, :K] / count + kappa * x - pull
-        return r, float(np.linalg.norm(r[:, 1:]) / np.linalg.norm(pull[:, 1:]))
+        links = np.fft.rfft(torques, axis=1)[:, :K] / count
+        r = links + kappa * x - pull
+        return r, float(np.linalg.norm(r[:, 1:]) / np.linalg.norm(links[:, 1:]))
 
     r, size = balance(x)
     left = [size]
