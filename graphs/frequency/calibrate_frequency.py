@@ -10,12 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.frequency.explained import Explained, explained
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
@@ -86,6 +88,11 @@ class FrequencyCalibration:
         asked |= {spring.damping for spring in self.problems[0].arm.springs}
         return tuple(name for name in self.names if name in asked and name not in self.told)
 
+    @cached_property
+    def explained(self) -> Explained:
+        """Whether the poses are explained."""
+        return explained(self.robot, self.problems)
+
     def rms_log(self, robot: Robot) -> dict[str, Any]:
         """How far the model's matrix is from the measured one: rms of the logarithm, and of each entry."""
         parts = [p.of_robot(robot).log_errors() for p in self.problems]
@@ -108,6 +115,7 @@ class FrequencyCalibration:
             "parameters": table,
             "told": list(self.told),
             "undetermined": [{name: 1.0} for name in self.silent],
+            "explained": self.explained.to_json(),
             "frequency": self.rms_log(self.robot),
             "frequency_before": self.rms_log(self.start),
         }

@@ -59,12 +59,14 @@ class FrequencySummary:
     priors: tuple[()] = field(default=(), init=False)
 
     @staticmethod
-    def of(problems: Sequence[FrequencySet], calibration: Calibration) -> FrequencySummary:
+    def of(problems: Sequence[FrequencySet], calibration: Calibration, apart: bool = False) -> FrequencySummary:
         """Summary of poses at their last stage.
 
         Args:
             problems: the poses.
             calibration: values that were found, of blocks that they touch.
+            apart: whether these recordings may prefer other values, as a part of those that found these: what all their
+                bands have in common is then no doubt, but what they ask for.
         """
         robot = problems[0].robot
         unit = np.array([robot.parameters[name].coordinate_sigma for name in calibration.names])
@@ -74,7 +76,8 @@ class FrequencySummary:
         size, V = np.linalg.eigh(A)
         told = size > TOLD * size[-1]
         root = V[:, told] / np.sqrt(size[told])  # A^-1/2 on what is told
-        bands = np.vstack([problem.slopes(calibration) for problem in problems]) * unit @ root
+        slopes = [problem.slopes(calibration) for problem in problems]
+        bands = np.vstack([_about_mean(part) for part in slopes] if apart else slopes) * unit @ root
         half = V[:, told] * np.sqrt(size[told])
         common, U = np.linalg.eigh(bands.T @ bands)
         doubt = _doubt(problems, calibration, unit, root)
@@ -103,6 +106,12 @@ class FrequencySummary:
         system.g_p += self.information @ away
         system.cost += 0.5 * float(away @ self.information @ away)
         return system
+
+
+def _about_mean(bands: Array) -> Array:
+    """Slopes of bands, shape (b, p), without what they have in common."""
+    b = len(bands)
+    return np.asarray((bands - bands.mean(axis=0)) * np.sqrt(b / max(b - 1, 1)))
 
 
 def _pushes(noise: Array, friction: Array) -> Array:
