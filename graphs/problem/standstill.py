@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.recordings.recording import Recording
@@ -181,6 +180,8 @@ def _speed(times: Array, q: Array, sigma: float, wanted: float) -> tuple[Array, 
     Returns:
         Slopes, shape (m,), the speed that they tell from zero, and half the width of the parabolas [s].
     """
+    from scipy.signal import savgol_filter
+
     period = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1] + 0.5 * period, period)
     for half in range(1, max(round(0.5 * LOOK / period), 2) + 1):

@@ -11,7 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import savgol_filter
 
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Stream
@@ -58,6 +57,8 @@ def slope_noise(stream: Stream, sigmas: Array) -> Array:
 
 def smooth_slope(values: Array, ticks: Array) -> Array:
     """Slope of a local parabola; polynomial at the ends, so that nothing jumps there."""
+    from scipy.signal import savgol_filter  # a second of import, which `init` does without
+
     h = float(np.median(np.diff(ticks)))
     width = min(2 * max(round(0.5 * SMOOTHING / h), 1) + 1, len(ticks) - 1 + len(ticks) % 2)
     if width < 3:
@@ -67,6 +68,8 @@ def smooth_slope(values: Array, ticks: Array) -> Array:
 
 def _widest_parabolas(values: Array, period: float, sigma: float) -> tuple[Array, Array]:
     """Smoothed samples and slopes; windows grow by half as long as what they leave looks like noise."""
+    from scipy.signal import savgol_filter
+
     if len(values) < 5:
         return values, np.gradient(values, period) if len(values) > 1 else 0.0 * values
     width, best = 3, 3

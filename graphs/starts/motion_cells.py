@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Stream, unknown_commands
@@ -149,17 +148,20 @@ def _smooth(v: Array, sigmas: Array, periods: Array, h: float) -> tuple[Array, A
     """Velocities smoothed as far as their noise asks for, and the noise that is left, shape (n,).
 
     Where accelerations are white with density S, the best smoother of positions with noise sigma at every period is
-    1 / (1 + (omega / omega_c)^4) with omega_c^4 = S / (sigma^2 period): a Butterworth filter there and back.
+    1 / (1 + (omega / omega_c)^4) with omega_c^4 = S / (sigma^2 period), the gain of a Butterworth filter of second
+    order there and back.
     """
     out, left = v.copy(), np.zeros(v.shape[1])
     for j, (sigma, period) in enumerate(zip(sigmas, periods, strict=True)):
         if sigma <= 0.0 or len(v) < 20:
             continue
+        whole = np.concatenate([2.0 * v[0, j] - v[:0:-1, j], v[:, j], 2.0 * v[-1, j] - v[-2::-1, j]])
+        spectrum, frequency = np.fft.rfft(whole), 2.0 * np.pi * np.fft.rfftfreq(len(whole), h)
         density = 2.0 * MEMORY * float(np.mean(np.gradient(v[:, j], h) ** 2))
         for _ in range(3):  # the noise is in the first guess of the accelerations, too
             omega = float(np.clip((density / (sigma**2 * period)) ** 0.25, 2.0, 0.45 * 2.0 * np.pi / h))
-            low = butter(2, omega / (2.0 * np.pi), fs=1.0 / h, output="sos")
-            out[:, j] = sosfiltfilt(low, v[:, j])
+            smooth = np.fft.irfft(spectrum / (1.0 + (frequency / omega) ** 4), len(whole))
+            out[:, j] = smooth[len(v) - 1 : 2 * len(v) - 1]
             density = 2.0 * MEMORY * float(np.mean(np.gradient(out[:, j], h) ** 2))
         left[j] = sigma * np.sqrt(period * omega**3 / (8.0 * np.sqrt(2.0)))
     return out, left
