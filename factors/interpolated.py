@@ -5,8 +5,10 @@ White noise on the velocities makes the cubic Hermite polynomial the most likely
 
     q(t) = h00 q0 + h h10 v0 + h01 q1 + h h11 v1,   v(t) = dq/dt
 
-Variables: X(k), X(k+1) and those of the sensor; dynamics where effects make the stamps late. A measurement is never
-moved in time; where its lateness is a parameter, the state is taken at another fraction of the step.
+Variables: X(k), X(k+1) and those of the sensor; dynamics where effects make the stamps late or the readings smooth. A
+measurement is never moved in time; where its lateness is a parameter, the state is taken at another fraction of the
+step. Where a filter has smoothed it, positions are those of the state plus variance/2 times the mean acceleration of
+the step.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ class InterpolatedFactor:
         fraction: (t - t_k) / h of each sample, shape (m,); outside [0, 1] the polynomial goes on.
         h: distance of the two ticks, shape (m,) [s].
         layout: of the states.
-        late: how late the stamps are beyond `fraction`; None if they are right.
+        late: how late the stamps are beyond `fraction`, and how smooth the readings; None if they are right.
         fixed: parameters that calibration leaves alone, by full name.
     """
 
@@ -82,18 +84,28 @@ class InterpolatedFactor:
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
         fraction, _ = self._fraction(calibration)
-        return self.inner.residual((self.between(x[0], x[1], fraction),), calibration)
+        between = self._smoothed(self.between(x[0], x[1], fraction), x, calibration)
+        return self.inner.residual((between,), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives by both states, and by what makes the stamps late."""
         fraction, slopes = self._fraction(calibration)
-        inner = self.inner.linearize((self.between(x[0], x[1], fraction),), calibration)
+        between = self._smoothed(self.between(x[0], x[1], fraction), x, calibration)
+        inner = self.inner.linearize((between,), calibration)
         J = inner.by_state[0]
-        by_block = dict(inner.by_block)
+        by_block, by_ends = dict(inner.by_block), self.by_ends(J, fraction)
         if slopes:
             rate = (J @ self.motion(x[0], x[1], fraction)[:, :, None])[:, :, 0]
-            by_block[DYNAMICS] = self._by_lateness(rate, slopes, by_block, calibration)
-        return Linearization(inner.residual, self.by_ends(J, fraction), by_block)
+            by_block[DYNAMICS] = self._by_parameters(-rate, slopes, by_block, calibration)
+        variance, smooth = self._variance(calibration)
+        if smooth:
+            q, v = self.layout.positions, self.layout.velocities
+            bend = 0.5 * (J[:, :, q] @ ((x[1] - x[0])[:, v] / self.h[:, None])[:, :, None])[:, :, 0]
+            by_block[DYNAMICS] = self._by_parameters(bend, smooth, by_block, calibration)
+            by_velocity = 0.5 * variance * J[:, :, q] / self.h[:, None, None]
+            by_ends[0][:, :, v] -= by_velocity
+            by_ends[1][:, :, v] += by_velocity
+        return Linearization(inner.residual, by_ends, by_block)
 
     def between(self, x0: Array, x1: Array, fraction: Array) -> Array:
         """What the factor of the sensor takes as its state, shape (m, d)."""
@@ -115,25 +127,40 @@ class InterpolatedFactor:
         J0[:, :, z], J1[:, :, z] = (1.0 - s) * J[:, :, z], s * J[:, :, z]
         return J0, J1
 
-    def _by_lateness(
-        self, rate: Array, slopes: dict[str, Array], by_block: dict[str, Array], calibration: Calibration
+    def _smoothed(self, between: Array, x: tuple[Array, ...], calibration: Calibration) -> Array:
+        """States with positions as a filter shows them; in place."""
+        variance, smooth = self._variance(calibration)
+        return smoothed(self.layout, between, x[0], x[1], self.h, variance) if smooth else between
+
+    def _variance(self, calibration: Calibration) -> tuple[float, dict[str, float]]:
+        """Of the weights of filters [s^2], and its slopes."""
+        return (0.0, {}) if self.late is None else self.late.variance(self._named(calibration))
+
+    def _named(self, calibration: Calibration) -> dict[str, float]:
+        return {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+
+    def _by_parameters(
+        self,
+        change: Array,
+        slopes: Mapping[str, Array | float],
+        by_block: dict[str, Array],
+        calibration: Calibration,
     ) -> Array:
-        """Derivative by the dynamics; `rate` is that of the reading, shape (m, r)."""
-        total = np.zeros((*rate.shape, len(calibration.names)))
+        """Derivative by the dynamics; `change` is that of the reading by lateness or variance, shape (m, r)."""
+        total = np.zeros((*change.shape, len(calibration.names)))
         if DYNAMICS in by_block:
             total += by_block[DYNAMICS]
         for name, slope in slopes.items():
             if name in calibration.names:
                 k = calibration.names.index(name)
-                total[:, :, k] -= rate * slope[:, None] * calibration.value_by_coordinate[k]
+                total[:, :, k] += (change.T * slope).T * calibration.value_by_coordinate[k]
         return total
 
     def _fraction(self, calibration: Calibration) -> tuple[Array, dict[str, Array]]:
         """Fraction of the step at which each sample was taken, and the slopes of its lateness."""
         if self.late is None:
             return self.fraction, {}
-        values = {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
-        late, slopes = self.late.since_anchor(values)
+        late, slopes = self.late.since_anchor(self._named(calibration))
         return self.fraction - late / self.h, slopes
 
 
@@ -158,6 +185,17 @@ def interpolate(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: A
     x[:, v] = sum(w[:, None] * part for w, part in zip(weights[1], pairs, strict=True))
     x[:, z] = x0[:, z] + fraction[:, None] * (x1[:, z] - x0[:, z])
     return x
+
+
+def smoothed(layout: StateLayout, between: Array, x0: Array, x1: Array, h: Array, variance: float | Array) -> Array:
+    """States between two ticks with positions as a filter with weights of this variance [s^2] shows them; in place.
+
+    The mean acceleration of the step stands for the one at the sample's time: it is less at the mercy of noise, and
+    the difference is a little lateness more.
+    """
+    q, v = layout.positions, layout.velocities
+    between[:, q] += 0.5 * np.reshape(variance / h, (-1, 1)) * (x1 - x0)[:, v]
+    return between
 
 
 def rate_between(layout: StateLayout, x0: Array, x1: Array, fraction: Array, h: Array) -> Array:

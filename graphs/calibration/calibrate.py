@@ -17,6 +17,12 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import Solved, summarize
+from jointscope.graphs.calibration.encoder_filters import (
+    free_filters,
+    lacking_filter,
+    solved_with_filters,
+    with_filters,
+)
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.friction_at_standstill import asked_at_standstill, sticking_joints
@@ -118,6 +124,8 @@ def _calibrated(
         robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
     seen = with_visible_noise(robot, recordings) if near is None and not biases_only else robot
+    filters = free_filters(robot) if near is None and not biases_only else ()
+    seen = with_filters(seen, {name: robot.parameters[name].value for name in filters}, fixed=True)
     told = list(recordings)
     if not biases_only and not standstill:
         told = [leaving_standstill_out(seen, recording) for recording in recordings]
@@ -137,17 +145,22 @@ def _calibrated(
     else:
         calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
     problems = anchored(problems, calibrations)
-    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), near is None and not biases_only, solver, sets)
-    solved = stage.solve(problems, noise, calibrations)
+    stated = {e.name: e.sigmas for e in (seen.motor_encoder, seen.link_encoder) if e is not None}
+    anew = near is None and not biases_only
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated)
+    if biases_only or standstill:
+        solved = stage.solve(problems, noise, calibrations)
+    else:
+        solved = asked_at_standstill(stage, problems, noise, calibrations)
+    solved = solved_with_filters(stage, solved, filters) if filters else solved
     if not biases_only and not standstill:
-        solved = asked_at_standstill(stage, solved)
         notices += sticking_joints(robot, solved.robot)
         robot = replace(robot, parameters=solved.robot.parameters)
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        result = _asked_for_causes(result, solved, effects=memory)
+        result = _asked_for_causes(result, solved, stage if memory else None)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -162,10 +175,13 @@ def _calibrated(
     return result
 
 
-def _asked_for_causes(result: CalibrationResult, solved: Solved, effects: bool) -> CalibrationResult:
-    """With what a linear step says of late signals, of masses and, where it is wanted, of the whole catalogue."""
+def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeStage | None) -> CalibrationResult:
+    """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
     test = ScoreTest.of(*solved.of_motions)
-    lacking = lacking_effects(test) if effects else ()
+    lacking = lacking_effects(test) if stage else ()
+    smoothed = lacking_filter(stage, solved) if stage else None
+    if smoothed is not None and smoothed.moved(result.found):
+        lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
     return replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
 
 

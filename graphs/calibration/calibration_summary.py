@@ -75,11 +75,11 @@ class Solved:
         estimate, motions = self.solution.estimate, len(self.problems)
         return self.problems, estimate.states[:motions], estimate.calibrations[:motions]
 
-    def encoder_sigmas(self, encoder: MotorEncoder | LinkEncoder) -> Array:
-        """Sigmas that the residuals of an encoder ask for, shape (n,)."""
+    def encoder_sigmas(self, encoder: MotorEncoder | LinkEncoder, stated: Array) -> Array:
+        """Sigmas that the residuals of an encoder ask for, beside those that were stated, shape (n,) both."""
         bags = [(p, c.series[encoder.name]) for p, c in zip(self.problems, self.residuals, strict=True)]
         fits = [(p.recording.streams[encoder.name], series_of(p, encoder, parts)) for p, parts in bags if parts]
-        return estimated_sigmas(encoder, [EncoderFit(*fit) for fit in fits])
+        return estimated_sigmas(encoder, [EncoderFit(*fit) for fit in fits], stated)
 
     @staticmethod
     def of(

@@ -4,9 +4,9 @@
     sigma^2 <- sigma^2 times sum of squares / (samples - leverages)
 
 where residuals are white: they are noise, and as large as they are. Coloured residuals are something that the model
-lacks, and no sigma may hide it. For the same reason none is raised beyond what neighbouring samples differ by: a
-missing effect bends the motion, it does not make samples jump. Process noise is estimated in the same way beside it,
-see noise_estimation.py.
+lacks, and no sigma may hide it; but one that had fallen may come back to what was stated. For the same reason none is
+raised beyond what neighbouring samples differ by: a missing effect bends the motion, it does not make samples jump.
+Process noise is estimated in the same way beside it, see noise_estimation.py.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from jointscope.graphs.calibration.calibration_result import ResidualSeries
@@ -30,7 +31,7 @@ COLOUR = 0.25  # largest autocorrelation of white residuals; a quantized encoder
 LAGS = 100  # samples
 BY_CHANCE = 4.0  # [1/sqrt(samples)] autocorrelation that white noise may show
 FOURTH_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
-SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
+FEWEST = 28  # samples that tell their noise by themselves
 ALIKE = 0.15  # relative difference of what both say about white noise
 TOO_SMALL = 1.5  # times the sigma, noise that the samples show by themselves
 ALTERNATING, FAR = -0.6, 4.0  # correlation of neighbouring differences, and [sigma] beyond which none counts more
@@ -44,13 +45,18 @@ class EncoderFit:
     stream: Stream
     series: ResidualSeries
 
+    def is_white(self, channel: int) -> bool:
+        """Whether what is left of a channel has no memory."""
+        return _is_white(self.series.measured[:, channel] - self.series.predicted[:, channel])
 
-def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]) -> Array:
+
+def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit], stated: Array) -> Array:
     """Sigma of each channel that the residuals ask for, shape (n,); as it was where they do not tell.
 
     Args:
         encoder: with the sigmas that were used.
         fits: of all recordings.
+        stated: sigmas before any was found anew, shape (n,).
     """
     sigmas = encoder.sigmas.copy()
     if not encoder.estimate_sigma or not fits:
@@ -60,14 +66,13 @@ def estimated_sigmas(encoder: MotorEncoder | LinkEncoder, fits: list[EncoderFit]
     lowest = np.max([_rounding(fit.stream, encoder.sigmas) for fit in fits], axis=0)
     highest = np.max([_roughness(fit.stream.measured) for fit in fits], axis=0)
     for j in np.flatnonzero((chi2 < AGREES[0]) | (chi2 > AGREES[1])):
-        # a smaller sigma hides nothing, whatever colour is left
-        if chi2[j] < AGREES[0] or all(
-            _is_white(fit.series.measured[:, j] - fit.series.predicted[:, j]) for fit in fits
-        ):
-            wanted = float(sigmas[j] * np.sqrt(chi2[j]))
-            bounded = max(wanted, lowest[j]) if wanted < sigmas[j] else min(wanted, highest[j])
-            # a bound may lie beyond what is there already
-            sigmas[j] = min(bounded, sigmas[j]) if wanted < sigmas[j] else max(bounded, sigmas[j])
+        wanted, white = float(sigmas[j] * np.sqrt(chi2[j])), all(fit.is_white(int(j)) for fit in fits)
+        if wanted < sigmas[j]:  # hides nothing, whatever colour is left
+            sigmas[j] = min(max(wanted, lowest[j]), sigmas[j])
+        else:
+            # one that fell where states followed the samples, while the noise of the motion was loose, may come back
+            bound = max(highest[j] if white else 0.0, stated[j])
+            sigmas[j] = max(min(wanted, bound), sigmas[j])
     return sigmas
 
 
@@ -82,24 +87,41 @@ def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is None or not encoder.estimate_sigma:
             continue
-        seen = np.min([_visible_noise(r.streams[encoder.name].measured) for r in recordings], axis=0)
+        streams = [recording.streams[encoder.name] for recording in recordings]
+        seen = np.min([_visible_noise(stream.times, stream.measured) for stream in streams], axis=0)
         sigmas = np.where(seen > TOO_SMALL * encoder.sigmas, seen, encoder.sigmas)
         changed[encoder.name] = replace(encoder, sigmas=sigmas)
     return robot.with_sensors(changed)
 
 
-def _visible_noise(values: Array) -> Array:
+def _visible_noise(times: Array, values: Array) -> Array:
     """White noise of each channel, shape (n,); zero where it cannot be told from motion. NaN was not measured."""
     found = []
-    for column in _measured(values):
-        if len(column) < 4 * len(SIXTH_DIFFERENCE):
+    for samples in values.T:
+        told = np.isfinite(samples)
+        column, stamps = samples[told], times[told]
+        if len(column) < FEWEST:
             found.append(0.0)
             continue
-        parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
+        parts = [_differences(stamps, column, order) for order in (4, 6)]
         fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
         alike = abs(fourth - sixth) < ALIKE * sixth and all(map(_alternates, parts))
         found.append(sixth if alike else 0.0)
     return np.array(found)
+
+
+def _differences(times: Array, values: Array, order: int) -> Array:
+    """Divided differences, each with the weights that leave white noise as large as it is, shape (m - order,).
+
+    Stamps with jitter are no equal steps: weights for these would show what a motion does between them.
+    """
+    t = sliding_window_view(times, order + 1)
+    t = (t - t[:, :1]) / (t[:, -1:] - t[:, :1])
+    apart = t[:, :, None] - t[:, None, :]
+    apart[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
+    weights = 1.0 / np.prod(apart, axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    return np.asarray(np.sum(weights * sliding_window_view(values, order + 1), axis=1), dtype=np.float64)
 
 
 def _alternates(differences: Array) -> bool:

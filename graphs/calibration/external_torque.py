@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import label, maximum
 from scipy.spatial import KDTree
 
-from jointscope.graphs.calibration.motion_regimes import slowest_visible_speed
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.joint_states import JointStates
+from jointscope.graphs.problem.motion_regimes import slowest_visible_speed
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.model.lasting_torques import equation_inertias
 from jointscope.robots.model.robot import Robot

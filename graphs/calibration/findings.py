@@ -88,7 +88,7 @@ def _verdict(result: CalibrationResult) -> str:
     dynamics = [p for p in result.parameters if p.name in result.robot.parameters]
     count = len(dynamics)
     # how well a time is known shows in seconds, not in shares of a delay that may be none
-    dynamics = [p for p in dynamics if p.value and p.unit != "s"]
+    dynamics = [p for p in dynamics if p.value and p.unit not in ("s", "s^2")]
     relative = [p.sigma / abs(p.value) for p in dynamics]
     if not relative:
         return "no parameter was free"

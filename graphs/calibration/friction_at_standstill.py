@@ -2,9 +2,11 @@
 """What a joint that stands says of its dry friction, where how sharply that turns over is looked for.
 
 Motion comes first: as far as the encoder tells it from standing, it says how friction grows with speed. Then standstill
-is asked, too. Where that ends at a law that turns over at speeds which the encoder sees, standstill says the rest.
-Where it does not, the joint sticks: its friction is a sign, whose sharpness would grow without an end, and it is held
-as sharp as the encoder tells.
+is asked, too, approached anew from the measurements, with loose noise and then with that of the windows: states that no
+law held are thousands of sigmas from any, and with the small noise that motion ends at no step leads there. Where that
+ends at a law that turns over at speeds which the encoder sees, and that takes no more noise than motion asks for,
+standstill says the rest. Where it does not, the joint sticks: its friction is a sign, whose sharpness would grow
+without an end, and it is held as sharp as the encoder tells.
 """
 
 from __future__ import annotations
@@ -12,39 +14,55 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_summary import Solved
-from jointscope.graphs.calibration.whole_stage import FEW_ITERATIONS, WholeStage, anchored
+from jointscope.graphs.calibration.stages.convergence_asked import must_converge
+from jointscope.graphs.calibration.whole_stage import (
+    BELOW_ITERATIONS,
+    FEW_ITERATIONS,
+    MOST_ITERATIONS,
+    SMALL_STEP,
+    WholeStage,
+    anchored,
+)
+from jointscope.graphs.noise.noise_estimation import densities, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import SATURATED, asked_joints, holding_sharpness, slowest_seen
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import SHARPNESS, Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Notice
 
 SEEN = 1.0  # of a law tanh(x), the x of the slowest speed that the encoder tells from none
+CONTRADICTS = 2.0  # times the noise that motion alone asks for, where standstill contradicts the law
 
 
-def asked_at_standstill(stage: WholeStage, solved: Solved) -> Solved:
+def asked_at_standstill(
+    stage: WholeStage, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]
+) -> Solved:
     """The solution in which standstill says its part about the sharpness of friction, or that a joint sticks.
 
     Args:
         stage: solves.
-        solved: the solution without what joints say where they stand.
+        problems: the recordings without what joints say where they stand.
+        noise: where it begins.
+        calibrations: values that windows found.
     """
-    robot = solved.robot
-    asked = [joint for joint in asked_joints(robot) if any(joint in p.recording.sticking for p in solved.problems)]
+    robot = problems[0].robot
+    asked = [joint for joint in asked_joints(robot) if any(joint in p.recording.sticking for p in problems)]
     if not asked:
-        return solved
-    noise, estimate = solved.problems[0].dynamics.steps.noise, solved.solution.estimate
-    telling = anchored(_telling(solved.problems, asked), estimate.calibrations)
+        return stage.solve(problems, noise, calibrations)
+    estimate = stage.approached(problems, noise, calibrations)
+    moving = stage.step("friction in motion", problems, noise, estimate, MOST_ITERATIONS)
+    must_converge(moving, robot, SMALL_STEP)
     try:
-        solution = stage.step("friction at standstill", telling, noise, estimate, FEW_ITERATIONS)
-        if solution.converged and _turns_over_in_sight(telling, solution.estimate.calibrations[0], asked):
-            return stage.settled(telling, noise, solution.estimate)
+        found = _told(stage, problems, asked, noise, moving.estimate.calibrations)
     except SolveError:  # the law contradicts what it is asked for
-        pass
-    return _held_as_a_sign(stage, solved)
+        found = None
+    return found or _held_as_a_sign(stage, problems, noise, moving.estimate)
 
 
 def sticking_joints(before: Robot, after: Robot) -> list[Notice]:
@@ -61,6 +79,22 @@ def sticking_joints(before: Robot, after: Robot) -> list[Notice]:
         )
         for joint in held
     ]
+
+
+def _told(
+    stage: WholeStage,
+    problems: Sequence[BagProblem],
+    asked: Sequence[str],
+    noise: ProcessNoise,
+    calibrations: Sequence[Calibration],
+) -> Solved | None:
+    """The solution with what some joints say where they stand; None where their friction is no law in sight."""
+    telling = anchored(_telling(problems, asked), calibrations)
+    estimate = stage.approached(telling, noise, calibrations[: len(problems)])
+    for solved in stage.passes(telling, noise, estimate, BELOW_ITERATIONS):
+        if not _turns_over_in_sight(solved.problems, solved.solution.estimate.calibrations[0], asked):
+            return None
+    return stage.from_both_sides(solved) if _takes_no_more_noise(stage, problems, solved) else None
 
 
 def _telling(problems: Sequence[BagProblem], asked: Sequence[str]) -> list[BagProblem]:
@@ -83,11 +117,27 @@ def _turns_over_in_sight(problems: Sequence[BagProblem], found: Calibration, ask
     )
 
 
-def _held_as_a_sign(stage: WholeStage, solved: Solved) -> Solved:
-    """The solution with the sharpness of joints that stick held."""
-    sharp = holding_sharpness(solved.robot, [problem.recording for problem in solved.problems])
-    estimate, motions = solved.solution.estimate, len(solved.problems)
+def _takes_no_more_noise(stage: WholeStage, moving: Sequence[BagProblem], told: Solved) -> bool:
+    """Whether motion alone asks for as much noise as motion and standstill together.
+
+    A joint that truly sticks under a rounded law can be explained by random torques: these would show here.
+    """
+    if not told.robot.noise.estimate:
+        return True
+    noise, estimate = told.problems[0].dynamics.steps.noise, told.solution.estimate
+    alone = anchored([problem.of_robot(told.robot) for problem in moving], estimate.calibrations)
+    problems = [problem.with_noise(noise) for problem in alone]
+    solution = stage.step("friction in motion", alone, noise, estimate, FEW_ITERATIONS)
+    wanted = scaled(noise, Solved.of(problems, solution, stage.hold, told.sets).evidence.factors)
+    return bool(np.all(densities(noise) < CONTRADICTS * densities(wanted)))
+
+
+def _held_as_a_sign(
+    stage: WholeStage, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate
+) -> Solved:
+    """The solution with the sharpness of joints that stick held; arguments as in `asked_at_standstill`."""
+    sharp = holding_sharpness(problems[0].robot, [problem.recording for problem in problems])
+    motions = len(problems)
     known = [c.carried_to(Calibration.of(sharp)) for c in estimate.calibrations[:motions]]
     start = stage.with_sets(Estimate(estimate.states[:motions], tuple(known)))
-    problems = anchored([problem.of_robot(sharp) for problem in solved.problems], known)
-    return stage.settled(problems, solved.problems[0].dynamics.steps.noise, start)
+    return stage.finished(anchored([problem.of_robot(sharp) for problem in problems], known), noise, start)

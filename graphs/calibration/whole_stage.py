@@ -8,7 +8,7 @@ from below: a smaller one that agrees with its own residuals is the better expla
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import IterationRecord
 from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.noise.lasting_noise import NoiseWindows, states_in
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
 from jointscope.graphs.noise.torque_memory import likeliest_memory, memory_windows
@@ -31,7 +32,6 @@ from jointscope.graphs.starts.memory_start import with_filled_memories
 from jointscope.graphs.starts.time_shift_start import placed
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.robot_file import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
@@ -51,7 +51,6 @@ SMALL_STEP = 0.1  # [sigma] a last step that changes no value
 BLUNT = (20.0, 60.0)  # [s/rad] friction sharpness on the way to that of the robot
 BELOW_ITERATIONS = 25  # where it does not come to rest in as many, the larger noise stays
 BELOW = 10.0  # times smaller process noise that is tried
-VANISHED = 0.1  # of its prior, a size that may be on its way to nothing
 BETTER = 1.5  # times smaller, the one that is preferred ...
 AS_GOOD = 0.02  # ... where the cost rises by less than this per measured value
 
@@ -78,6 +77,7 @@ class WholeStage:
         sigmas: whether the sigmas of encoders are estimated, too.
         solver: minimises the cost of all samples.
         sets: recordings of other kinds, which share the values of the motions from here on.
+        stated: sigmas of encoders before any was found anew, by sensor, shape (n,) each; those at hand where empty.
     """
 
     hold: tuple[str, ...]
@@ -86,17 +86,32 @@ class WholeStage:
     sigmas: bool
     solver: Solver = solve
     sets: Sequence[SetProblem] = ()
+    stated: Mapping[str, Array] = field(default_factory=dict)
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
+        return self.finished(problems, noise, self.approached(problems, noise, calibrations))
+
+    def approached(
+        self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]
+    ) -> Estimate:
+        """Where looser noise and blunter friction lead from the values that windows found."""
         blunt = blunt_sharpness(problems[0].robot, [p.recording for p in problems])
         softer = [anchored([blunted(p, sharpness) for p in problems], calibrations) for sharpness in blunt]
         estimate = approach(softer[0] if softer else problems, noise, calibrations, self.hold)
         estimate = self.with_sets(estimate)
         for soft in softer:
             estimate = self.step("blunt friction", soft, noise, estimate, FEW_ITERATIONS).estimate
-        solved = self.settled(problems, noise, estimate)
-        return self._from_below(solved) if blunt and noise.estimate else solved
+        return estimate
+
+    def finished(self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate) -> Solved:
+        """The solution with the noise that the whole asks for, approached from both sides where that is needed."""
+        return self.from_both_sides(self.settled(problems, noise, estimate))
+
+    def from_both_sides(self, above: Solved) -> Solved:
+        """A solution, or a better one with less noise, where encoders do not show how joints turn over."""
+        blunt = blunt_sharpness(above.robot, [p.recording for p in above.problems])
+        return self._from_below(above) if blunt and above.robot.noise.estimate else above
 
     def with_memory(self, white: Solved) -> Solved:
         """The solution with random torques that last, where the recordings ask for them; else the one that is given."""
@@ -120,19 +135,26 @@ class WholeStage:
         self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
     ) -> Solved:
         """A solution whose noise agrees with its residuals."""
-        passes = FixedPoint()
+        *_, solved = self.passes(problems, noise, estimate, most)
+        return solved
+
+    def passes(
+        self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
+    ) -> Iterator[Solved]:
+        """Solutions on the way to one whose noise agrees with its residuals, which is the last."""
+        updates = FixedPoint()
         for _ in range(NOISE_PASSES):
             solution = self.step("all samples", problems, noise, estimate, most or MOST_ITERATIONS)
-            _must_converge(solution, problems[0].robot, NUISANCE if self.hold else SMALL_STEP)
+            must_converge(solution, problems[0].robot, NUISANCE if self.hold else SMALL_STEP)
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
-            other = _with_sigmas(problems, solved) if self.sigmas else None
+            yield solved
+            other = _with_sigmas(problems, solved, self.stated) if self.sigmas else None
             better = scaled(noise, solved.evidence.factors) if noise.estimate else noise
             if other is None and np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
                 break
-            noise = passes.update(noise, solved.evidence.factors) if noise.estimate else noise
+            noise = updates.update(noise, solved.evidence.factors) if noise.estimate else noise
             problems, estimate = other or problems, solution.estimate
-        return solved
 
     def _from_below(self, above: Solved) -> Solved:
         """The better of two solutions, where a smaller noise agrees with itself as well."""
@@ -236,52 +258,17 @@ def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]
     return placed(problems, values)
 
 
-def _with_sigmas(problems: Sequence[BagProblem], solved: Solved) -> list[BagProblem] | None:
+def _with_sigmas(
+    problems: Sequence[BagProblem], solved: Solved, stated: Mapping[str, Array]
+) -> list[BagProblem] | None:
     """The problems with the sigmas of encoders that the residuals ask for; None where all are as they were."""
     robot, changed = problems[0].robot, {}
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
-            found = solved.encoder_sigmas(encoder)
+            found = solved.encoder_sigmas(encoder, stated.get(encoder.name, encoder.sigmas))
             if np.any(np.abs(np.log(found / encoder.sigmas)) > SIGMA_AGREES):
                 changed[encoder.name] = replace(encoder, sigmas=found)
     if not changed:
         return None
     other = robot.with_sensors(changed)
     return anchored([problem.of_robot(other) for problem in problems], solved.solution.estimate.calibrations)
-
-
-def _must_converge(solution: Solution, robot: Robot, enough: float) -> None:
-    """Raises unless the solver converged, gained nothing more, or made a last step shorter than `enough` sigmas."""
-    if solution.converged or solution.flat:
-        return
-    last = solution.iterations[-1]
-    if last.step_in_sigmas >= enough:
-        gone = _vanishing(robot, solution)
-        raise SolveError(
-            f"no convergence after {len(solution.iterations)} iterations: the last step was still "
-            f"{last.step_in_sigmas:.2g} sigma and the cost fell from {last.cost_before:.6g} to {last.cost_after:.6g}; "
-            + gone
-            + "start values may be far off, or the model may contradict the recording"
-        )
-
-
-def _vanishing(robot: Robot, solution: Solution) -> str:
-    """A clause about effects whose sizes go to nothing, a long way for logarithms; empty if there are none."""
-    calibration = solution.estimate.calibrations[0]
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
-    gone = [
-        here.label
-        for here in robot.effects
-        if any(
-            name in values
-            and robot.parameters[name].positive
-            and values[name] < VANISHED * robot.parameters[name].prior
-            for name in (here.parameter(p.name) for p in here.effect.parameters_at(robot, here.owner))
-        )
-    ]
-    if not gone:
-        return ""
-    return (
-        f"sizes of {', '.join(gone)} are below a tenth of their start, so the recording may show no such effect: "
-        f"`jointscope remove {robot_argument(robot)} {' '.join(gone)} -o OUT.yaml`; else "
-    )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.calibration.motion_regimes import WHOLE_ROBOT
+from jointscope.graphs.problem.motion_regimes import WHOLE_ROBOT
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.calibration.motion_regimes import REGIMES, WHOLE_ROBOT, MotionRegimes, motion_regimes
 from jointscope.graphs.comparison.channel_errors import ChannelErrors, channel_errors
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.comparison.error_concentration import concentration
@@ -22,6 +21,7 @@ from jointscope.graphs.comparison.error_correlation import JointSignals
 from jointscope.graphs.comparison.failure_sentences import Finding, sentences
 from jointscope.graphs.noise.whiteness_test import whiteness
 from jointscope.graphs.problem.joint_states import JointStates
+from jointscope.graphs.problem.motion_regimes import REGIMES, WHOLE_ROBOT, MotionRegimes, motion_regimes
 from jointscope.robots.recordings.recording import Recording
 
 __all__ = ["REGIMES", "ChannelFailure", "FailureAnalysis", "FailureWindow", "analyse_failure"]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.calibration.motion_regimes import AROUND_REVERSAL, NEAR, MotionRegimes
 from jointscope.graphs.comparison.channel_errors import ChannelErrors
 from jointscope.graphs.comparison.error_concentration import EVERYWHERE, Concentration, shares
+from jointscope.graphs.problem.motion_regimes import AROUND_REVERSAL, NEAR, MotionRegimes
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.interpolated import interpolate
+from jointscope.factors.interpolated import interpolate, smoothed
 from jointscope.graphs.comparison.causal_filter import FilteredStates
 from jointscope.graphs.comparison.noise_floor import are_judged, settled_from
 from jointscope.graphs.comparison.prediction import Predictor
@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 HORIZON = 0.1  # [s] the horizon of `error`
 HORIZONS = (0.01, 0.1, 1.0)  # [s]
 SPACING = {0.01: 0.01, 0.1: 0.01, 1.0: 0.1}  # [s] between starts, by horizon
-PAUSES = 0.9  # quantile of the pauses between samples
 
 
 @dataclass(frozen=True)
@@ -56,12 +55,14 @@ class _Group:
         channels: indices of the channels.
         taken: when the samples were really taken, shape (m,) [s].
         accelerated: whether it feels the accelerations of the links, too.
+        variance: over time, of the weights of the filter that smoothed them [s^2].
     """
 
     sensor: str
     channels: NDArray[np.intp]
     taken: Array
     accelerated: bool
+    variance: float
 
     def steps(self, timeline: Timeline, times: Array) -> NDArray[np.intp]:
         """Steps in which samples at these times were taken."""
@@ -72,6 +73,8 @@ class _Group:
     ) -> Array:
         """What its factor asks for: states between two ticks, with accelerations behind them where it feels them."""
         x = _between(problem, step, times, *ends)
+        if self.variance:
+            smoothed(problem.robot.layout, x, *ends, problem.timeline.h[step], self.variance)
         return predictor.with_accelerations(x, step) if self.accelerated else x
 
 
@@ -94,7 +97,11 @@ def predict_ahead(
             for name, s in problem.robot.sensors.items()
         }
     judged = are_judged(problem, start, horizon)
-    wanted = {g.sensor: _target_samples(g.taken, ticks[start] + horizon) for g in reversed(groups)}
+    streams = problem.recording.streams
+    wanted = {
+        g.sensor: _target_samples(g.taken, float(np.min(streams[g.sensor].periods)), ticks[start] + horizon)
+        for g in reversed(groups)
+    }
     taken = [g.taken[wanted[g.sensor][0]] for g in groups]
     steps = [g.steps(timeline, times) for g, times in zip(groups, taken, strict=True)]
     d = causal.mean.shape[1]
@@ -127,8 +134,10 @@ def _groups(problem: BagProblem) -> list[_Group]:
     for name, sensor in problem.robot.sensors.items():
         stamps = problem.recording.streams[name].times
         for channels, late in late_channels(problem.robot, name):
-            taken = stamps - Lateness.of(problem.robot, late, stamps).anchor
-            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer)))
+            lateness = Lateness.of(problem.robot, late, stamps)
+            variance = lateness.variance({name: p.value for name, p in problem.robot.parameters.items()})[0]
+            taken = stamps - lateness.anchor
+            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer), variance))
     return found
 
 
@@ -139,14 +148,13 @@ def _sums(h: Array, horizon: float) -> Array:
     return total / count
 
 
-def _target_samples(taken: Array, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def _target_samples(taken: Array, period: float, times: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Nearest of the samples, taken at these instants, to each time, and whether it lies within half a period.
 
-    Where two nodes speak just behind each other, the period is the pause after both.
+    The period is that of the fastest node, however soon others speak behind it.
     """
     right = np.clip(np.searchsorted(taken, times), 1, len(taken) - 1)
     nearest = np.where(times - taken[right - 1] < taken[right] - times, right - 1, right)
-    period = float(np.quantile(np.diff(taken), PAUSES))
     return nearest, np.abs(taken[nearest] - times) <= 0.5 * period + 1e-9
 
 

@@ -92,18 +92,18 @@ class FixedLagEstimator(WindowAccess):
         """What happened, oldest first; the last thousand."""
         return list(self._books.log.events)
 
-    def command(self, t: float, u: ArrayLike) -> None:
-        """A command that acts from t [s] on, shape (n,), SI unit of the robot's command."""
-        values = self._books.intake.command(t, u, self._now)
+    def command(self, t: float, u: ArrayLike, about: NDArray[np.bool_] | None = None) -> None:
+        """A command that acts from t [s] on, shape (n,), SI unit of the robot's command; `about` as in `sample`."""
+        values = self._books.intake.command(t, u, self._now, about)
         if values is None:
             return
         if self.status.running:
             self._close_before(t)
-        self._waiting.commands.add(t, values)
+        self._waiting.commands.add(t, values, about)
         newest = self._now
         if newest is None:
             return
-        self._books.watch.seen("command", t)
+        self._books.watch.commanded(t, about)
         if self._waiting.commands.acts_until(t) <= self._engine.past[0].time:
             self._books.intake.too_late("command", t, newest)
             return
@@ -132,14 +132,14 @@ class FixedLagEstimator(WindowAccess):
             name: "command", or a sensor of the robot.
             t: stamp [s].
             values: shape (c,), SI.
-            about: channels that a message of a sensor is about, shape (c,), where drivers send one for each joint; the
-                others count as neither measured nor lost. None for all.
+            about: channels that a message is about, shape (c,), where drivers send one for each joint; the others count
+                as neither measured nor lost, and commands act on. None for all.
 
         Raises:
             EstimatorError: unknown stream or wrong shape.
         """
         if name == "command":
-            self.command(t, values)
+            self.command(t, values, about)
             return
         observations = self._books.intake.sample(name, t, values, self._now, about)
         if self._books.clock.was_set:
@@ -147,7 +147,7 @@ class FixedLagEstimator(WindowAccess):
         if not observations:
             return
         if not self.status.running:
-            if self._first.add(observations):
+            if self._first.add(observations) and not self._books.intake.waits_for_commands:
                 self._start()
             return
         self._books.watch.seen(name, t)

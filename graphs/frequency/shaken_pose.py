@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.responses.response_matrix import ResponseMatrix, response_matrix
 from jointscope.graphs.responses.spectra import Spectra, spectra, steady_spectra
-from jointscope.robots.recordings.signals import Excitation, Signals
+from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FINER = 4  # times the sampling rate: friction turns over within milliseconds, and what folds back is not of its line
-LARGE = 50.0  # beyond it 1 / cosh^2 is zero
 VELOCITY_BAND = 0.8  # of half the rate: beyond it positions tell nothing but noise of the velocity that friction sees
 
 
@@ -90,6 +89,28 @@ class ShakenPose:
         return np.asarray(self.found.Y[:, :, :K].mean(axis=1))
 
     @cached_property
+    def motions(self) -> Complex:
+        """The same in every experiment as it was, each sign by itself, shape (b, K, nu) [rad]."""
+        common = self.found.common
+        K, signs = self.motion.shape[1], self._signs[:, :, None, None]
+        both = 0.0 if common is None else common[:, :, :K].mean(axis=1)
+        return np.asarray((both + signs * self.motion).reshape(-1, *self.motion.shape[1:]))
+
+    def both_signs(self, each: Complex) -> Complex:
+        """What every experiment has by itself, shape (b, ...), as spectra of this pose have it, shape (e, ...)."""
+        signs = self._signs
+        every = each.reshape(*signs.shape, *each.shape[1:])
+        return np.asarray(np.einsum("se,se...->e...", signs, every) / len(signs))
+
+    @property
+    def _signs(self) -> Array:
+        """Of the excitation, both of a pair, shape (2, e), or those of single experiments, shape (1, e)."""
+        order = sorted(self.found.excitation.experiments, key=lambda e: (e.realisation, e.number))
+        if self.found.common is None:
+            return np.array([[e.sign for e in order]], dtype=np.float64)
+        return np.outer([1.0, -1.0], np.ones(len(self.motion)))
+
+    @cached_property
     def torques(self) -> Complex:
         """Of the motors at the lines, shape (e, l, nu) [N m]."""
         return np.asarray(self.found.U.mean(axis=1)[:, self.lines])
@@ -103,25 +124,64 @@ class ShakenPose:
         Returns:
             Shape (e, l, nu) each.
         """
+        key = sharpness.tobytes()
+        if key not in self._frictions:  # several begins ask for the same
+            self._frictions[key] = self._friction(sharpness)
+        return self._frictions[key]
 
+    @cached_property
+    def _frictions(self) -> dict[bytes, tuple[Complex, Complex]]:
+        return {}
+
+    def _friction(self, sharpness: Array) -> tuple[Complex, Complex]:
         def law(x: Array) -> Array:
             y = sharpness * self._velocity(x, VELOCITY_BAND)
-            return np.concatenate([np.tanh(y), y / np.cosh(np.minimum(np.abs(y), LARGE)) ** 2], axis=2)
+            t = np.tanh(y)
+            return np.concatenate([t, y * (1.0 - t * t)], axis=2)
 
         size, sharper = np.split(self._of_positions(law), 2, axis=2)
         return size, sharper
 
-    def friction_doubt(self, sharpness: Array) -> Complex:
-        """What half of the band of the velocities is worth in friction of unit size; above it they are not known."""
+    def friction_doubt(self, sharpness: Array, share: float = 1.0) -> Complex:
+        """What the upper half of a share of the band of the velocities is worth in friction of unit size."""
 
         def law(x: Array) -> Array:
-            fine, coarse = (np.tanh(sharpness * self._velocity(x, part * VELOCITY_BAND)) for part in (1.0, 0.5))
+            fine, coarse = (np.tanh(sharpness * self._velocity(x, part * share * VELOCITY_BAND)) for part in (1.0, 0.5))
             return np.asarray(fine - coarse)
 
         return self._of_positions(law)
 
+    def changes(self, sharpness: Array) -> tuple[Complex, Complex, Complex]:
+        """What changes from period to period, which is noise, with all that one cause does to different lines.
+
+        Args:
+            sharpness: k of each motor, shape (nu,) [s/rad].
+
+        Returns:
+            Torques, positions and friction of unit size, shape (s, e, l, nu) each, scaled so that their squares add up
+            to the variance of a mean over all periods; s is 0 with one period.
+        """
+
+        def law(x: Array) -> Array:
+            return np.asarray(np.tanh(sharpness * self._velocity(x, VELOCITY_BAND)))
+
+        ways = (self.signals.inputs, None), (self.signals.outputs, None), (self.signals.outputs, law)
+        torques, positions, friction = (self._changed(*way) for way in ways)
+        return torques, positions, friction
+
+    def _changed(self, signal: Signal, law: Callable[[Array], Array] | None) -> Complex:
+        kinds = [x for x in steady_spectra(signal, self.found.excitation, self.path, law) if x is not None]
+        P = self.found.periods
+        each = [np.swapaxes(x - x.mean(axis=1, keepdims=True), 0, 1)[:, :, self.lines] for x in kinds]
+        return np.asarray(np.concatenate(each)[: 0 if P < 2 else None] / np.sqrt(max(P * (P - 1), 1) * len(kinds)))
+
     def _of_positions(self, law: Callable[[Array], Array]) -> Complex:
-        found, _ = steady_spectra(self.signals.outputs, self.found.excitation, self.path, law)
+        """Of the mean over periods: noise of a velocity rounds off what turns over, and the mean has less of it."""
+
+        def mean(x: Array) -> Array:
+            return law(x.mean(axis=0, keepdims=True))
+
+        found, _ = steady_spectra(self.signals.outputs, self.found.excitation, self.path, mean)
         return np.asarray(found.mean(axis=1)[:, self.lines])
 
     def _velocity(self, x: Array, band: float) -> Array:

@@ -2,30 +2,31 @@
 """From stage to stage: the arm about where it was found, what carries the excitation, and how large residuals are.
 
 Residuals of the torque balance are what friction laws, sensors and a motion beside the excitation leave. Their
-covariance at each line is that of the last stage's residuals at neighbouring lines, over all experiments.
+covariance at each line is that of the last stage's residuals at neighbouring lines, over all experiments: at first many
+of them, then ever fewer, for a resonance at the wrong place makes a few lines look noisy, and would be left there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.frequency.frequency_set import FrequencySet, Stage
-from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
+from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
+from jointscope.graphs.frequency.motor_stiffness import motor_stiffness
+from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.graphs.responses.response_matrix import over_neighbours
+from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
 from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-HARMONICS = 2  # of the arm about the motion that carries the excitation
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
+NARROWER = 4  # times fewer lines from stage to stage
 STEP = {"length": 1e-4, "angle": 1e-4}  # [m], [rad] of the differences for columns of geometry
 
 
@@ -36,54 +37,68 @@ def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
     relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[pose.used]
     parts = arm.linearised(pose.q, values).mean
     sharpness = np.array([robot.sharpness_of(joint, values) for joint in arm.joints])
-    stage = Stage(parts, (1.0 / np.hypot(relative, LOG_FLOOR)).astype(complex), 0.0, None, sharpness, {}, values, True)
+    stage = Stage(
+        parts,
+        (1.0 / np.hypot(relative, LOG_FLOOR)).astype(complex),
+        0.0,
+        None,
+        sharpness,
+        {},
+        values,
+        True,
+        len(pose.lines),
+        geometry_slopes(arm, robot, pose),
+    )
     return FrequencySet(robot, pose, stage)
 
 
 def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     """The pose with the torque balance about values that were found."""
     values, pose, robot, arm = before.values(calibration), before.pose, before.robot, before.arm
+    width = max(before.stage.width // NARROWER, NEIGHBOURS)
     parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
-    geometry = before.stage.geometry or _geometry(arm, robot, pose, parts, values)
+    k, slopes = motor_stiffness(arm, parts, pose.w, values), before.stage.slopes
+    columns = k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines])
+    geometry = dict(zip(slopes.names, columns, strict=True))
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
-    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False)
-    k = motor_stiffness(arm, parts, pose.w, values)
-    if pose.step:
-        stage = replace(stage, shift=_shift(arm, pose, k.Z, values))
+    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False, width, slopes)
+    moving = moving_arm(arm, pose, values, before.stage.x)
+    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, pose.lines])
+    stage = replace(stage, shift=moving.torques[:, pose.lines] - standing, x=moving.x)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
-    root = np.linalg.cholesky(_covariance(r))
+    root = np.linalg.cholesky(_covariance(r, width))
+    size = 4.0 * len(r) * float(np.sum(np.log(np.einsum("lii->li", root).real)))  # real and imaginary part
     whiten = np.asarray(np.linalg.solve(root, now.with_friction(k.Z, values)), dtype=np.complex128)
-    return replace(now, stage=replace(stage, whiten=whiten))
+    return replace(now, stage=replace(stage, whiten=whiten, unlikely=size))
 
 
-def _shift(arm: FlexibleArm, pose: ShakenPose, Z: Complex, values: Mapping[str, float]) -> Complex:
-    """Torques about the carrying motion less those of the arm that stands."""
-    excitation = pose.found.excitation
-    about = arm.linearised(pose.q, values, pose.carrier, 2.0 * np.pi * excitation.carrier, HARMONICS)
-    moving = carried_torque(arm, about, excitation.f0, pose.step, pose.motion, values)[:, pose.lines]
-    return np.asarray(moving - np.einsum("lij,elj->eli", Z, pose.motion[:, pose.lines]))
+def _covariance(r: Complex, width: int) -> Complex:
+    """Of residuals at each line, shape (l, nu, nu), by those of its neighbours.
 
-
-def _covariance(r: Complex) -> Complex:
-    """Of residuals at each line, shape (l, nu, nu), by those of its neighbours."""
+    The inverse of a covariance of n samples is n / (n - nu) too large in the mean, and the information with it.
+    """
     each = np.einsum("eli,elj->lij", r, r.conj()) / len(r)
-    mean = over_neighbours(each)
+    mean = over_neighbours(each, width)
+    count = len(r) * neighbours(r.shape[1], width)
+    mean = mean * (count / np.maximum(count - r.shape[2], 1.0))[:, None, None]
     floor = 1e-6 * np.real(np.trace(mean, axis1=1, axis2=2))[:, None, None] * np.eye(r.shape[2])
     return np.asarray(mean + floor)
 
 
-def _geometry(
-    arm: FlexibleArm, robot: Robot, pose: ShakenPose, parts: tuple[Array, Array, Array], values: Mapping[str, float]
-) -> dict[str, Complex]:
-    """Columns of the geometric errors that are parameters of the robot, shape (e, l, nu), by differences."""
-    Z, found = motor_stiffness(arm, parts, pose.w, values).Z, {}
+def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose) -> GeometrySlopes:
+    """How M, C and G follow the geometric errors that are parameters of the robot, by differences.
+
+    They change by thousandths where geometry does by millimetres, so one look serves all stages.
+    """
+    values = {name: p.value for name, p in robot.parameters.items()}
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
-    for joint in robot.joints:
-        for part, step in kinds.items():
-            name = f"{joint}.{part}"
-            if name in robot.parameters and not robot.parameters[name].fixed:
-                moved = {**values, name: values[name] + step}
-                other = motor_stiffness(arm, arm.linearised(pose.q, moved).mean, pose.w, moved).Z
-                found[name] = np.einsum("lij,elj->eli", (other - Z) / step, pose.motion[:, pose.lines])
-    return found
+    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()}
+    free = [name for name in steps if name in robot.parameters and not robot.parameters[name].fixed]
+    parts, shape = arm.linearised(pose.q, values).mean, (len(free), len(arm.springs), len(arm.springs))
+    moved = [arm.linearised(pose.q, {**values, name: values[name] + steps[name]}).mean for name in free]
+    M, C, G = (
+        np.array([(each[i] - part) / steps[name] for name, each in zip(free, moved, strict=True)]).reshape(shape)
+        for i, part in enumerate(parts)
+    )
+    return GeometrySlopes(tuple(free), (M, C, G))

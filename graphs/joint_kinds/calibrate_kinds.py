@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.agreement import Agreement, agreement
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration, settled_stages
+from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage
-from jointscope.graphs.joint_kinds.agreement import Agreement, agreement
-from jointscope.graphs.joint_kinds.frequency_summary import FrequencySummary
 from jointscope.graphs.poses.calibrate_poses import AGREES, PoseCalibration, calibrate_poses, squared_distances
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context

@@ -102,7 +102,7 @@ def _moved(segment: Segment, columns: Sequence[Column]) -> Array:
     """How far errors of readings move the states, which follow fine encoders, shape (m + 1, d, k)."""
     s, encoder = segment.signals, segment.problem.robot.motor_encoder
     q, v = s.model.layout.joint_q, s.model.layout.joint_v
-    part = SensorPart(encoder.name, np.arange(len(q)), s.ticks, s.x[:, q], s.x[:, v])
+    part = SensorPart(encoder.name, np.arange(len(q)), s.ticks, s.x[:, q], s.x[:, v], s.rate[:, v])
     found = np.zeros((*s.x.shape, len(columns)))
     for i, column in enumerate(columns):
         if column.reading is not None:

@@ -34,16 +34,23 @@ def shared_error(stream: Stream, sigmas: Array) -> Array | None:
     coarse = step > COARSE * sigmas
     if len(stream) < SMOOTHING or not np.any(coarse):
         return None
-    period = float(np.median(np.diff(stream.times)))
-    slope = np.diff(stream.values, axis=0, prepend=stream.values[:1]) / np.diff(stream.times, prepend=-np.inf)[:, None]
+    factor = np.ones(stream.values.shape)
+    for j in map(int, np.flatnonzero(coarse)):
+        own, seen = stream.channel(j), np.isfinite(stream.measured[:, j])
+        factor[seen, j] = np.sqrt(_worth_one(own, float(step[j]), float(stream.periods[j])))
+    return factor
+
+
+def _worth_one(own: Stream, step: float, period: float) -> Array:
+    """How many samples of one channel share an error, shape (k,)."""
+    slope = np.diff(own.values[:, 0], prepend=own.values[0, 0]) / np.diff(own.times, prepend=-np.inf)
     # of the past alone: a filter that uses these weights must not know the future
-    speed = np.abs(uniform_filter1d(slope, SMOOTHING, axis=0, origin=SMOOTHING // 2))
-    worth_one = np.clip(step / np.maximum(speed * period, SMALLEST_CHANGE), 1.0, MOST)
-    return np.where(coarse, np.sqrt(worth_one), 1.0)
+    speed = np.abs(uniform_filter1d(slope, SMOOTHING, origin=SMOOTHING // 2))
+    return np.asarray(np.clip(step / np.maximum(speed * period, SMALLEST_CHANGE), 1.0, MOST))
 
 
 def encoder_steps(values: Array) -> Array:
-    """Smallest change between two samples of each channel, shape (c,); zero where nothing does."""
-    changes = np.abs(np.diff(values, axis=0))
-    smallest = np.min(np.where(changes > SMALLEST_CHANGE, changes, np.inf), axis=0, initial=np.inf)
-    return np.where(np.isfinite(smallest), smallest, 0.0)
+    """Smallest change between two samples of each channel, shape (c,); zero where nothing does. NaN: not measured."""
+    changes = [np.abs(np.diff(column[np.isfinite(column)])) for column in values.T]
+    changes = [some[some > SMALLEST_CHANGE] for some in changes]
+    return np.array([float(np.min(some)) if len(some) else 0.0 for some in changes])

@@ -89,8 +89,8 @@ def holding_sharpness(robot: Robot, recordings: Sequence[Recording]) -> Robot:
 def slowest_seen(robot: Robot, recording: Recording, joint: str) -> float:
     """The slowest speed of a joint that its encoder tells from zero, or a small part of its own [rad/s, m/s]."""
     encoder, j = robot.motor_encoder, robot.joints.index(joint)
-    stream = recording.streams[encoder.name]
-    q, times, sigma = stream.values[:, j], stream.times, float(encoder.sigmas[j])
+    stream, sigma = recording.streams[encoder.name].channel(j), float(encoder.sigmas[j])
+    q, times = stream.values[:, 0], stream.times
     v, _, _ = _speed(times, q, sigma, 0.0)
     grain = GRAIN * float(np.quantile(np.abs(v), 0.95))
     return max(grain, _speed(times, q, sigma, grain)[1])
@@ -158,7 +158,7 @@ def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0
         times: the speed at which friction has its full size, below which the joint is too slow.
     """
     encoder, j = robot.motor_encoder, robot.joints.index(joint)
-    stream = recording.streams[encoder.name]
+    stream = recording.streams[encoder.name].channel(j)
     elastic = joint in robot.layout.motors and not robot.has_effect(ADDED_SPRING, joint)
     asked = _is_asked(robot, joint)
     held = f"{joint}.{SHARPNESS}" in robot.parameters and not asked  # as a sign
@@ -166,7 +166,7 @@ def _standing(robot: Robot, recording: Recording, joint: str, times: float = 1.0
     if slow_effects and not (elastic or held):
         return None
     rounded = slowest_seen(robot, recording, joint) if asked else SATURATED / robot.sharpness_of(joint)
-    v, seen, reach = _speed(stream.times, stream.values[:, j], float(encoder.sigmas[j]), CLEARLY * rounded)
+    v, seen, reach = _speed(stream.times, stream.values[:, 0], float(encoder.sigmas[j]), CLEARLY * rounded)
     hardly = HARDLY_MOVES * float(np.quantile(np.abs(v), 0.95))
     if seen >= max(rounded, hardly):
         return None

@@ -53,7 +53,7 @@ class Timeline:
         """
         command = recording.command
         sensors = [stream for name, stream in recording.streams.items() if name != "command"]
-        period = _usual_step(command)
+        period = float(np.min(command.periods, initial=np.inf))
         end = min(max(float(s.times[-1]) for s in sensors), float(command.times[-1]) + period)
         keep = np.append(np.diff(command.times) >= SHORTEST_STEP, True) & (command.times < end)
         times, u = command.times[keep], command.values[keep]
@@ -88,21 +88,18 @@ class Timeline:
         return step, (times - self.ticks[step]) / self.h[step]
 
 
-def _usual_step(command: Stream) -> float:
-    """Usual time from one command to the next [s]; several drivers on one topic may speak just behind each other."""
-    drivers = command.values.shape[1] if command.filled is not None else 1
-    steps = (command.times[drivers:] - command.times[:-drivers]) / drivers
-    return float(np.median(steps)) if len(steps) else np.inf
-
-
 def _means(command: Stream, ticks: Array) -> Array:
-    """Mean of a signal that is linear between samples over each step, shape (m, n); the last value goes on."""
-    times = np.append(command.times, max(float(ticks[-1]), float(command.times[-1])) + 1.0)
-    values = np.vstack([command.values, command.values[-1:]])
-    pieces = 0.5 * np.diff(times)[:, None] * (values[:-1] + values[1:])
-    reached = np.vstack([np.zeros(values.shape[1]), np.cumsum(pieces, axis=0)])
-    k = np.clip(np.searchsorted(times, ticks, side="right") - 1, 0, len(times) - 2)
-    passed = (ticks - times[k])[:, None]
-    slope = (values[k + 1] - values[k]) / np.diff(times)[k, None]
-    at_ticks = reached[k] + passed * values[k] + 0.5 * slope * passed**2
-    return np.asarray(np.diff(at_ticks, axis=0) / np.diff(ticks)[:, None], dtype=np.float64)
+    """Mean of a signal that is linear between the samples of each channel over each step, shape (m, n).
+
+    The last value goes on.
+    """
+    found = []
+    for j in range(command.values.shape[1]):
+        own = command.channel(j)
+        times = np.append(own.times, max(float(ticks[-1]), float(own.times[-1])) + 1.0)
+        values = np.append(own.values[:, 0], own.values[-1:, 0])
+        reached = np.append(0.0, np.cumsum(0.5 * np.diff(times) * (values[:-1] + values[1:])))
+        k = np.clip(np.searchsorted(times, ticks, side="right") - 1, 0, len(times) - 2)
+        passed, slope = ticks - times[k], (np.diff(values) / np.diff(times))[k]
+        found.append(np.diff(reached[k] + passed * values[k] + 0.5 * slope * passed**2) / np.diff(ticks))
+    return np.column_stack(found)

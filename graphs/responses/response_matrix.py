@@ -122,12 +122,21 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
     return over_neighbours(total)
 
 
-def over_neighbours(covariance: Complex) -> Complex:
-    """Mean of each line, shape (l, ...), and its neighbours, fewer at the ends."""
-    n = len(covariance)
+def over_neighbours(covariance: Complex, each_side: int = NEIGHBOURS) -> Complex:
+    """Mean of each line, shape (l, ...), and its neighbours on each side, fewer at the ends."""
     sums = np.concatenate([np.zeros_like(covariance[:1]), np.cumsum(covariance, axis=0)])
-    low, high = np.maximum(np.arange(n) - NEIGHBOURS, 0), np.minimum(np.arange(n) + NEIGHBOURS + 1, n)
+    low, high = _window(len(covariance), each_side)
     return np.asarray((sums[high] - sums[low]) / (high - low)[:, None, None])
+
+
+def neighbours(lines: int, each_side: int = NEIGHBOURS) -> Array:
+    """How many lines `over_neighbours` takes together, shape (l,)."""
+    low, high = _window(lines, each_side)
+    return np.asarray(high - low, dtype=np.float64)
+
+
+def _window(lines: int, each_side: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.maximum(np.arange(lines) - each_side, 0), np.minimum(np.arange(lines) + each_side + 1, lines)
 
 
 def _about_neighbours(G: Complex) -> Complex:

@@ -45,6 +45,7 @@ class LackingEffect:
         p_value: that it is chance, over the blocks of the recording and all effects that were asked for.
         worth: score less what its sizes cost.
         with_it: each parameter with the effect beside it, in the parameter's unit.
+        tried: whether the values were found with the effect in the model, not by one linear step.
     """
 
     effect: str
@@ -52,6 +53,7 @@ class LackingEffect:
     p_value: float
     worth: float
     with_it: dict[str, float]
+    tried: bool = False
 
     @property
     def label(self) -> str:

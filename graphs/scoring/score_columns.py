@@ -19,7 +19,7 @@ from jointscope.graphs.scoring.columns.elasticity import elasticity_column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.inertia import coriolis_columns, gravity_columns, inertia_columns
 from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
-from jointscope.graphs.scoring.columns.reading import late_column, reading_column
+from jointscope.graphs.scoring.columns.reading import late_column, reading_column, smooth_column
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.columns.transmission import transmission_columns
@@ -29,6 +29,7 @@ from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
+from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.effect_kinds.transmission_elements import TransmissionElements
@@ -60,6 +61,8 @@ def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
         return [Column(reading=reading_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
     if isinstance(effect, TimeShift):
         return [Column(reading=late_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
+    if isinstance(effect, SmoothedReading):
+        return [Column(reading=smooth_column(hypothesis, s))]
     assert isinstance(effect, Structure)
     if effect.form == "bearing":
         return bearing_columns(hypothesis, s)

@@ -246,4 +246,6 @@ def _sensor_part(
     offset = np.broadcast_to(zero, len(sensor.channels))
     motion = sum((J @ rate[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
     reading = linear.residual + measured - offset[channels]
-    return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion))
+    q, a = segment.problem.robot.layout.positions, rate[:, segment.problem.robot.layout.velocities]
+    bend = sum((J[:, :, q] @ a[ticks + i][:, :, None])[:, :, 0] for i, J in enumerate(linear.by_state))
+    return SensorPart(factor.name, channels, stamps, reading, np.asarray(motion), np.asarray(bend))

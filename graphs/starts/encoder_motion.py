@@ -26,15 +26,14 @@ FITS = 1.1  # [sigma] mean residual of a parabola that is explained by noise
 
 def encoder_motion(stream: Stream, encoder: MotorEncoder | LinkEncoder, ticks: Array) -> tuple[Array, Array]:
     """Positions and velocities at ticks, shape (m, n) each [rad, of joints that slide m]."""
-    period = float(np.median(np.diff(stream.times)))
-    values = stream.values - encoder.zero
-    if period <= SMOOTHING / 4.0 and not hides_reversals(stream, encoder):
-        q = np.column_stack([np.interp(ticks, stream.times, column) for column in values.T])
+    own = [stream.channel(j) for j in range(stream.values.shape[1])]  # each joint may have a driver of its own
+    if np.all(stream.periods <= SMOOTHING / 4.0) and not hides_reversals(stream, encoder):
+        q = np.column_stack([np.interp(ticks, joint.times, joint.values[:, 0]) for joint in own]) - encoder.zero
         return q, smooth_slope(q, ticks)
-    grid = np.arange(stream.times[0], stream.times[-1] + 0.5 * period, period)
     found = []
-    for column, sigma in zip(values.T, encoder.sigmas, strict=True):
-        q, v = _widest_parabolas(np.interp(grid, stream.times, column), period, float(sigma))
+    for joint, period, zero, sigma in zip(own, stream.periods, encoder.zero, encoder.sigmas, strict=True):
+        grid = np.arange(joint.times[0], joint.times[-1] + 0.5 * period, period)
+        q, v = _widest_parabolas(np.interp(grid, joint.times, joint.values[:, 0]) - zero, period, float(sigma))
         spline = CubicHermiteSpline(grid, q, v)
         inside = np.clip(ticks, grid[0], grid[-1])
         found.append((spline(inside), spline(inside, 1)))
@@ -43,19 +42,18 @@ def encoder_motion(stream: Stream, encoder: MotorEncoder | LinkEncoder, ticks: A
 
 def hides_reversals(stream: Stream, encoder: MotorEncoder | LinkEncoder) -> bool:
     """Whether slopes over SMOOTHING, or over three samples where these take longer, are lost in noise."""
-    return bool(np.any(slope_noise(stream.times, encoder.sigmas) > ROUGH))
+    return bool(np.any(slope_noise(stream, encoder.sigmas) > ROUGH))
 
 
-def slope_noise(times: Array, sigmas: Array) -> Array:
+def slope_noise(stream: Stream, sigmas: Array) -> Array:
     """Noise of slopes over SMOOTHING, or over three samples where these take longer, shape (n,) [rad/s].
 
     Args:
-        times: stamps of the encoder, shape (m,) [s].
+        stream: of the encoder, with n channels.
         sigmas: of the encoder, shape (n,) [rad].
     """
-    period = float(np.median(np.diff(times)))
-    window = max(SMOOTHING, 2.0 * period)
-    return np.asarray(sigmas * np.sqrt(12.0 * period / window) / window)
+    window = np.maximum(SMOOTHING, 2.0 * stream.periods)
+    return np.asarray(sigmas * np.sqrt(12.0 * stream.periods / window) / window)
 
 
 def smooth_slope(values: Array, ticks: Array) -> Array:

@@ -119,7 +119,7 @@ def _stops_of(joint: str, cells: MotionCells, j: int, signals: Array, equation: 
     usual = float(np.sqrt(np.mean(missing[elsewhere] ** 2)))
     for side, at_end in ends.items():
         contact = _contacts(at_end, side * missing > TOUCHES * usual)
-        lasts = np.sum(contact) * cells.h > max(LONG, SAMPLES * cells.period)
+        lasts = np.sum(contact) * cells.h > max(LONG, SAMPLES * cells.periods[j])
         often = label(contact)[1] >= SEVERAL
         if (often or lasts) and _is_pressed(side * missing[at_end], usual, least):
             at = float(np.average(q[contact], weights=np.abs(missing[contact])))

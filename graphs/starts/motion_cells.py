@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.recording import Stream
+from jointscope.robots.recordings.recording import Stream, unknown_commands
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -47,7 +47,7 @@ class MotionCells:
         a: mean accelerations, shape (m, n) [rad/s^2].
         u: mean commands, shape (m, n).
         known: cells in which friction has the size of sliding, and no sample is missing, shape (m, n).
-        period: of the encoders' samples [s].
+        periods: of the samples of each encoder, shape (n,) [s].
     """
 
     h: float
@@ -58,7 +58,7 @@ class MotionCells:
     a: Array
     u: Array
     known: Flags
-    period: float
+    periods: Array
 
 
 def motion_cells(
@@ -80,9 +80,11 @@ def motion_cells(
     Raises:
         RecordingError: the two do not overlap, or hardly, or there are hardly any positions.
     """
-    if len(encoder) < FEWEST_SAMPLES:
-        raise RecordingError(f"there are {len(encoder)} positions; expected at least {FEWEST_SAMPLES}")
-    period = float(np.median(np.diff(encoder.times)))
+    fewest = int(np.min(np.count_nonzero(np.isfinite(encoder.measured), axis=0), initial=len(encoder)))
+    if fewest < FEWEST_SAMPLES:
+        raise RecordingError(f"there are {fewest} positions; expected at least {FEWEST_SAMPLES}")
+    periods = encoder.periods
+    period = float(np.min(periods))  # of the fastest node, where several publish
     t0 = float(max(encoder.times[0], command.times[0]))
     t1 = float(min(encoder.times[-1], command.times[-1] + (period if held else 0.0)))
     if t1 - t0 < period:
@@ -97,46 +99,60 @@ def motion_cells(
         )
     h = max(period / CELLS_PER_SAMPLE, SHORTEST_CELL, (t1 - t0) / MOST_CELLS)
     edges: Array = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1, dtype=np.float64)
-    path = CubicSpline(encoder.times, encoder.values)
-    q, v = path(edges), path(edges, 1)
-    v_smooth, v_sigma = _smooth(v, sigmas, period, h)
+    (q, v), middle = _path(encoder, edges), 0.5 * (edges[1:] + edges[:-1])
+    v_smooth, v_sigma = _smooth(v, sigmas, periods, h)
     means = np.diff(_integral(command, edges, held), axis=0) / h
-    middle = 0.5 * (edges[1:] + edges[:-1])
     slow = np.maximum(UNCLEAR * v_sigma, AT_REST * np.sqrt(np.mean(v_smooth**2, axis=0)))
     resting = np.abs(v_smooth) < slow
     rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
     fewest = np.maximum(REVERSAL * 2.0 * slow / np.maximum(rush, 1e-12), 2.0 * h) / h
     measured = np.isfinite(encoder.measured)  # one joint's motion moves the others, too
-    usable = ~np.any([_missing(encoder.times[good], middle, period) for good in measured.T], axis=0)
-    for begin, end in left_out:
+    missing = [_missing(encoder.times[good], middle, own) for good, own in zip(measured.T, periods, strict=True)]
+    usable = ~np.any(missing, axis=0)
+    unknown = [stretch for stretches in unknown_commands(command).values() for stretch in stretches] if held else []
+    for begin, end in [*left_out, *unknown]:
         usable &= (middle < begin - h) | (middle > end + h)
     known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
-    return MotionCells(
-        h, middle, path(middle), np.diff(q, axis=0) / h, v_smooth, np.diff(v, axis=0) / h, means, known, period
-    )
+    at_middle, a = _path(encoder, middle)[0], np.diff(v, axis=0) / h
+    return MotionCells(h, middle, at_middle, np.diff(q, axis=0) / h, v_smooth, a, means, known, periods)
+
+
+def _path(encoder: Stream, times: Array) -> tuple[Array, Array]:
+    """Positions and velocities on curves through the samples of each joint, shape (m, n); at rest outside of them."""
+    found = []
+    for j in range(encoder.values.shape[1]):
+        own = encoder.channel(j)
+        inside = (times >= own.times[0]) & (times <= own.times[-1])
+        curve, at = CubicSpline(own.times, own.values[:, 0]), np.clip(times, own.times[0], own.times[-1])
+        found.append((curve(at), np.where(inside, curve(at, 1), 0.0)))
+    return np.column_stack([q for q, _ in found]), np.column_stack([v for _, v in found])
 
 
 def _integral(command: Stream, edges: Array, held: bool) -> Array:
-    """Integral of the commands from the first stamp to the edges, shape (m, n)."""
-    times, values, steps = command.times, command.values, np.diff(command.times)[:, None]
-    total = np.zeros_like(values)
-    np.cumsum(steps * (values[:-1] if held else 0.5 * (values[:-1] + values[1:])), axis=0, out=total[1:])
-    i = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(times) - 1)
-    since = (edges - times[i])[:, None]
-    slope = np.zeros_like(values)
-    if not held:
-        slope[:-1] = np.diff(values, axis=0) / steps
-    return np.asarray(total[i] + since * (values[i] + 0.5 * since * slope[i]))
+    """Integral of the commands to the edges, shape (m, n), each joint's from its own stamps."""
+    found = []
+    for j in range(command.values.shape[1]):
+        own = command.channel(j)
+        times, values, steps = own.times, own.values[:, 0], np.diff(own.times)
+        parts = steps * (values[:-1] if held else 0.5 * (values[:-1] + values[1:]))
+        total = np.append(0.0, np.cumsum(parts))
+        i = np.clip(np.searchsorted(times, edges, side="right") - 1, 0, len(times) - 1)
+        since = edges - times[i]
+        slope = np.zeros(len(times))
+        if not held:
+            slope[:-1] = np.diff(values) / steps
+        found.append(total[i] + since * (values[i] + 0.5 * since * slope[i]))
+    return np.column_stack(found)
 
 
-def _smooth(v: Array, sigmas: Array, period: float, h: float) -> tuple[Array, Array]:
+def _smooth(v: Array, sigmas: Array, periods: Array, h: float) -> tuple[Array, Array]:
     """Velocities smoothed as far as their noise asks for, and the noise that is left, shape (n,).
 
     Where accelerations are white with density S, the best smoother of positions with noise sigma at every period is
     1 / (1 + (omega / omega_c)^4) with omega_c^4 = S / (sigma^2 period): a Butterworth filter there and back.
     """
     out, left = v.copy(), np.zeros(v.shape[1])
-    for j, sigma in enumerate(sigmas):
+    for j, (sigma, period) in enumerate(zip(sigmas, periods, strict=True)):
         if sigma <= 0.0 or len(v) < 20:
             continue
         density = 2.0 * MEMORY * float(np.mean(np.gradient(v[:, j], h) ** 2))

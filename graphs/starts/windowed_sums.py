@@ -92,12 +92,12 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
     usable = unknown[starts + length] == unknown[starts]
     count = int(np.clip(m * h / (BLOCK * width), 2, BLOCKS))
     block = np.minimum(starts * count // max(m - length + 1, 1), count - 1)
-    velocity, acceleration = _noise_gains(cells.period, length * h)
     found = []
     for j in range(n):
         good = sliding_window_view(signals[:, j], length, axis=0)[starts[usable[:, j]]] @ (window / length)
         counts = np.bincount(block[usable[:, j]], minlength=count).astype(float)
         products = np.stack([part.T @ part for part in np.split(good, np.cumsum(counts[:-1]).astype(int))])
+        velocity, acceleration = _noise_gains(float(cells.periods[j]), length * h)
         of_noise = np.zeros((5, 5))
         of_noise[1, 1], of_noise[1, 4], of_noise[4, 4] = acceleration * noise[j]
         of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]

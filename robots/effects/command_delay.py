@@ -47,6 +47,7 @@ EFFECT = CommandEffect(
         typical="one or two control periods, 1 to 10 ms",
         excitation="steps and chirps of the command",
         look_alikes={
+            "encoder_filter": "smoothed positions are late, too; the variance is what no delay explains",
             "motor_lag": "they agree to first order; only steps of the command at a high rate tell them apart",
             "encoder_delay": "with the encoder late, motion seems to lag behind the command",
             "clock_offset": "stamps that are late against the commands look like a late command",

@@ -37,6 +37,7 @@ EFFECT = TimeShift(
         typical="0.1 to 10 ms",
         excitation="fast oscillation, with a gyro that sees the same joint",
         look_alikes={
+            "encoder_filter": "a filter of first order is late, too; the variance is what no delay explains",
             "command_delay": "with the encoder late, motion seems to lag behind the command",
             "motor_lag": "with the encoder late, motion seems to lag behind the command",
             "gyro_delay": "only the difference in time between encoder and gyro shows, but for the command",

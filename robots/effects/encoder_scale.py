@@ -30,6 +30,7 @@ EFFECT = ReadingEffect(
         typical="1 to 20 % where a number is mistaken, 0.01 % where a belt wears",
         excitation="motion of the joint with a gyro on a body that it turns",
         look_alikes={
+            "encoder_filter": "in motion of one frequency both change the amplitude alone",
             "encoder_eccentricity": "over a small part of a turn the slope of its error is a scale",
             "gyro_scale": "the same share of all joints that a gyro sees is a scale of the gyro",
         },

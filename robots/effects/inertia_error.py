@@ -41,6 +41,7 @@ EFFECT = InertiaEffect(
         typical="2 to 20 % of the model's value",
         excitation="acceleration of the joint and of all joints before it, in several postures",
         look_alikes={
+            "encoder_filter": "in motion of one frequency a smaller amplitude is a larger inertia",
             "payload": "a payload is one combination of errors of the last body's moments of inertia",
             "bearing_flexibility": "its transverse inertias are moments of the same body",
             "gravity_imbalance": "where gravity acts, a wrong first moment comes with a wrong inertia",

@@ -69,6 +69,7 @@ EFFECT = JointElasticity(
         typical="resonance of the link at 3 to 30 Hz",
         excitation="hard stops, steps and chirps of the joint through its resonance",
         look_alikes={
+            "encoder_filter": "both let the link move more than the encoder reads, by the same law below the resonance",
             "bearing_flexibility": "both let the body oscillate after a stop; the bearing turns it about other axes",
             "encoder_delay": "below the resonance the difference between motor and link looks like one in time",
         },

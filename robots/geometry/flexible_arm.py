@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.equations_of_motion import FreeEquations
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, LENGTHS, STIFFNESS, TILT_DAMPING
@@ -140,6 +141,15 @@ class FlexibleArm:
         series = [np.fft.fft(np.array(part), axis=0) / len(phases) for part in zip(*found, strict=True)]
         kept = np.arange(-harmonics, harmonics + 1)
         return Linearised(*(part[kept] for part in series))
+
+    def equations(self, q: Array, values: Mapping[str, float]) -> FreeEquations:
+        """Equations of motion of the turns x in a pose, springs and dampers left out.
+
+        Args:
+            q: mean positions of all joints of the robot, shape (n,) [rad].
+            values: geometric errors by name.
+        """
+        return FreeEquations(self._model(q, values))
 
     def _model(self, q: Array, values: Mapping[str, float]) -> pin.Model:
         """The bodies with hinges for drives and bearings, other joints welded where they stand."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How late the stamps of a sensor's channels are, summed over a robot's effects."""
+"""How late the stamps of a sensor's channels are, and over what time their readings are means, by a robot's effects."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Accelerometer, MotorEncoder
@@ -19,10 +20,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Lateness:
-    """Lateness of m samples.
+    """Lateness and smoothing of m samples.
 
     Attributes:
-        effects: what makes them late.
+        effects: what makes them late or smooth.
         stamps: times since the start of the recording, shape (m,) [s].
         anchor: lateness at which the samples were placed, shape (m,) [s].
     """
@@ -42,20 +43,28 @@ class Lateness:
         """Lateness beyond the anchor and its derivatives by parameters, by full name, shape (m,) each [s]."""
         late, slopes = -self.anchor, dict[str, Array]()
         for here in self.effects:
-            assert isinstance(here.effect, TimeShift)
+            if not isinstance(here.effect, TimeShift):
+                continue
             own = {p.name: values[here.parameter(p.name)] for p in here.effect.parameters}
             added, by = here.effect.late(self.stamps, own)
             late = late + added
             slopes |= {here.parameter(name): slope for name, slope in by.items()}
         return late, slopes
 
+    def variance(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
+        """Variance of the weights of filters, and its derivatives by parameters, by full name [s^2]."""
+        names = [
+            here.parameter(here.effect.variance) for here in self.effects if isinstance(here.effect, SmoothedReading)
+        ]
+        return sum(values[name] for name in names), dict.fromkeys(names, 1.0)
+
 
 def late_channels(robot: Robot, name: str) -> list[tuple[NDArray[np.intp], tuple[EffectAt, ...]]]:
-    """Channels of a sensor in groups that share the same lateness, and what makes each group late."""
+    """Channels of a sensor in groups of the same lateness and smoothing, and what makes each group so."""
     sensor = robot.sensors[name]
     groups: dict[tuple[str, ...], tuple[list[int], tuple[EffectAt, ...]]] = {}
     for j in range(len(sensor.channels)):
-        effects = tuple(here for here in robot.effects if shifts(here, robot, name, j))
+        effects = tuple(here for here in robot.effects if shifts(here, robot, name, j) or smooths(here, robot, name, j))
         groups.setdefault(tuple(here.label for here in effects), ([], effects))[0].append(j)
     return [(np.array(channels, dtype=np.intp), effects) for channels, effects in groups.values()]
 
@@ -71,3 +80,10 @@ def shifts(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
     if here.owner == "robot":
         return here.effect.sensors == "all" or (here.effect.sensors == "encoder") == encoder
     return (encoder and robot.joints[channel] == here.owner) or here.owner == name
+
+
+def smooths(here: EffectAt, robot: Robot, name: str, channel: int) -> bool:
+    """Whether an effect smooths a channel."""
+    if not isinstance(here.effect, SmoothedReading) or not isinstance(robot.sensors[name], MotorEncoder):
+        return False
+    return here.owner in ("robot", robot.joints[channel])

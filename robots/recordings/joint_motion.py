@@ -41,7 +41,7 @@ def joint_motion(encoder: Stream, zero: Array) -> JointMotion:
         zero: readings at angle zero, shape (n,) [rad].
     """
     times = encoder.times
-    window = min(max(WINDOW, 3.0 * float(np.median(np.diff(times)))), float(times[-1] - times[0]) / 3.0)
+    window = min(max(WINDOW, 3.0 * float(np.max(encoder.periods))), float(times[-1] - times[0]) / 3.0)
     count = min(MOST_POINTS, len(times))
     instants = np.linspace(times[0] + window / 2, times[-1] - window / 2, count)
     before, middle, after = (

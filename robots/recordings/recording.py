@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ GRID = 1000  # instants at which a recording is looked at
 TOLD_WITH_RESULTS = ("clock", "foreign", "glitch", "end_stop", "dropped", "staircase", "mimic", "coarse")
 """Kinds of notices that whoever believes a result has to know: the reader took data away, changed their times, or the
 robot file contradicts them."""
+COMMAND_PERIODS, COMMAND_SECONDS = 5.0, 0.01  # [1], [s] a pause of the commands is longer than both
+FEWEST_STEPS = 10  # that show a period
+SPREAD, LONG_TAIL = 0.5, 3.0  # [periods] typical and 90 % largest deviation of steps, above which there is no period
 SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
 
 
@@ -57,16 +61,60 @@ class Stream:
     @property
     def whole(self) -> Stream:
         """The samples of which every channel was measured."""
-        return self if self.filled is None else self._some(np.asarray(~self.filled.any(axis=1)))
+        return self if self.filled is None else self.take(np.asarray(~self.filled.any(axis=1)))
 
-    def between(self, t0: float, t1: float) -> Stream:
-        """The samples with t0 <= time < t1 [s]."""
-        return self._some(slice(*np.searchsorted(self.times, [t0, t1])))
+    @cached_property
+    def periods(self) -> Array:
+        """Usual time from one sample of each channel to its next, shape (m,) [s]; infinite for fewer than two.
 
-    def _some(self, index: slice | NDArray[np.bool_]) -> Stream:
+        Several drivers may speak on one topic, each at its own rate and some just behind each other: what lies between
+        two messages of different ones is no period of either.
+        """
+        if self.filled is None:
+            return np.full(self.values.shape[1], _middle_step(self.times))
+        return np.array([_middle_step(self.times[seen]) for seen in ~self.filled.T])
+
+    def channel(self, index: int) -> Stream:
+        """The samples of which one channel was measured, with that channel alone."""
+        one = replace(self, values=self.values[:, [index]], channels=(self.channels[index],), filled=None)
+        return one if self.filled is None else one.take(np.asarray(~self.filled[:, index]))
+
+    def exchanged(self, order: Sequence[int]) -> Stream:
+        """The same channels with each other's samples, column k with those of `order[k]`."""
+        filled = None if self.filled is None else self.filled[:, order]
+        return replace(self, values=self.values[:, order], filled=filled)
+
+    def has_period(self, index: int) -> bool:
+        """Whether samples of a channel come again and again, not when something changes."""
+        steps, period = np.diff(self.channel(index).times), self.periods[index]
+        if len(steps) < FEWEST_STEPS:
+            return False
+        typical = float(np.median(np.abs(steps - period)))
+        return typical < SPREAD * period and float(np.quantile(steps, 0.9)) < LONG_TAIL * period
+
+    def silences(self, periods: float, seconds: float) -> dict[int, list[tuple[float, float]]]:
+        """Stretches (t0, t1) [s] without samples of a channel that are longer than so many periods and seconds.
+
+        Among several drivers on one topic one may begin late or end early, and is silent until then or from then on.
+        """
+        found = {}
+        for k, period in enumerate(self.periods):
+            own = self.channel(k).times
+            if len(own) > 1:
+                edges = np.concatenate([self.times[:1], own, self.times[-1:]])
+                long = np.flatnonzero(np.diff(edges) > max(periods * float(period), seconds))
+                found[k] = [(float(edges[i]), float(edges[i + 1])) for i in long]
+        return found
+
+    def take(self, index: slice | NDArray[np.bool_]) -> Stream:
+        """Some of the samples."""
         received = None if self.received is None else self.received[index]
         filled = None if self.filled is None else self.filled[index]
         return replace(self, times=self.times[index], values=self.values[index], received=received, filled=filled)
+
+    def between(self, t0: float, t1: float) -> Stream:
+        """The samples with t0 <= time < t1 [s]."""
+        return self.take(slice(*np.searchsorted(self.times, [t0, t1])))
 
 
 @dataclass(frozen=True)
@@ -151,13 +199,12 @@ class Recording:
         held = streams["command"]
         if before >= 0 and not (len(held) and held.times[0] == t0):
             received = None if held.received is None else np.append(t0, held.received)
-            streams["command"] = Stream(
-                held.name,
-                np.append(t0, held.times),
-                np.vstack([self.command.values[before], held.values]),
-                held.channels,
-                held.unit,
-                received,
+            streams["command"] = replace(
+                held,
+                times=np.append(t0, held.times),
+                values=np.vstack([self.command.values[before], held.values]),
+                received=received,
+                filled=None if held.filled is None else np.vstack([np.zeros(held.filled.shape[1], bool), held.filled]),
             )
         goal = None if self.goal is None else self.goal.between(t0, t1)
         return replace(self, streams=streams, goal=goal)
@@ -197,6 +244,19 @@ class Recording:
     def sticks(self, joint: str, times: Array, horizon: Array | float = 0.0) -> NDArray[np.bool_]:
         """Whether friction may have held a joint in the last `horizon` seconds before each time, shape (m,)."""
         return _touched(self.sticking.get(joint, ()), times, horizon)
+
+
+def unknown_commands(command: Stream) -> dict[int, list[tuple[float, float]]]:
+    """Stretches (t0, t1) [s] in which nobody knows what some channels commanded, by channel.
+
+    Commands that are sent only when they change have no period, and are silent when nothing changes.
+    """
+    silences = command.silences(COMMAND_PERIODS, COMMAND_SECONDS)
+    return {k: stretches for k, stretches in silences.items() if stretches and command.has_period(k)}
+
+
+def _middle_step(times: Array) -> float:
+    return float(np.median(np.diff(times))) if len(times) > 1 else float(np.inf)
 
 
 def _touched(stretches: Sequence[tuple[float, float]], times: Array, horizon: Array | float) -> NDArray[np.bool_]:

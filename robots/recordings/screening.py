@@ -248,7 +248,7 @@ def _check_efforts(recording: Recording, robot: Robot, motion: JointMotion) -> l
     beyond = np.abs(command.values[at]) > BEYOND_LIMIT * limits
     if np.count_nonzero(beyond, axis=0).max() < FEWEST_BEYOND:
         return []
-    asked = np.abs(robot.tree.torque(motion.q, motion.v, np.gradient(motion.v, motion.times, axis=0)))
+    asked = np.abs(_torque_of_motion(robot, motion))
     doubtful = [
         j
         for j, rows in enumerate(beyond.T)
@@ -270,6 +270,16 @@ def _check_efforts(recording: Recording, robot: Robot, motion: JointMotion) -> l
         "record the effort that the motors report beside the positions (it then drives the model), or move more gently"
     )
     return [Notice("command", "unit", int(np.count_nonzero(rows)), text)]
+
+
+def _torque_of_motion(robot: Robot, motion: JointMotion) -> NDArray[np.float64]:
+    """What the drives gave for a motion, by links, rotors and friction of the robot file, shape (m, n)."""
+    a = np.gradient(motion.v, motion.times, axis=0)
+    viscous = [robot.parameters.get(f"{joint}.motor_viscous.coefficient") for joint in robot.joints]
+    laws = ("inertia", "coulomb_torque")
+    rotor, dry = np.array([[robot.drive_parameter(joint, law).value for joint in robot.joints] for law in laws])
+    drive = rotor * a + dry * np.sign(motion.v) + np.array([p.value if p else 0.0 for p in viscous]) * motion.v
+    return np.asarray(robot.tree.torque(motion.q, motion.v, a) + drive)
 
 
 def _slope(commanded: NDArray[np.float64], asked: NDArray[np.float64]) -> float:

@@ -31,6 +31,7 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect, carried_noise
@@ -110,7 +111,8 @@ def _factors_with_effects():
         path = CommandPath(ticks, u, robot.effects, robot.joints)
         weight = robot.kinematic_tree.mass_matrix(rng.normal(size=(M, robot.layout.n_link)))
         steps = Steps(h, u, robot.noise, robot.layout, weight, path if path.changes else None, np.arange(M))
-        if not isinstance(robot.effects[-1].effect if robot.effects else None, ReadingEffect | TimeShift):
+        last = robot.effects[-1].effect if robot.effects else None
+        if not isinstance(last, ReadingEffect | SmoothedReading | TimeShift):
             yield f"dynamics with {label}", SimpsonDynamics(ElasticJoints(robot), steps, robot.joints), robot
             gentle = replace(steps, sliding=rng.choice([0.1, 1.0], (M, 2, robot.n)))
             yield f"gentle friction, {label}", SimpsonDynamics(ElasticJoints(robot), gentle, robot.joints), robot

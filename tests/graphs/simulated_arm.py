@@ -97,6 +97,7 @@ def moved(
     push: tuple[float, float, int, float] | None = None,
     stop: tuple[int, float, float] | None = None,
     cable: float = 0.0,
+    sharp: float = SHARP,
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -112,6 +113,7 @@ def moved(
         push: from and to [s], joint, torque [N m] of a hand.
         stop: joint, and from where to where it can move from its middle [rad].
         cable: stiffness of a cable that pulls each joint to its zero [N m/rad].
+        sharp: how sharply dry friction turns over that does not truly hold a joint [s/rad].
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
     text = arm.urdf.format(options='<mujoco><compiler balanceinertia="false"/></mujoco>')
@@ -142,7 +144,7 @@ def moved(
             target = middle + run * (size / 2.0 * (np.sin(speeds * t + phases) - np.sin(phases))).sum(axis=0)
             u = data.qfrc_bias + heavy * (150.0 * (target - data.qpos) - 12.0 * data.qvel)
             commands[sent], sent = u, sent + 1
-        data.qfrc_applied[:] = u - dry * np.tanh(SHARP * data.qvel)
+        data.qfrc_applied[:] = u - dry * np.tanh(sharp * data.qvel)
         if push is not None and push[0] <= k * STEP < push[1]:
             data.qfrc_applied[push[2]] += push[3]
         mujoco.mj_step(model, data)

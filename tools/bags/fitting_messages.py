@@ -36,7 +36,6 @@ def read_columns(
     first: int = 0,
     wanted: Sequence[str] = (),
     width: int | None = None,
-    acts_on: bool = False,
 ) -> Columns:
     """One field of the messages of a topic that belong together.
 
@@ -48,21 +47,17 @@ def read_columns(
         first: number of the first message in its topic.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values of messages without names; None for what most have.
-        acts_on: whether values act until the next one, as those of commands.
     """
-    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width, acts_on)
+    return fitting_messages(message_parts(topic, message_type, field, decode_all, first), wanted, width)
 
 
-def fitting_messages(
-    found: MessageParts, wanted: Sequence[str] = (), width: int | None = None, acts_on: bool = False
-) -> Columns:
+def fitting_messages(found: MessageParts, wanted: Sequence[str] = (), width: int | None = None) -> Columns:
     """The messages that fit.
 
     Args:
         found: the messages in parts.
         wanted: names that a message must have; empty for those that most messages share.
         width: number of values that a message without names must have; None for what most messages have.
-        acts_on: whether values act until the next one, as those of commands; else they were measured.
 
     Returns:
         Their columns: the wanted names first, then others that all of them have. Without wanted names, those of all
@@ -71,19 +66,20 @@ def fitting_messages(
     parts = found.parts
     if len(parts) == 1:
         return _with_broken(parts[0], found.broken)
-    named = [part for part in parts if _is_sound(part)]
+    named = _told_once([part for part in parts if _is_sound(part)])
     if not wanted and PLUS in found.topic:
         wanted = tuple(dict.fromkeys(name for part in named for name in part.names or ()))
     core = tuple(wanted) or _most_shared(named)
     if core:
         chosen = [part for part in named if set(core) <= set(part.names or ())]
         if not chosen and wanted and all(any(name in (part.names or ()) for part in named) for name in core):
-            others = [part for part in parts if not set(part.names or ()) & set(core)]
-            return woven(named, core, acts_on, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
+            used = {id(part) for part in named}
+            others = [part for part in parts if id(part) not in used or not set(part.names or ()) & set(core)]
+            return woven(named, core, tuple([*_kinds(others, set(core)), *_broken(found.broken)]))
     else:
         chosen = []
     if core and not wanted and (nodes := _nodes(named, core)):
-        return _of_nodes(found, nodes, acts_on)
+        return _of_nodes(found, nodes)
     if not chosen:
         return _with_broken(_unnamed(parts, width), found.broken)
     first = chosen[0].names or ()
@@ -114,6 +110,20 @@ def _is_sound(part: Columns) -> bool:
     return bool(names) and len(names) == part.values.shape[1] and len(set(names)) == len(names)
 
 
+def _told_once(named: Sequence[Columns]) -> list[Columns]:
+    """The parts without an aggregator, which repeats later what several nodes say; without these where it says more."""
+    left = list(named)
+    for whole in named:
+        own = set(whole.names or ())
+        pieces = [part for part in left if set(part.names or ()) < own]
+        names = [name for part in pieces for name in part.names or ()]
+        if len(pieces) > 1 and len(names) == len(set(names)) and set(names) == own:
+            rarest = min(len(part.values) for part in pieces)
+            spare = [whole] if rarest >= max(len(whole.values), FEWEST) else pieces
+            left = [part for part in left if all(part is not other for other in spare)]
+    return left
+
+
 def _nodes(named: Sequence[Columns], core: tuple[str, ...]) -> list[list[Columns]]:
     """Parts by the node that they come from, where several tell of different joints; empty where there is but one."""
     nodes: list[list[Columns]] = []
@@ -127,7 +137,7 @@ def _nodes(named: Sequence[Columns], core: tuple[str, ...]) -> list[list[Columns
     return nodes if len(nodes) > 1 else []
 
 
-def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]], acts_on: bool) -> Columns:
+def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]]) -> Columns:
     """What several nodes tell, each of the joints that all of its messages name."""
     used = {id(part) for node in nodes for part in node}
     shared = [
@@ -136,7 +146,7 @@ def _of_nodes(found: MessageParts, nodes: Sequence[Sequence[Columns]], acts_on: 
     names = tuple(name for own in shared for name in own)
     others = [part for part in found.parts if id(part) not in used]
     left_out = (*_kinds(others, set(names)), *_broken(found.broken))
-    return woven([part for node in nodes for part in node], names, acts_on, left_out)
+    return woven([part for node in nodes for part in node], names, left_out)
 
 
 def _most_shared(named: Sequence[Columns]) -> tuple[str, ...]:
@@ -201,6 +211,8 @@ def _kinds(others: Sequence[Columns], used: set[str]) -> list[LeftOut]:
             kind = "in which a joint stands twice"
         elif not names:
             kind = f"without names, of {width} value{'s' * (width != 1)}" if used else f"of {width} values"
+        elif used and used <= set(names):
+            kind = "of another node that repeats what those of the joints say"
         elif used & set(names):
             kind = "that lack some of the joints"
         else:

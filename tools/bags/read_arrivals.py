@@ -140,7 +140,7 @@ class ArrivalReader:
             channels = _about(need, fitting)
             self._last[need.name] = values[-1] if channels is None else _newest(values, before)
             if channels is not None and need.name == "command":
-                values, channels = _acting(stamps, values, before, self._held), None
+                values = _acting(stamps, values, before, self._held)
             columns.append((stamps, values))
             about.append(channels)
         if not present:
@@ -196,7 +196,6 @@ class ArrivalReader:
             first=counts[topic.name],
             wanted=wanted,
             width=width,
-            acts_on=need.name == "command",
         )
         later = need.name in self._last
         if later and wanted and columns.names and not set(wanted) <= set(columns.names):
@@ -281,5 +280,6 @@ def _acting(stamps: NDArray[np.int64], values: Array, before: Array | None, held
             continue
         inside = known[known > 0]
         order = inside[np.argsort(stamps[inside - 1], kind="stable")]
-        whole[1:, j] = np.interp(stamps - stamps[0], stamps[order - 1] - stamps[0], column[order])
+        unknown = np.nan if known[0] > 0 else None  # before the first one of all
+        whole[1:, j] = np.interp(stamps - stamps[0], stamps[order - 1] - stamps[0], column[order], left=unknown)
     return whole[1:]

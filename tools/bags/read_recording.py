@@ -84,8 +84,7 @@ def read_recording(
     parts = {n.name: message_parts(raw[n.source.topic], types[n.name], n.source.field, decode_all) for n in needed}
     posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
     notices += found + mimic_notices([parts[name] for name in _encoders(robot)], robot)
-    acting = "command" if robot.command_held else ""
-    columns = {n.name: fitting_messages(parts[n.name], *wanted_of(n), acts_on=n.name == acting) for n in needed}
+    columns = {n.name: fitting_messages(parts[n.name], *wanted_of(n)) for n in needed}
     samples, found = _in_bag_order(needed, raw, types, columns, {*posture, *robot.tree.model.names})
     notices += said_once(found)
     samples, seams, found = on_one_time_axis(samples, [name for name in samples if columns[name].stamps is not None])
@@ -98,8 +97,8 @@ def read_recording(
     start_ns = min(int(s.stamps[0]) for s in samples.values())
     streams = {need.name: _stream(need, samples[need.name], start_ns) for need in needed}
     for stream in streams.values():
-        notices += timing_notices(stream.name, _usual_times(stream))
-        notices += clipping_notices(stream.name, stream.values, stream.channels, stream.unit)
+        notices += timing_notices(stream.name, _times_of_one_clock(stream))
+        notices += clipping_notices(stream.name, stream.measured, stream.channels, stream.unit)
     notices += step_notices("command", streams["command"].values, streams["command"].channels, streams["command"].unit)
     moving_goal = None if goal is None else _stream(goal[0], goal[1], start_ns)
     recording = Recording(str(path), bag_sha256(path), start_ns, streams, notices, moving_goal, posture=posture)
@@ -206,11 +205,11 @@ def _samples(
     return TimedSamples(stamps, received, values, absent), notices
 
 
-def _usual_times(stream: Stream) -> NDArray[np.float64]:
+def _times_of_one_clock(stream: Stream) -> NDArray[np.float64]:
     """Times of the channel with most samples: those of several drivers together are none of any clock."""
     if stream.filled is None or stream.filled.any(axis=1).mean() < SHARED:
         return stream.times
-    return stream.times[~stream.filled[:, int(np.argmin(stream.filled.sum(axis=0)))]]
+    return stream.channel(int(np.argmin(stream.filled.sum(axis=0)))).times
 
 
 def _surplus(name: str, topic: RawTopic, bag: Bag) -> list[Notice]:

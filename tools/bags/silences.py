@@ -7,41 +7,44 @@ encoders are for long. Commands that are sent only when they change have no peri
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.recording import Notice, Recording, Stream
+from jointscope.robots.recordings.recording import (
+    COMMAND_PERIODS,
+    COMMAND_SECONDS,
+    Notice,
+    Recording,
+    Stream,
+    unknown_commands,
+)
 from jointscope.tools.bags.clocks.durations import duration
 from jointscope.tools.bags.tidying.stream_notices import timing
 
 Stretch = tuple[float, float]
 
-COMMAND_PERIODS, COMMAND_SECONDS = 5.0, 0.01  # [1], [s] a pause of the commands is longer than both
 SENSOR_PERIODS, SENSOR_SECONDS = 20.0, 0.25  # [1], [s]
-REGULAR = 0.5  # spread of the steps over their median, above which a stream has no period
 SAID = 5  # stretches listed
 
 
 def with_silences_left_out(recording: Recording, encoder: str) -> Recording:
-    """The recording with its silences left out, and notices that say so.
+    """The recording with its silences left out, at the ends cut off, and notices that say so.
 
     Args:
         recording: all streams on one time axis.
         encoder: name of the encoders' stream.
     """
-    commands = _pauses(recording.command, COMMAND_PERIODS, COMMAND_SECONDS)
-    if not _has_period(recording.command):
-        commands = []
-    sensors = _pauses(recording.streams[encoder], SENSOR_PERIODS, SENSOR_SECONDS)
+    commands = _by_stretch(recording.command, unknown_commands(recording.command))
+    sensors = _by_stretch(positions := recording.streams[encoder], positions.silences(SENSOR_PERIODS, SENSOR_SECONDS))
     silent = _silent(recording.streams)
     stretches = merged([*commands, *sensors, *silent])
     if not stretches:
         return recording
     try:
-        without = recording.leaving_out(stretches)
+        without = recording.leaving_out(stretches).between(*_all_speak(recording, encoder, [*commands, *sensors]))
     except RecordingError:  # hardly anything would be left: such a recording is judged by what is there
         text = (
             f"samples are missing in most of the recording, for {duration(sum(t1 - t0 for t0, t1 in stretches))} in all"
@@ -51,6 +54,15 @@ def with_silences_left_out(recording: Recording, encoder: str) -> Recording:
     return replace(without, notices=[*said, _notice(stretches, commands, sensors, silent)])
 
 
+def _all_speak(recording: Recording, encoder: str, stretches: Sequence[Stretch]) -> Stretch:
+    """From when until when all drivers of one topic speak [s]: one may begin late or end early."""
+    begin, end = -np.inf, np.inf
+    for stream in (recording.command, recording.streams[encoder]):
+        begin = max([begin, *(t1 for t0, t1 in stretches if t0 == stream.times[0])])
+        end = min([end, *(t0 for t0, t1 in stretches if t1 == stream.times[-1])])
+    return float(begin), float(np.nextafter(end, np.inf))
+
+
 def _is_silence(stream: Stream, stretches: list[Stretch]) -> bool:
     """Whether the gaps of a stream are no others than those that are left out."""
     seen = timing(stream.times)
@@ -58,30 +70,28 @@ def _is_silence(stream: Stream, stretches: list[Stretch]) -> bool:
     return seen.gaps <= len(stretches) and any(t0 <= at <= t1 for t0, t1 in stretches)
 
 
-def _has_period(stream: Stream) -> bool:
-    steps = np.diff(stream.times)
-    if len(steps) < 10:
-        return False
-    middle = float(np.median(steps))
-    return float(np.median(np.abs(steps - middle))) < REGULAR * middle and float(np.quantile(steps, 0.9)) < 3.0 * middle
-
-
-def _pauses(stream: Stream, periods: float, seconds: float) -> list[Stretch]:
-    """Steps between samples that are longer than usual ones [s]."""
-    steps = np.diff(stream.times)
-    if not len(steps):
-        return []
-    long = np.flatnonzero(steps > max(periods * float(np.median(steps)), seconds))
-    return [(float(stream.times[k]), float(stream.times[k + 1])) for k in long]
+def _by_stretch(stream: Stream, silences: Mapping[int, list[Stretch]]) -> dict[Stretch, str]:
+    """Whose samples are missing in each stretch: " of elbow", or nothing where those of all channels are."""
+    channels: dict[Stretch, list[int]] = {}
+    for k, stretches in silences.items():
+        for stretch in stretches:
+            channels.setdefault(stretch, []).append(k)
+    names = {stretch: [stream.channels[k].rpartition(".")[0] for k in some] for stretch, some in channels.items()}
+    return {at: "" if len(own) == len(stream.channels) else f" of {', '.join(own)}" for at, own in names.items()}
 
 
 def _silent(streams: Mapping[str, Stream]) -> list[Stretch]:
     """Stretches without a sample of any stream [s]."""
     times = np.unique(np.concatenate([stream.times for stream in streams.values()]))
-    slowest = max((float(np.median(np.diff(s.times))) for s in streams.values() if len(s) > 1), default=0.0)
+    slowest = max(_slowest(stream) for stream in streams.values())
     steps = np.diff(times)
     long = np.flatnonzero(steps > max(COMMAND_PERIODS * slowest, COMMAND_SECONDS))
     return [(float(times[k]), float(times[k + 1])) for k in long]
+
+
+def _slowest(stream: Stream) -> float:
+    """Period of the slowest channel that has one [s]."""
+    return float(np.max(stream.periods[np.isfinite(stream.periods)], initial=0.0))
 
 
 def merged(stretches: list[Stretch]) -> list[Stretch]:
@@ -95,22 +105,18 @@ def merged(stretches: list[Stretch]) -> list[Stretch]:
     return found
 
 
-def _notice(stretches: list[Stretch], commands: list[Stretch], sensors: list[Stretch], silent: list[Stretch]) -> Notice:
+def _notice(
+    stretches: list[Stretch], commands: Mapping[Stretch, str], sensors: Mapping[Stretch, str], silent: list[Stretch]
+) -> Notice:
     parts = []
     for t0, t1 in stretches[:SAID]:
         middle = 0.5 * (t0 + t1)
-        what = next(
-            (
-                word
-                for word, some in (
-                    ("nothing at all was recorded", silent),
-                    ("no command", commands),
-                    ("no encoder sample", sensors),
-                )
-                if any(a <= middle <= b for a, b in some)
-            ),
-            "samples are missing",
+        reasons = (
+            *((at, "nothing at all was recorded") for at in silent),
+            *((at, f"no command{whose}") for at, whose in commands.items()),
+            *((at, f"no encoder sample{whose}") for at, whose in sensors.items()),
         )
+        what = next((why for (a, b), why in reasons if a <= middle <= b), "samples are missing")
         parts.append(f"{t0:.3f} to {t1:.3f} s ({what} for {duration(t1 - t0)})")
     more = f" and {len(stretches) - SAID} more" if len(stretches) > SAID else ""
     text = f"left out, as too little is known there: {', '.join(parts)}{more}; no equation of motion is asked to hold"

@@ -18,24 +18,19 @@ from jointscope.tools.bags.messages.columns import Columns, LeftOut
 Flags = NDArray[np.bool_]
 Numbers = NDArray[np.int64]
 
-GAP = 4.5  # usual steps between two messages of a joint, from which its node was silent
-AT_THE_END = 1.5  # usual steps before its first and behind its last message, from which it was
 UNFILLED = 0.5  # share of the messages of one node that must have stamps of their own
 
 
-def woven(
-    parts: Sequence[Columns], names: tuple[str, ...], acts_on: bool = False, left_out: tuple[LeftOut, ...] = ()
-) -> Columns:
+def woven(parts: Sequence[Columns], names: tuple[str, ...], left_out: tuple[LeftOut, ...] = ()) -> Columns:
     """All messages that are about some of the joints.
 
     Args:
         parts: messages with the same names each, with their `rows`.
         names: of the joints, one column each.
-        acts_on: whether values act until the next one, as those of commands; then no node is ever silent.
         left_out: messages that are not used.
 
     Returns:
-        Columns in the order of the bag. What is NaN and not `absent` is missing: its node was silent.
+        Columns in the order of the bag. What is NaN and not `absent` is what its node said.
     """
     parts = [part for part in parts if set(part.names or ()) & set(names)]
     rows = np.concatenate([_rows(part) for part in parts])
@@ -55,9 +50,7 @@ def woven(
         rows, stamps, values, about = _joined(rows, stamps, values, about, node)
     order = np.argsort(rows, kind="stable")
     rows, stamps, values, about = rows[order], stamps[order], values[order], about[order]
-    clock = stamps if stamped and _tell(stamps, np.zeros(len(stamps), np.intp)) else rows
-    absent = np.column_stack([~about[:, k] & ~_silent(clock, about[:, k], acts_on) for k in range(len(names))])
-    return Columns(stamps if stamped else None, values, names, rows, left_out, absent if absent.any() else None)
+    return Columns(stamps if stamped else None, values, names, rows, left_out, None if about.all() else ~about)
 
 
 def _rows(part: Columns) -> NDArray[np.intp]:
@@ -88,19 +81,3 @@ def _joined(
     earliest = np.full(len(keys), rows.max())
     np.minimum.at(earliest, group, rows)
     return earliest, stamps[first], joined, known
-
-
-def _silent(clock: Numbers, about: Flags, acts_on: bool) -> Flags:
-    """Where the node of a joint should have spoken and did not, shape (n,)."""
-    own = np.unique(clock[about])
-    if len(own) < 2:
-        return np.ones(len(clock), bool)
-    step = float(np.median(np.diff(own)))
-    after = np.searchsorted(own, clock)
-    before_first, behind_last = after == 0, after == len(own)
-    early = before_first & (own[0] - clock > AT_THE_END * step)
-    if acts_on:
-        return early
-    inside = own[np.clip(after, 0, len(own) - 1)] - own[np.clip(after - 1, 0, len(own) - 1)] > GAP * step
-    late = behind_last & (clock - own[-1] > AT_THE_END * step)
-    return np.where(before_first, early, np.where(behind_last, late, inside))

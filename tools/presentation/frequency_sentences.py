@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
+from jointscope.robots.model.robot import SHARPNESS
 from jointscope.tools.presentation.numbers import significant, with_sigma
 
 
@@ -29,6 +30,18 @@ def one_realisation(result: FrequencyCalibration) -> list[str]:
     alone = [p.pose.path for p in result.problems if len(p.pose.matrix.each) == 1]
     text = "what friction does under other phases is taken from neighbouring lines; record more to know it"
     return [f"{path} has one realisation: {text}" for path in alone]
+
+
+def sticking(result: FrequencyCalibration) -> list[str]:
+    """Where friction turns over faster than velocities tell, which friction that sticks does."""
+    ends = [name for name in result.names if name.endswith(f".{SHARPNESS}") and name not in result.told]
+    if not ends:
+        return []
+    joints = ", ".join(name.split(".")[0] for name in ends)
+    return [
+        f"friction of {joints} turns over faster than the velocities tell ({SHARPNESS}); if it sticks, which the model "
+        "does not know, springs are further off than their sigmas say"
+    ]
 
 
 def value_rows(result: FrequencyCalibration) -> list[list[str]]:

@@ -11,16 +11,12 @@ import numpy as np
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
-from jointscope.tools.presentation.frequency_sentences import (
-    identifiable_sentence,
-    matrix_sentence,
-    one_realisation,
-    value_rows,
-)
+from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
 from jointscope.tools.presentation.numbers import percent
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
 SIGMAS = 2.0  # half width of the bands that are drawn
 SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
@@ -37,10 +33,8 @@ def frequency_report(
         more: sections at the end.
     """
     paths = ", ".join(problem.pose.path for problem in result.problems)
-    items = [matrix_sentence(result), identifiable_sentence(result), *one_realisation(result)]
-    verdict = "".join(f"<li>{escape(item)}</li>" for item in items)
     sections = [
-        Section("verdict", "What was found", f"<ul>{verdict}</ul>", f"{len(result.problems)} poses."),
+        _verdict(result),
         *acceptance(checked),
         _values(result),
         *response_sections(result),
@@ -49,10 +43,18 @@ def frequency_report(
     return page(f"{result.robot.name}: drives and bearings from frequency responses", paths, sections)
 
 
+def _verdict(result: FrequencyCalibration) -> Section:
+    judgement = judge_frequency(result)
+    items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
+    matrix = f"<li>{escape(matrix_sentence(result))}</li>"
+    return Section("verdict", "Is it good?", f"<ul>{items}{matrix}</ul>", judgement.headline)
+
+
 def response_sections(result: FrequencyCalibration) -> list[Section]:
     """Measured and model, and what torques are left, pose by pose."""
     responses = [_pose(result, problem, k) for k, problem in enumerate(result.problems)]
-    return responses + [_balance(problem, k) for k, problem in enumerate(result.problems)]
+    balances = [_balance(problem, k) for k, problem in enumerate(result.problems)]
+    return [*responses, *balances, _answered(result)]
 
 
 def _values(result: FrequencyCalibration) -> Section:
@@ -101,3 +103,18 @@ def _balance(problem: FrequencySet, k: int) -> Section:
     return Section(
         f"left{k}", f"What is left in {pose.path}", figure(panels, [Key("motor", "k0"), Key("left over", "k1")]), lead
     )
+
+
+def _answered(result: FrequencyCalibration) -> Section:
+    """How much of what is left answers the excitation, band by band."""
+    head = ["pose", "from [Hz]", "to [Hz]", "answers the excitation", "± sigma"]
+    rows = [
+        [escape(pose.path), f"{band.low:g}", f"{band.high:g}", percent(band.share), percent(band.sigma)]
+        for pose in result.explained.poses
+        for band in pose.answered
+    ]
+    lead = (
+        "Share of the power that is left that comes again under other phases of the excitation, or at neighbouring "
+        "lines where there is one realisation: near nothing for noise and friction, much where a response is missing."
+    )
+    return Section("answered", "Does what is left answer the excitation?", table(head, rows, (1, 2, 3, 4)), lead)

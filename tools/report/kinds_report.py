@@ -13,6 +13,7 @@ from jointscope.tools.presentation.frequency_sentences import (
     kinds_sentences,
     matrix_sentence,
     one_realisation,
+    sticking,
 )
 from jointscope.tools.report.frequency_report import response_sections
 from jointscope.tools.report.page.acceptance import acceptance
@@ -30,7 +31,8 @@ def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS, more
     """
     responses = result.frequency
     paths = [p.poses.path for p in result.poses.problems] + [p.pose.path for p in responses.problems]
-    said = [matrix_sentence(responses), identifiable_sentence(responses), *one_realisation(responses)]
+    said = [matrix_sentence(responses), identifiable_sentence(responses)]
+    said += [*one_realisation(responses), *sticking(responses)]
     headline, *others_said = kinds_sentences(result)
     items = "".join(f"<li>{escape(item)}</li>" for item in [*others_said, *said])
     verdict, *others = pose_sections(result.poses)

@@ -6,14 +6,10 @@ from __future__ import annotations
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
-from jointscope.tools.presentation.frequency_sentences import (
-    identifiable_sentence,
-    matrix_sentence,
-    one_realisation,
-    value_rows,
-)
+from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
 from jointscope.tools.presentation.numbers import percent, with_sigma
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
 
 def response_text(found: MeasuredResponse) -> str:
@@ -64,14 +60,15 @@ def resonance_rows(found: MeasuredResponse) -> list[list[str]]:
 
 def frequency_calibration_text(result: FrequencyCalibration) -> str:
     """The summary of a calibration."""
-    paths = ", ".join(problem.pose.path for problem in result.problems)
+    paths, judgement = ", ".join(problem.pose.path for problem in result.problems), judge_frequency(result)
     lines = [
         f"{result.robot.name} from {paths}: {len(result.problems)} poses, calibrated in {result.wall_seconds:.1f} s, "
         f"{result.iterations} iterations in {result.stages} stages",
         "",
+        judgement.headline,
+        *(f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")),
+        *(f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")),
         f"  - {matrix_sentence(result)}",
-        f"  - {identifiable_sentence(result)}",
-        *(f"  - {sentence}" for sentence in one_realisation(result)),
         "",
         text_table(["parameter", "start", "value", "± sigma", "unit", ""], value_rows(result), "<>>><<"),
     ]

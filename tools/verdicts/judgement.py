@@ -179,7 +179,7 @@ def _determined(result: CalibrationResult) -> Check:
 
 def _typically_open(result: CalibrationResult) -> float:
     """Median relative sigma of the dynamic parameters."""
-    free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit != "s" and p.value]
+    free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit not in ("s", "s^2") and p.value]
     return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
 
 
@@ -246,7 +246,7 @@ def equation_names(result: CalibrationResult) -> list[str]:
 
 def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
     """The dynamic parameter with the largest sigma relative to its value, and that share; times have none."""
-    told = [p for p in result.parameters if p.value and p.unit != "s" and not is_mounting_or_bias(p)]
+    told = [p for p in result.parameters if p.value and p.unit not in ("s", "s^2") and not is_mounting_or_bias(p)]
     shares = {p.name: p.sigma / abs(p.value) for p in told}
     if not shares:
         return "", float("nan")

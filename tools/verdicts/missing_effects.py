@@ -30,9 +30,16 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     covered = "" if asked else ", which its sigma covers"
     return "bad" if asked else "warn", (
         f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
-        f"{_change(result, first, worst)}{covered}. Which it is, and whether it predicts better: "
-        f"`{_discover(result)}`."
+        f"{_change(result, first, worst)}{covered}. {_next(result, first)}."
     )
+
+
+def _next(result: CalibrationResult, effect: LackingEffect) -> str:
+    """What to type: an effect that was tried need not be looked for."""
+    if effect.tried:
+        file = result.start.path.name
+        return f"Add it: `jointscope add {file} {effect.label} -o OUT.yaml`, then calibrate again"
+    return f"Which it is, and whether it predicts better: `{_discover(result)}`"
 
 
 def _discover(result: CalibrationResult) -> str:

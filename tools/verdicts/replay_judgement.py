@@ -25,6 +25,7 @@ KINDS = {
     "stuck": "stuck",
     "duplicate": "repeated",
     "not_finite": "not finite",
+    "incomplete": "before those of all joints had come",
     "outlier": "outliers",
     "saturated": "saturated",
 }

@@ -50,6 +50,8 @@ class CommandHistory:
         self._values: Mapping[str, float] = {name: p.value for name, p in robot.parameters.items()}
         self._times: list[float] = []
         self._u: list[Array] = []
+        self._about: list[NDArray[np.bool_] | None] = []
+        self._own_periods: Array | None = None  # of each joint, once messages are about some joints only
         self.period = float("inf")
         # as if one of two thousand commands so far had jumped to the full one
         self.typical_change = np.full(robot.n, math.sqrt(CHANGE_SHARE) * _full_command(robot))
@@ -63,18 +65,21 @@ class CommandHistory:
         """Stamp of the newest command [s]; minus infinity without one."""
         return self._times[-1] if self._times else float("-inf")
 
-    def add(self, t: float, u: Array) -> None:
-        """Takes in a command; it may be older than others."""
+    def add(self, t: float, u: Array, about: NDArray[np.bool_] | None = None) -> None:
+        """Takes in a command of all joints; it may be older than others, and new only for those that it is `about`."""
         i = bisect_right(self._times, t)
         if i == len(self._times) and i:
-            self._learn(u - self._u[-1])
+            self._learn(u - self._u[-1], about)
         self._times.insert(i, t)
         self._u.insert(i, u)
+        self._about.insert(i, about)
+        if about is not None and self._own_periods is None:
+            self._own_periods = np.full(self._robot.n, np.inf)
         self._added += 1
         if self._added <= RECENT or self._added % EVERY == 0:
             self._measure_period()
         while len(self._times) > 2 and self._times[1] < self._times[-1] - self._kept:
-            del self._times[0], self._u[0]
+            del self._times[0], self._u[0], self._about[0]
 
     def mean(self, t0: float, t1: float) -> Array:
         """Mean command that acts between two times, effects included, shape (n,); zero before the first command."""
@@ -100,7 +105,7 @@ class CommandHistory:
         u, missing = self.mean(t0, t1), self.doubt(t0, t1)
         return (u, None) if missing is None else (u + missing[0], missing[1])
 
-    def lost(self, t0: float, t1: float) -> tuple[Array, Array | None]:
+    def lost(self, t0: float, t1: float) -> tuple[Array, Array]:
         """As `acting` where commands have stopped: drives may do anything between holding the last one and nothing."""
         u = self.mean(t0, t1)
         return u, (np.abs(u) + self.typical_change) * math.sqrt(HELD_IN_DOUBT / (t1 - t0))
@@ -115,27 +120,42 @@ class CommandHistory:
             Expected change of the mean command of the step, and its standard deviation, shape (n,) each; None where
             nothing is missing.
         """
-        first = bisect_right(self._times, t0 + SAME_TIME) - 1
-        if first < 0 or not math.isfinite(self.period):
+        if self._own_periods is None:
+            return self._doubt(self._times, self._u, self.period, self.typical_change, t0, t1)
+        moved, sigma, complete = np.zeros_like(self.typical_change), np.zeros_like(self.typical_change), True
+        for j, period in enumerate(self._own_periods):
+            own = self._own(j)
+            u = [self._u[i][[j]] for i in own]
+            found = self._doubt([self._times[i] for i in own], u, float(period), self.typical_change[[j]], t0, t1)
+            if found is not None:
+                moved[j], sigma[j], complete = found[0][0], found[1][0], False
+        return None if complete else (moved, sigma)
+
+    def _doubt(
+        self, times: list[float], commands: list[Array], period: float, typical_change: Array, t0: float, t1: float
+    ) -> tuple[Array, Array] | None:
+        """As `doubt`, of joints whose commands come together."""
+        first = bisect_right(times, t0 + SAME_TIME) - 1
+        if first < 0 or not math.isfinite(period):
             return None
-        last = bisect_left(self._times, t1 - SAME_TIME)
-        moved, variance, complete = np.zeros_like(self.typical_change), np.zeros_like(self.typical_change), True
+        last = bisect_left(times, t1 - SAME_TIME)
+        moved, variance, complete = np.zeros_like(typical_change), np.zeros_like(typical_change), True
         for i in range(first, last):
-            following = self._times[i + 1] if i + 1 < len(self._times) else math.inf
-            begin = self._times[i] + self.period
+            following = times[i + 1] if i + 1 < len(times) else math.inf
+            begin = times[i] + period
             missing = min(t1, following) - max(t0, begin)
-            if missing < 0.5 * self.period:
+            if missing < 0.5 * period:
                 continue
             complete, share = False, missing / (t1 - t0)
             # one unknown command acts in all steps of the gap: their errors do not average out
             together = max(min(following, t1) - begin, missing) / missing
             if math.isinf(following):
-                variance += together * (share * self.typical_change) ** 2
+                variance += together * (share * typical_change) ** 2
             else:
-                change = self._u[i + 1] - self._u[i]
+                change = commands[i + 1] - commands[i]
                 if self._held:  # else the mean goes to the one after it by itself
-                    way = max(t0, begin) + 0.5 * missing - 0.5 * self.period - self._times[i]
-                    moved += share * way / (following - self._times[i]) * change
+                    way = max(t0, begin) + 0.5 * missing - 0.5 * period - times[i]
+                    moved += share * way / (following - times[i]) * change
                 variance += together * (share * change) ** 2 / 12.0
         return None if complete else (moved, np.sqrt(variance))
 
@@ -145,12 +165,18 @@ class CommandHistory:
         A measured one tells what acted since the one before it.
         """
         i = bisect_left(self._times, t)
-        if i == 0:
+        before, period = self._times[i - 1] if i else None, self.period
+        about = self._about[i] if i < len(self._times) else None
+        if self._own_periods is not None and about is not None:
+            j = int(np.argmax(about))
+            before = next((self._times[k] for k in reversed(self._own(j)) if self._times[k] < t), None)
+            period = float(self._own_periods[j])
+        if before is None:
             return t
         if not self._held:
-            return self._times[i - 1]
-        due = self._times[i - 1] + self.period
-        return due if t - due > 0.5 * self.period else t
+            return before
+        due = before + period
+        return due if t - due > 0.5 * period else t
 
     def acts_until(self, t: float) -> float:
         """When the command that acts at a time is replaced by the next one [s]; infinity for the last."""
@@ -161,19 +187,27 @@ class CommandHistory:
     def forget_after(self, t: float) -> None:
         """Forgets commands with later stamps, which cannot be right."""
         i = bisect_right(self._times, t)
-        del self._times[i:], self._u[i:]
+        del self._times[i:], self._u[i:], self._about[i:]
+
+    def _own(self, joint: int) -> list[int]:
+        """Which commands are about a joint, in the order of time."""
+        return [i for i, about in enumerate(self._about) if about is None or about[joint]]
 
     def _measure_period(self) -> None:
         """The median distance; lost commands make some distances longer, and the newest may not have come yet."""
-        recent = self._times[-RECENT:]
-        distances = sorted(b - a for a, b in itertools.pairwise(recent) if b - a > SHORTEST)
-        if distances:
-            self.period = distances[(len(distances) - 1) // 2]
+        if self._own_periods is None:
+            self.period = _middle_distance(self._times[-RECENT:], self.period)
+            return
+        for j, period in enumerate(self._own_periods):
+            recent = [self._times[i] for i in self._own(j)[-RECENT:]]
+            self._own_periods[j] = _middle_distance(recent, float(period))
+        self.period = float(self._own_periods.min())
 
-    def _learn(self, change: Array) -> None:
+    def _learn(self, change: Array, about: NDArray[np.bool_] | None) -> None:
         # rare jumps dominate, and are what a missing command may have been
         mean_square = self.typical_change**2
-        self.typical_change = np.sqrt(mean_square + CHANGE_SHARE * (change**2 - mean_square))
+        learned = np.sqrt(mean_square + CHANGE_SHARE * (change**2 - mean_square))
+        self.typical_change = learned if about is None else np.where(about, learned, self.typical_change)
 
     def _after_effects(self, t0: float, t1: float, last: int) -> Array:
         """As `mean`, with the effects on commands."""
@@ -198,6 +232,12 @@ class CommandHistory:
         u = np.array(self._u[first : last + 1])
         at = np.column_stack([np.interp(knots, self._times[first : last + 1], column) for column in u.T])
         return np.asarray(0.5 * (at[1:] + at[:-1]), dtype=np.float64)
+
+
+def _middle_distance(times: list[float], otherwise: float) -> float:
+    """Median distance of times; the lower one of two."""
+    distances = sorted(b - a for a, b in itertools.pairwise(times) if b - a > SHORTEST)
+    return distances[(len(distances) - 1) // 2] if distances else otherwise
 
 
 def _full_command(robot: Robot) -> float:

@@ -12,6 +12,7 @@ KINDS = (
     "too_early",
     "duplicate",
     "not_finite",
+    "incomplete",
     "stuck",
     "outlier",
     "sensor_lost",

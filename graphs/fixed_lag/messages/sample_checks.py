@@ -34,8 +34,8 @@ class SampleChecks:
         self._looked_at = 0
         self._repeats = [0.5] * channels
         self._step = [float("inf")] * channels
-        self._recent: deque[tuple[float, list[float], int]] = deque(maxlen=SMOOTHING + 1)
-        self._samples = 0
+        self._recent: deque[tuple[float, list[float], list[int]]] = deque(maxlen=SMOOTHING + 1)
+        self._samples = [0] * channels
 
     def is_duplicate(self, t: float) -> bool:
         """Whether a sample with this stamp came before; remembers it."""
@@ -83,11 +83,12 @@ class SampleChecks:
 
         NaN stands for a channel that was not measured, and is taken as a repetition.
         """
+        if not self._recent or t > self._recent[0][0]:
+            self._samples = [n + (not math.isnan(value)) for n, value in zip(self._samples, values, strict=True)]
         if any(math.isnan(value) for value in values):
             if not self._recent:
                 return None
             values = [last if math.isnan(new) else new for new, last in zip(values, self._recent[-1][1], strict=True)]
-        self._samples += not self._recent or t > self._recent[0][0]
         if not self._recent:
             self._recent.append((t, values, self._samples))
             return None
@@ -107,9 +108,10 @@ class SampleChecks:
         if not any(coarse):
             return None
         _, first, begin = self._recent[0]
-        count = max(self._samples - begin, SMOOTHING)  # with those that came late
+        # each channel's own samples, with those that came late; other nodes on the topic do not count
+        counts = [max(n - past, 1) for n, past in zip(self._samples, begin, strict=True)]
         # samples that share one error: a step over the way from one sample to the next
-        ways = [abs(value - start) / count for value, start in zip(values, first, strict=True)]
+        ways = [abs(value - start) / n for value, start, n in zip(values, first, counts, strict=True)]
         return [
             math.sqrt(min(max(step / max(way, SMALLEST_CHANGE), 1.0), MOST)) if is_coarse else 1.0
             for step, way, is_coarse in zip(self._step, ways, coarse, strict=True)

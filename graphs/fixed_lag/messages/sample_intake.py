@@ -14,9 +14,8 @@ from jointscope.graphs.fixed_lag.messages.status import EstimatorStatus, EventLo
 from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import EstimatorError
-from jointscope.robots.model.lateness import late_channels
+from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro
@@ -41,7 +40,7 @@ class SampleIntake:
     def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
         self._robot, self._status, self._log, self._clock = robot, status, log, clock
         self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        self._acting: Array | None = None  # last command of all joints
+        self._acting = np.full(robot.n, np.nan)  # last command of each joint
         self._in_doubt = 0  # commands since then
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
@@ -49,24 +48,43 @@ class SampleIntake:
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
-    def command(self, t: float, u: ArrayLike, now: float | None) -> Array | None:
+    @property
+    def waits_for_commands(self) -> bool:
+        """Whether commands of some joints have come, and none yet of the others."""
+        return bool(np.isnan(self._acting).any() and not np.isnan(self._acting).all())
+
+    def command(
+        self, t: float, u: ArrayLike, now: float | None, about: NDArray[np.bool_] | None = None
+    ) -> Array | None:
         """A command if it can be used, shape (n,); now is the time of the estimate [s], None before there is one.
 
-        Joints whose value is no number keep the one before, for a while.
+        Joints whose value is no number keep the one before, for a while; those that the message is not `about`, shape
+        (n,), as long as their own driver is silent.
         """
         values = self._shaped("command", t, u, self._robot.n, now)
         if values is None:
             return None
-        bad = _useless(values.tolist())
-        if not bad:
+        useless = _useless(values.tolist())
+        if not useless:
             self._acting, self._in_doubt = values, 0
             return values
-        self._in_doubt += 1
-        joints = ", ".join(self._robot.joints[j] for j in bad)
-        self._drop("command", t, "not_finite", f"the command of {joints} is no number and is left out")
-        if self._acting is None or len(bad) == len(values) or self._in_doubt >= LONGEST_DOUBT:
+        bad = np.isin(np.arange(len(values)), useless)
+        lost = bad if about is None else bad & about
+        if not lost.any():
+            self._in_doubt = 0
+        else:
+            self._in_doubt += 1
+            joints = ", ".join(joint for joint, no_number in zip(self._robot.joints, lost, strict=True) if no_number)
+            self._drop("command", t, "not_finite", f"the command of {joints} is no number and is left out")
+            if lost.all() or self._in_doubt >= LONGEST_DOUBT:
+                return None
+        values = np.where(bad, self._acting, values)
+        self._acting = values
+        if np.isnan(values).any():
+            if not lost.any():
+                joints = ", ".join(joint for joint, u in zip(self._robot.joints, values, strict=True) if np.isnan(u))
+                self._drop("command", t, "incomplete", f"no command of {joints} has come yet")
             return None
-        self._acting = values = np.where(np.isin(np.arange(len(values)), bad), self._acting, values)
         return values
 
     def sample(
@@ -106,7 +124,8 @@ class SampleIntake:
                 taken = t - _lateness(effects, t, self._values) if effects else t
                 whole = len(channels) == len(found)
                 chosen = (found, sigma) if whole else (found[channels], sigma[channels])
-                result.append(Observation(name, t, taken, channels, *chosen))
+                variance = Lateness(effects, found, found).variance(self._values)[0]
+                result.append(Observation(name, t, taken, channels, *chosen, variance))
         return result
 
     def forget_stamps(self) -> None:
@@ -164,9 +183,5 @@ def _useless(numbers: list[float]) -> list[int]:
 
 def _lateness(effects: tuple[EffectAt, ...], t: float, values: dict[str, float]) -> float:
     """How late a stamp is by the effects of the robot file [s]."""
-    total, stamp = 0.0, np.array([t])
-    for here in effects:
-        assert isinstance(here.effect, TimeShift)
-        own = {p.name: values[here.parameter(p.name)] for p in here.effect.parameters}
-        total += float(here.effect.late(stamp, own)[0][0])
-    return total
+    stamp = np.array([t])
+    return float(Lateness(effects, stamp, np.zeros(1)).since_anchor(values)[0][0])

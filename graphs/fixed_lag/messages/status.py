@@ -10,7 +10,7 @@ from jointscope.graphs.fixed_lag.messages.event import Event
 
 EVENTS_KEPT = 1000
 QUIET = 1.0  # [s] between two events of a kind that is frequent
-FREQUENT = ("late", "too_late", "too_early", "duplicate", "not_finite", "stuck", "outlier")
+FREQUENT = ("late", "too_late", "too_early", "duplicate", "not_finite", "incomplete", "stuck", "outlier")
 
 
 @dataclass
@@ -23,8 +23,8 @@ class EstimatorStatus:
         restarts: how often the estimator began anew.
         received, used: samples by stream.
         late: samples that were used although later ones had come before, by stream.
-        dropped: samples that were not used, by stream and kind (too_late, too_early, duplicate, not_finite, stuck,
-            outlier).
+        dropped: samples that were not used, by stream and kind (too_late, too_early, duplicate, not_finite,
+            incomplete, stuck, outlier).
         nis: mean normalised innovation squared of the last second by channel, 1 is right.
         nis_mean: the same for all sensors together, per degree of freedom.
         alarms: channels whose innovations are larger than noise and model allow; `jointscope diagnose` says why.

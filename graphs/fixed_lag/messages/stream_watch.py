@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from jointscope.graphs.fixed_lag.messages.status import EventLog
 from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.robots.model.robot import Robot
@@ -15,6 +18,7 @@ SHARE = 0.05  # weight of a new distance in the running estimate of the usual on
 EVERY = 10  # ticks between two looks
 CONTRADICTION = 30.0**2  # normalised innovation squared of the encoders per degree of freedom
 LONGEST_CONTRADICTION = 0.1  # [s]
+COMMAND = "command"
 
 
 class StreamWatch:
@@ -26,7 +30,7 @@ class StreamWatch:
     """
 
     def __init__(self, robot: Robot, log: EventLog):
-        self._log, self._encoder = log, robot.motor_encoder.name
+        self._log, self._encoder, self._joints = log, robot.motor_encoder.name, robot.joints
         self._last: dict[str, float] = {}
         self._usual: dict[str, float] = {}
         self._lost: dict[str, float] = {}
@@ -42,8 +46,17 @@ class StreamWatch:
             self._last[name] = t
             if name in self._lost:
                 silence = t - self._lost.pop(name)
-                kind = "command_back" if name == "command" else "sensor_back"
+                kind = "command_back" if _commands(name) else "sensor_back"
                 self._log.tell(t, kind, name, f"{name} is back after {silence:.2f} s")
+
+    def commanded(self, t: float, about: NDArray[np.bool_] | None) -> None:
+        """A command has come: of all joints, or of those that it is about, shape (n,)."""
+        if about is None:
+            self.seen(COMMAND, t)
+            return
+        for joint, own in zip(self._joints, about, strict=True):
+            if own:
+                self.seen(f"{joint}.{COMMAND}", t)
 
     def check(self, now: float) -> tuple[str, ...]:
         """Streams that are silent; looks at them every few ticks."""
@@ -52,14 +65,20 @@ class StreamWatch:
             for name, last in self._last.items():
                 if name not in self._lost and now - last > self._patience(name):
                     self._lost[name] = last
-                    kind = "command_lost" if name == "command" else "sensor_lost"
+                    kind = "command_lost" if _commands(name) else "sensor_lost"
                     self._log.tell(now, kind, name, f"nothing of {name} since {last:.3f} s")
         return tuple(self._lost)
 
-    def command_is_lost(self, now: float) -> bool:
-        """Whether commands have stopped; the robot may then do what its drives do without one."""
-        last = self._last.get("command")
-        return last is not None and now - last > self._patience("command")
+    def lost_commands(self, now: float) -> NDArray[np.bool_] | None:
+        """Joints whose commands have stopped, shape (n,), None without any: their drives may then do what they like."""
+        if self._is_lost(COMMAND, now):
+            return np.ones(len(self._joints), bool)
+        lost = [self._is_lost(f"{joint}.{COMMAND}", now) for joint in self._joints]
+        return np.array(lost) if any(lost) else None
+
+    def _is_lost(self, name: str, now: float) -> bool:
+        last = self._last.get(name)
+        return last is not None and now - last > self._patience(name)
 
     def fits(self, now: float, innovations: Sequence[Innovation]) -> bool:
         """Whether the encoders have not contradicted the estimate for long."""
@@ -76,3 +95,8 @@ class StreamWatch:
 
     def _patience(self, name: str) -> float:
         return max(SILENT, PERIODS * self._usual.get(name, SILENT))
+
+
+def _commands(name: str) -> bool:
+    """Whether a stream is that of the commands, of all joints or of one."""
+    return name.rpartition(".")[2] == COMMAND

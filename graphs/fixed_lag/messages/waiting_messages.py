@@ -59,8 +59,11 @@ class WaitingMessages:
 
     def acting(self, t0: float, t1: float) -> tuple[Array, Array | None]:
         """Mean command over a step, and the standard deviation of the torques that missing commands leave open."""
-        lost = self._books.watch.command_is_lost(t1)
-        u, doubt = self.commands.lost(t0, t1) if lost else self.commands.acting(t0, t1)
+        lost = self._books.watch.lost_commands(t1)
+        u, doubt = self.commands.acting(t0, t1)
+        if lost is not None:
+            held, unknown = self.commands.lost(t0, t1)
+            u, doubt = np.where(lost, held, u), np.where(lost, unknown, 0.0 if doubt is None else doubt)
         return u, None if doubt is None else doubt * np.abs(self._engine.torque_gain)
 
     def up_to(self, time: float) -> tuple[list[Innovation], int]:

@@ -120,9 +120,8 @@ def _finite(recording: Recording) -> Recording:
     """The recording without samples that hold NaN or infinity, which the estimator leaves out, too."""
     streams = {}
     for name, s in recording.streams.items():
-        good = np.isfinite(s.values).all(axis=1)
-        received = None if s.received is None else s.received[good]
-        streams[name] = replace(s, times=s.times[good], values=s.values[good], received=received)
+        good = np.asarray(np.isfinite(s.values).all(axis=1))
+        streams[name] = s.take(good)
     return replace(recording, streams=streams)
 
 

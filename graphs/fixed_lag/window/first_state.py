@@ -62,7 +62,10 @@ class FirstSamples:
         return np.asarray(q[last, np.arange(self._n)], dtype=np.float64)
 
     def add(self, observations: Sequence[Observation]) -> bool:
-        """Takes in the groups of channels of one message; returns whether the estimator can begin."""
+        """Takes in the groups of channels of one message; returns whether the estimator can begin.
+
+        Until it does, the newest samples that suffice are kept.
+        """
         own = [o for o in observations if o.sensor == self._encoder.name]
         if not own:
             return False
@@ -75,9 +78,16 @@ class FirstSamples:
         if samples and taken <= samples[-1].time:
             return False  # older than what is there
         samples.append(EncoderSample(taken, q - np.asarray(self._encoder.zero)))
-        span = taken - samples[0].time
-        count = int(np.isfinite([sample.q for sample in samples]).sum(axis=0).min())
-        return (span >= WINDOW and count >= FEWEST) or (span >= LONGEST_WAIT / 2 and count > 1)
+        while len(samples) > 1 and _suffice(samples[1:]):
+            del samples[0]
+        return _suffice(samples)
+
+
+def _suffice(samples: Sequence[EncoderSample]) -> bool:
+    """Whether they tell where all joints are, and how fast."""
+    span = samples[-1].time - samples[0].time
+    count = int(np.isfinite([sample.q for sample in samples]).sum(axis=0).min())
+    return (span >= WINDOW and count >= FEWEST) or (span >= LONGEST_WAIT / 2 and count > 1)
 
 
 def first_state(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.accelerated import acceleration_weights
-from jointscope.factors.interpolated import interpolate, weights_between
+from jointscope.factors.interpolated import interpolate, smoothed, weights_between
 from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
 from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 
@@ -30,6 +30,7 @@ class Observation:
         channels: indices of the channels, shape (c,).
         values: shape (c,) [unit of the sensor].
         sigma: shape (c,).
+        variance: over time, of the weights of the filter that smoothed it [s^2].
     """
 
     sensor: str
@@ -38,6 +39,11 @@ class Observation:
     channels: NDArray[np.intp]
     values: Array
     sigma: Array
+    variance: float = 0.0
+
+    def needs_step(self, readings: ReadingsAtOneState) -> bool:
+        """Whether its reading depends on how the state changes, so on both ends of the step."""
+        return self.variance != 0.0 or readings.feels_acceleration(self.sensor)
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,7 @@ def observed_rows(
         layout: of the states.
         observations: taken in [t0, t1].
         x0: state at the beginning, shape (D,); None where all samples were taken at the end, and none of them is an
-            acceleration.
+            acceleration or smoothed.
         x1: state at the end, shape (D,).
         t0: beginning of the step [s].
         t1: end of the step [s].
@@ -96,19 +102,24 @@ def observed_rows(
         row = part.stop
         parts.append(part)
         sigma[part] = o.sigma
-        feels = readings.feels_acceleration(o.sensor)
-        if x0 is None or (o.taken >= t1 - AT_TICK and not feels):
+        if x0 is None or (o.taken >= t1 - AT_TICK and not o.needs_step(readings)):
             reading, J = readings.read(o.sensor, own, o.stamp)
             by_end[part, :d] = J if len(J) == len(o.channels) else J[o.channels]
         else:
             h, s = t1 - t0, (o.taken - t0) / (t1 - t0)
             at = interpolate(layout.robot, x0[None, :d], x1[None, :d], np.array([s]), np.array([h]))[0]
-            if feels:
+            if o.variance:
+                smoothed(layout.robot, at[None], x0[None, :d], x1[None, :d], np.array([h]), o.variance)
+            if readings.feels_acceleration(o.sensor):
                 at = np.concatenate([at, _acceleration(layout, x0, x1, s, h)])
             reading, J = readings.read(o.sensor, at, o.stamp)
             if by_start is None:
                 by_start = np.zeros((total, layout.size))
             J0, J1 = _split(layout, J[o.channels], s, h)
+            if o.variance:
+                by_velocity = 0.5 * o.variance / h * J[o.channels][:, layout.robot.positions]
+                J0[:, layout.robot.velocities] -= by_velocity
+                J1[:, layout.robot.velocities] += by_velocity
             by_start[part, :d], by_end[part, :d] = J0, J1
         predicted = reading[o.channels]
         bias = layout.biases.get(o.sensor)

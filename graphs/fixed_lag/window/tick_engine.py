@@ -128,7 +128,7 @@ class TickEngine:
         for o in observations:
             i = int(np.searchsorted(times, o.taken - AT_TICK))
             first, last = ticks[max(i - 1, 0)], ticks[min(i, len(ticks) - 1)]
-            feels = self._readings.feels_acceleration(o.sensor)
+            feels = o.needs_step(self._readings)
             if feels and first is last:
                 continue  # the step before it is gone
             at_tick = abs(last.time - o.taken) <= AT_TICK and not feels
@@ -224,8 +224,7 @@ class TickEngine:
     def _take_in(self, x0: NewestState, found: Prediction, before: PastTick, here: PastTick) -> list[Innovation]:
         """Updates a prediction with samples of its step."""
         x1, time, observations = found.state, here.time, here.observations
-        feels = self._readings.feels_acceleration
-        at_end = all(o.taken >= time - AT_TICK and not feels(o.sensor) for o in observations)
+        at_end = all(o.taken >= time - AT_TICK and not o.needs_step(self._readings) for o in observations)
         start = None if at_end else x0.mean
         seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, before.time, time)
         with_state = seen.by_end @ x1.covariance

@@ -27,6 +27,7 @@ class SensorPart:
         stamps: shape (s,) [s].
         reading: predicted reading without zero or bias, shape (s, r).
         reading_rate: its time derivative, shape (s, r).
+        reading_bend: its second time derivative, of readings that depend on positions alone, shape (s, r).
     """
 
     name: str
@@ -34,6 +35,7 @@ class SensorPart:
     stamps: Array
     reading: Array
     reading_rate: Array
+    reading_bend: Array
 
 
 @dataclass(frozen=True)

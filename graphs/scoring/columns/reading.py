@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Columns of errors of readings: distorted values and late stamps."""
+"""Columns of errors of readings: distorted and smoothed values, and late stamps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.time_shift import TimeShift
-from jointscope.robots.model.lateness import shifts
+from jointscope.robots.model.lateness import shifts, smooths
 
 Array = NDArray[np.float64]
 
@@ -52,5 +52,15 @@ def late_column(hypothesis: EffectHypothesis, s: ScoreSignals, size: str) -> Sen
         slope = effect.late(part.stamps, p)[1][size]
         hit = np.array([shifts(hypothesis.here, s.robot, part.name, int(channel)) for channel in part.channels])
         return -part.reading_rate * slope[:, None] * hit
+
+    return column
+
+
+def smooth_column(hypothesis: EffectHypothesis, s: ScoreSignals) -> SensorColumn:
+    """Error of readings that a filter has smoothed, by the variance of its weights."""
+
+    def column(part: SensorPart) -> Array:
+        hit = np.array([smooths(hypothesis.here, s.robot, part.name, int(channel)) for channel in part.channels])
+        return 0.5 * part.reading_bend * hit
 
     return column

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jointscope.graphs.calibration.whole_stage import _must_converge
+from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.solving.convergence import Iteration
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.effect_editing import add_effect
@@ -26,11 +26,11 @@ def test_effects_that_vanish_are_named_with_the_command_that_removes_them():
     robot = add_effect(load_robot("doggy"), "backlash@joint2")
     small = 0.01 * robot.parameters["joint2.backlash.half_gap"].prior
     with pytest.raises(SolveError, match=r"sizes of backlash@joint2 are below a tenth .*jointscope remove doggy back"):
-        _must_converge(unfinished(robot, {"joint2.backlash.half_gap": small}), robot, 0.1)
+        must_converge(unfinished(robot, {"joint2.backlash.half_gap": small}), robot, 0.1)
 
 
 def test_effects_that_are_there_are_not_blamed():
     robot = add_effect(load_robot("doggy"), "backlash@joint2")
     with pytest.raises(SolveError, match="no convergence after 1 iterations") as err:
-        _must_converge(unfinished(robot, {}), robot, 0.1)
+        must_converge(unfinished(robot, {}), robot, 0.1)
     assert "remove" not in str(err.value)

@@ -8,12 +8,12 @@ import time
 import numpy as np
 import pytest
 
-from jointscope.graphs.calibration.motion_regimes import REGIMES, motion_regimes
 from jointscope.graphs.comparison.comparison_result import ModelComparison, SensorPrediction
 from jointscope.graphs.comparison.error_concentration import concentration
 from jointscope.graphs.comparison.failure_analysis import analyse_failure
 from jointscope.graphs.noise.whiteness_test import evenly, whiteness
 from jointscope.graphs.problem.joint_states import JointStates
+from jointscope.graphs.problem.motion_regimes import REGIMES, motion_regimes
 from jointscope.robots.recordings.recording import Recording, Stream
 
 FREQUENCY = np.array([0.23, 0.61, 0.37])  # [Hz]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The torque balance and the logarithm of the matrix: derivatives, limits, and what a carrying motion adds."""
+"""The torque balance and the logarithm of the matrix: derivatives and limits."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shaken_arm import CARRIER, LINES, RATE, N, made_up
+from shaken_arm import LINES, RATE, N, made_up
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.frequency.motor_stiffness import carried_torque, motor_stiffness
+from jointscope.graphs.frequency.motor_stiffness import motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage
 from jointscope.robots.files.robot_file import load_robot
@@ -59,40 +59,6 @@ def test_the_stiffness_of_one_motor_alone_is_a_spring_between_two_masses(robot):
     found = motor_stiffness(arm, parts, w, stiff).Z[:, 2, 2]
     np.testing.assert_allclose(found.real, expected, rtol=1e-5)
     np.testing.assert_allclose(found.imag, 0.0, atol=1e-4 * np.abs(expected).max())
-
-
-def test_a_motion_of_no_size_carries_nothing(robot):
-    pose = ShakenPose.of(*made_up())
-    arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
-    still = arm.linearised(pose.q, values, 0.0 * pose.carrier, 1.0, 2)
-    f0 = pose.found.excitation.f0
-    carried = carried_torque(arm, still, f0, CARRIER, pose.motion, values)[:, pose.lines]
-    Z = motor_stiffness(arm, arm.linearised(pose.q, values).mean, pose.w, values).Z
-    plain = np.einsum("lij,elj->eli", Z, pose.motion[:, pose.lines])
-    np.testing.assert_allclose(carried, plain, rtol=1e-6, atol=1e-9 * np.abs(plain).max())
-
-
-def test_what_a_motion_carries_is_what_the_arm_needs_at_every_moment(robot):
-    """In time: springs and rotors of the solution balance the bodies, whose matrices follow the phase."""
-    pose = ShakenPose.of(*made_up())
-    arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
-    stiff = values | {s.stiffness: 1e12 for s in arm.springs} | {s.damping: 0.0 for s in arm.springs}
-    speed = 2.0 * np.pi * pose.found.excitation.carrier
-    about = arm.linearised(pose.q, stiff, pose.carrier, speed, 2)
-    f0, motion = pose.found.excitation.f0, pose.motion
-    torques = carried_torque(arm, about, f0, CARRIER, motion, stiff)
-    # rigid springs: the arm follows the motors, so its torque is M(t) a + C(t) v + G(t) q, sample by sample
-    t, k = np.arange(4096) / 4096.0 / f0, np.arange(motion.shape[1])
-    waves = np.exp(2j * np.pi * f0 * np.outer(t, k))
-    w = 2.0 * np.pi * f0 * k
-    q, v, a = (waves @ (factor[:, None] * motion[0]) for factor in (np.ones(len(k)), 1j * w, -(w**2)))
-    phase = np.exp(1j * speed * np.outer(t, np.arange(-2, 3)))
-    own = np.ix_(range(5), arm.driven, arm.driven)
-    M, C, G = (np.einsum("th,hij->tij", phase, part[own]) for part in (about.M, about.C, about.G))
-    needed = sum(np.einsum("tij,tj->ti", A, x) for A, x in ((M, a), (C, v), (G, q)))
-    needed += a * [stiff[f"joint{i}.inertia"] for i in (1, 2, 3)]
-    found = np.array([(needed * waves[:, [line]].conj()).mean(axis=0) for line in LINES])
-    np.testing.assert_allclose(torques[0, LINES], found, rtol=2e-3, atol=2e-4 * np.abs(found).max())
 
 
 def test_friction_turns_over_faster_than_samples_and_is_taken_between_them(robot):

@@ -297,17 +297,34 @@ def test_angles_somewhat_beyond_the_limits_are_only_noted(doggy, good):
 
 
 @pytest.mark.parametrize(
-    ("share", "most", "topic", "said"),
-    ((1.0, 99.0, "/cmd", 0), (0.6, 99.0, "/cmd", 0), (1.0, 30.0, "/cmd", 1), (1.0, 30.0, "/states", 0)),
-    ids=("all acted", "a heavy rotor takes its part", "cut at 30 N m", "reported by the motors"),
+    ("share", "rotor", "most", "topic", "said"),
+    (
+        (1.0, 0.0, 99.0, "/cmd", 0),
+        (0.6, 0.0, 99.0, "/cmd", 0),
+        (0.1, 9.0, 99.0, "/cmd", 0),
+        (0.1, 9.0, 30.0, "/cmd", 1),
+        (1.0, 0.0, 30.0, "/cmd", 1),
+        (1.0, 0.0, 30.0, "/states", 0),
+    ),
+    ids=(
+        "all acted",
+        "a rotor that nobody knows takes its part",
+        "a known rotor takes most",
+        "a known rotor takes most, cut at 30 N m",
+        "cut at 30 N m",
+        "reported by the motors",
+    ),
 )
-def test_commands_beyond_the_effort_limit_are_told_where_the_motion_does_not_follow(share, most, topic, said):
+def test_commands_beyond_the_effort_limit_are_told_where_the_motion_does_not_follow(share, rotor, most, topic, said):
     times = np.arange(0.0, 4.0, 0.005)
     commanded = 60.0 * np.sin(3 * times)[:, None]
     v = np.cumsum(share * np.clip(commanded, -most, most), axis=0) * 0.005
+    values = {"inertia": rotor, "coulomb_torque": 0.0}
     tree = SimpleNamespace(effort_limits=np.array([40.0]), torque=lambda q, v, a: a, urdf=Path("arm.urdf"))
     robot = SimpleNamespace(
-        joints=("elbow",), tree=tree, free_links=False, transmission=None, unit_at=lambda joint, unit: unit,
+        joints=("elbow",), tree=tree, free_links=False, parameters={},
+        drive_parameter=lambda joint, law: SimpleNamespace(value=values[law]),
+        transmission=None, unit_at=lambda joint, unit: unit,
         command=SimpleNamespace(topic=topic, unit="N m"),
         motor_encoder=SimpleNamespace(source=SimpleNamespace(topic="/states")),
     )  # fmt: skip

@@ -102,6 +102,86 @@ def test_a_command_of_one_joint_leaves_those_of_the_others(arm, halves, tmp_path
             np.testing.assert_array_equal(stream.values[own_rows, j], given)
 
 
+NODES = {
+    # first and last row of the shoulder's messages, and of the elbow's: states at 100 Hz, commands at 250 Hz
+    "one millisecond behind each other": {"states": (0, None, 1, None), "commands": (0, None, 1, None)},
+    "half begins late": {"states": (0, None, 1605, None), "commands": (0, None, 2, None)},
+    "half ends early": {"states": (0, None, 5, 2400), "commands": (0, None, 2, None)},
+    "half is commanded late": {"states": (0, None, 2, None), "commands": (0, None, 1605, None)},
+    "half is no longer commanded": {"states": (0, None, 2, None), "commands": (0, None, 2, 2400)},
+}
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    """As `arm`, sampled so fast that nodes may speak just behind each other."""
+    folder = tmp_path_factory.mktemp("nodes")
+    urdf = write_urdf(folder / "arm.urdf", {"shoulder": None, "elbow": "shoulder"})
+    return urdf, ArmMotion(urdf, ["shoulder", "elbow"], seconds=4.0, rate=1000.0)
+
+
+@pytest.mark.parametrize("nodes", NODES)
+def test_nodes_may_speak_just_behind_each_other_begin_late_and_end_early(fast, tmp_path, capsys, nodes):
+    urdf, motion = fast
+    every = np.arange(len(motion.times))
+    topics = {}
+    for kind, (first, last, other, end) in NODES[nodes].items():
+        step = 10 if kind == "states" else 4
+        for joint, own in (("shoulder", every[first:last:step]), ("elbow", every[other:end:step])):
+            of_joint = motion.states([joint]) if kind == "states" else motion.commands([joint])
+            topics[f"{'/joint_states' if kind == 'states' else '/cmd'}#{joint}"] = of_joint | {"rows": own}
+    bag = write_arm_bag(tmp_path / "nodes.mcap", motion.times, topics)
+    robot, found, told = tmp_path / "arm.yaml", tmp_path / "found.yaml", tmp_path / "found.json"
+    assert main(["init", str(urdf), str(bag), "-o", str(robot)]) == 0
+    out = capsys.readouterr().out
+    assert "the recording can be used with it" in out and "no number" not in out
+    cut = nodes != "one millisecond behind each other"
+    assert ("left out, as too little is known there" in out and "of elbow for" in out) == cut
+    start = load_robot(robot)
+    assert main(["calibrate", str(robot), str(bag), "-o", str(found), "--json", str(told)]) == 0
+    assert "Yes, this calibration is good" in capsys.readouterr().out
+    values = json.loads(told.read_text())["parameters"]
+    for joint in ("shoulder", "elbow"):
+        for name, true in TRUE.items():
+            got = values[f"{joint}.{name}"]
+            assert abs(got["value"] - true) < max(0.01 * true, 3.5 * got["sigma"]), name
+            assert start.parameters[f"{joint}.{name}"].value == pytest.approx(true, rel=0.05), name
+    assert main(["replay", str(found), str(bag), "--json", str(told)]) == 0
+    out = capsys.readouterr().out
+    if nodes == "half is commanded late":
+        assert "before those of all joints had come" in out
+    assert ("nothing of elbow.command since" in out) == (nodes == "half is no longer commanded")
+    if nodes != "half is no longer commanded":
+        assert json.loads(told.read_text())["nis_mean"] < 1.5
+
+
+@pytest.mark.parametrize("aggregated", (40, 4))
+def test_an_aggregator_that_repeats_what_two_nodes_say_is_left_out_unless_it_says_more(
+    fast, tmp_path, capsys, aggregated
+):
+    urdf, motion = fast
+    every = np.arange(len(motion.times))
+    topics = {"/cmd": motion.commands(["shoulder", "elbow"]) | {"rows": every[::4]}}
+    for joint, own in (("shoulder", every[::10]), ("elbow", every[2::10])):
+        topics[f"/joint_states#{joint}"] = motion.states([joint]) | {"rows": own}
+    late = motion.states(["shoulder", "elbow"]) | {"rows": every[7:-60:aggregated]}
+    late |= {"stamped": lambda stamp: stamp + 50_000_000} if aggregated > 10 else {}
+    bag = write_arm_bag(tmp_path / "aggregator.mcap", motion.times, topics | {"/joint_states#all": late})
+    robot = tmp_path / "arm.yaml"
+    assert main(["init", str(urdf), str(bag), "-o", str(robot)]) == 0
+    out = capsys.readouterr().out
+    assert "the recording can be used with it" in out
+    repeated = f"left out {len(late['rows'])} messages of another node that repeats what those of the joints say"
+    assert (repeated in out) == (aggregated > 10)
+    stream = read_recording(bag, load_robot(robot)).streams["motor_encoder"]
+    (block,) = list(ArrivalReader(bag, load_robot(robot)))
+    arrived = block.values[block.names.index("motor_encoder")]
+    kept = [len(every[::10]), len(every[2::10])] if aggregated > 10 else 2 * [len(late["rows"])]
+    assert np.isfinite(stream.measured).sum(axis=0).tolist() == np.isfinite(arrived).sum(axis=0).tolist() == kept
+    for joint in ("shoulder", "elbow"):
+        assert load_robot(robot).parameters[f"{joint}.inertia"].value == pytest.approx(0.05, rel=0.05), joint
+
+
 def test_a_list_that_is_shorter_than_its_names_is_said_with_both_lengths(arm, tmp_path, capsys):
     _, urdf, motion, _ = arm
     command = motion.commands(["shoulder", "elbow"])

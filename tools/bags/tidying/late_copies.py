@@ -25,6 +25,8 @@ SPREAD = 0.15  # of how late is usual; a signal that turns round repeats itself 
 LONGEST_RUN = 3.0  # copies between two messages of the driver, in the mean
 TYPICAL = 0.9  # quantile of how far messages lie off the line between their neighbours
 OFF = 3.0  # times that far off are copies
+NEARLY_ALL, TWICE = 0.95, 2.0  # quantile of the deviations from usual lateness, and how many times that is near
+SAME_TIME = 1e-6  # [s]
 NEVER_TWICE = 0.9  # share of the driver's different messages that no other one equals
 
 
@@ -70,13 +72,33 @@ def _found(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> tuple[Flag
     usual = float(np.median(later[copies]))
     like = copies & (np.abs(later - usual) < SPREAD * usual)
     runs = int(np.count_nonzero(np.diff(like.astype(np.int8), prepend=0) == 1))
-    own = np.count_nonzero(fresh & ~copies)
-    twice = np.count_nonzero(known & fresh & ~copies)
     if np.count_nonzero(like) < ALIKE * np.count_nonzero(copies) or like.sum() > LONGEST_RUN * runs:
         return none
-    if not own or twice > (1.0 - NEVER_TWICE) * own or _likely(values[~like]):
-        return none
-    return (like, later) if _out_of_the_way(stamps, values, like) else none
+    copies, later = _with_those_of_rest(stamps, values, like, later)
+    return none if _likely(values[~copies]) or not _out_of_the_way(stamps, values, like, ~copies) else (copies, later)
+
+
+def _with_those_of_rest(
+    stamps: NDArray[np.int64], values: NDArray[np.float64], like: Flags, later: NDArray[np.float64]
+) -> tuple[Flags, NDArray[np.float64]]:
+    """All copies of a relay whose lateness is known, and how late each is [s].
+
+    Each message of the driver has one about so much later, even where it equals many others, as those of a command at
+    rest do. When the driver moves on, the relay repeats the rest for a while.
+    """
+    usual = float(np.median(later[like]))
+    near = max(TWICE * float(np.quantile(np.abs(later[like] - usual), NEARLY_ALL)), SAME_TIME)
+    at, copies, later = (stamps - stamps[0]) / 1e9, like.copy(), np.where(like, later, 0.0)
+    repeated = set((np.searchsorted(at, at[like] - later[like] - SAME_TIME)).tolist())
+    for i in range(len(at)):
+        if copies[i] or i in repeated:
+            continue
+        first, last = np.searchsorted(at, [at[i] + usual - near, at[i] + usual + near])
+        candidates = [k for k in range(first, last) if not copies[k] and np.array_equal(values[k], values[i])]
+        if candidates:
+            k = min(candidates, key=lambda k: abs(at[k] - at[i] - usual))
+            copies[k], later[k] = True, at[k] - at[i]
+    return copies, later
 
 
 def _fresh(values: NDArray[np.float64]) -> Flags:
@@ -96,10 +118,10 @@ def _earlier(values: NDArray[np.float64]) -> tuple[Flags, NDArray[np.intp]]:
     return known, np.where(known, before, np.arange(n))
 
 
-def _out_of_the_way(stamps: NDArray[np.int64], values: NDArray[np.float64], copies: Flags) -> bool:
-    """Whether most copies lie off the way that the other messages go, as what was sent long before does."""
-    at, own = (stamps - stamps[0]) / 1e9, values[~copies]
-    t = at[~copies]
+def _out_of_the_way(stamps: NDArray[np.int64], values: NDArray[np.float64], copies: Flags, of_driver: Flags) -> bool:
+    """Whether most copies lie off the way that the driver's messages go, as what was sent long before does."""
+    at, own = (stamps - stamps[0]) / 1e9, values[of_driver]
+    t = at[of_driver]
     if len(t) < FEWEST:
         return False
     share = ((t[1:-1] - t[:-2]) / np.maximum(t[2:] - t[:-2], 1e-9))[:, None]

@@ -77,7 +77,7 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
     Args:
         samples: in the order of their stamps.
         wraps: period of the counter behind them, 0 for none.
-        acts_on: whether the last value before stands there, as that of a command does; not in long runs.
+        acts_on: whether the last value before stands there, as that of a command does; not where many are no numbers.
     """
     bad = np.isnan(samples.values)
     if not bad.any():
@@ -94,7 +94,7 @@ def filled_in(samples: TimedSamples, wraps: float = 0.0, acts_on: bool = False) 
             values[:, j] = np.where(_in_runs(missing[:, j]), np.nan, column[before])
             continue
         column = np.unwrap(column, period=wraps) if wraps else column
-        bridged = _bridged(times, times[good], column, _in_runs(missing[:, j], SMOOTH + 1))
+        bridged = _bridged(times, times[good], column)
         bridged[good] = column  # a spline may round it
         values[:, j] = bridged
     return replace(samples, values=values, filled=bad & ~np.isnan(values))
@@ -105,7 +105,7 @@ def absent_in(samples: TimedSamples) -> Flags:
     return np.zeros(samples.values.shape, bool) if samples.filled is None else samples.filled
 
 
-def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
+def _bridged(times: Array, known: Array, column: Array) -> Array:
     """A channel at all times: what is known, a spline between, straight lines where much is missing, shape (n,)."""
     from scipy.interpolate import CubicSpline
 
@@ -113,6 +113,9 @@ def _bridged(times: Array, known: Array, column: Array, long: Flags) -> Array:
     if len(known) < 4:
         return straight
     outside = (times < known[0]) | (times > known[-1])
+    steps = np.diff(known)
+    between = np.clip(np.searchsorted(known, times) - 1, 0, len(steps) - 1)
+    long = steps[between] > (SMOOTH + 1.5) * float(np.median(steps))
     return np.asarray(np.where(long | outside, straight, CubicSpline(known, column)(times)), dtype=np.float64)
 
 

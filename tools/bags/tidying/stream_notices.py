@@ -106,14 +106,15 @@ def clipping_notices(name: str, values: Array, channels: tuple[str, ...], unit: 
 
     Args:
         name: name of the stream.
-        values: samples, shape (n, m); a channel with NaN or infinite values is left out.
+        values: samples, shape (n, m); NaN was not measured.
         channels: name of each column.
         unit: unit of the values.
     """
     parts, total = [], 0
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     for column, channel in zip(values.T, channels, strict=True):
-        low, high = (column.min(), column.max()) if np.isfinite(column).all() and len(column) else (0.0, 0.0)
+        column = column[np.isfinite(column)]
+        low, high = (column.min(), column.max()) if len(column) else (0.0, 0.0)
         for extreme in (low, high):
             # the smaller end of a range is where a signal rests, not a limit
             is_limit = abs(extreme) > LIMIT_SHARE * largest

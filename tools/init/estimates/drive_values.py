@@ -156,7 +156,7 @@ def find_drives(
         _drive(equation, known, direction, link, joint in elastic)
         for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
     ]
-    shown = _turn_over(tree, equations, slope_noise(encoder.times, sigmas), elastic)
+    shown = _turn_over(tree, equations, slope_noise(encoder, sigmas), elastic)
     drives = [replace(drive, sharpness=k) for drive, k in zip(drives, shown, strict=True)]
     return Drives(told, drives, tree.gravity, reason, held)
 

@@ -105,16 +105,15 @@ class _Wiring:
 
     def left(self, signs: Signs = (), exchanged: Exchange | None = None) -> float:
         """Root mean square share of the torques that is left; infinite where a value would be impossible."""
-        q, u = self.encoder.values, self.command.values
-        order = np.arange(self.tree.n)
+        q, u = self.encoder, self.command
+        order = list(range(self.tree.n))
         if exchanged is not None:
             i, j = (self.tree.joints.index(joint) for joint in exchanged.joints)
-            order[[i, j]] = j, i
-            q = q[:, order] if POSITIONS in exchanged.columns else q
-            u = u[:, order] if COMMANDS in exchanged.columns else u
-        q = q * np.array(signs) if signs else q
-        turned = replace(self.encoder, values=q), replace(self.command, values=u)
-        equations = equations_of(self.tree, *turned, self.held)
+            order[i], order[j] = j, i
+            q = q.exchanged(order) if POSITIONS in exchanged.columns else q
+            u = u.exchanged(order) if COMMANDS in exchanged.columns else u
+        q = replace(q, values=q.values * np.array(signs)) if signs else q
+        equations = equations_of(self.tree, q, u, self.held)
         return open_share(equations) if all(map(_is_possible, equations)) else np.inf
 
 

@@ -154,8 +154,10 @@ def _continued(signal: Signal, turns: Mapping[str, float]) -> Signal:
     if not turns:
         return signal
     labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
-    columns = [
-        continued(signal.values[:, [k]], turns[label]) if label in turns else signal.values[:, [k]]
-        for k, label in enumerate(labels)
-    ]
-    return replace(signal, values=np.hstack(columns))
+    values = signal.values.copy()
+    for k, label in enumerate(labels):
+        if label in turns:
+            own = np.ones(len(values), bool) if signal.filled is None else ~signal.filled[:, k]
+            whole = continued(values[own][:, [k]], turns[label])[:, 0]
+            values[:, k] = np.interp(signal.times, signal.times[own], whole)
+    return replace(signal, values=values)

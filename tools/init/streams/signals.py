@@ -201,7 +201,7 @@ class _Field:
 def _field(raw: RawTopic, kind: MessageType, known: KnownField) -> _Field | None:
     """One field; None where it is empty in some messages or changes its length."""
     try:
-        columns = read_columns(raw, kind, known.path, acts_on=bool(COMMANDED.search(raw.name.lower())))
+        columns = read_columns(raw, kind, known.path)
     except RecordingError:
         return None
     width = columns.values.shape[1]

@@ -33,6 +33,6 @@ class SwappedAxes(SimulatedEffect):
                 f"effect {self.id}@{self.owner}: swap must be 12 (x and y), 13 (x and z) or 23 (y and z), got {value:g}"
             )
 
-    def logged(self, sensor: Sensor, values: Array) -> Array:
+    def logged(self, sensor: Sensor, stamps: Array, values: Array) -> Array:
         """Rates in the wrong order, shape (m, 3) [rad/s]."""
         return values[:, list(SWAPS[int(self.parameters["swap"])])] if self.sensed_by(sensor) else values

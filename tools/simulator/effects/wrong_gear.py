@@ -30,7 +30,7 @@ class WrongGear(SimulatedEffect):
         if value == 0:
             raise EffectError(f"effect {self.id}@{self.owner}: {name} must not be zero")
 
-    def logged(self, sensor: Sensor, values: Array) -> Array:
+    def logged(self, sensor: Sensor, stamps: Array, values: Array) -> Array:
         """Scaled angles, shape (m, n_joints) [rad]."""
         scaled, channels = np.array(values), self.encoder_channels(sensor)
         scaled[:, channels] *= self.parameters["factor"]

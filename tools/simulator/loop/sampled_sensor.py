@@ -57,7 +57,7 @@ class SampledSensor:
 
     def stream(self, trajectory: Trajectory) -> Stream:
         """What a bag holds of the samples that were taken before the end and not lost."""
-        values = logged(self._effects, self.sensor, self.given_out(trajectory, slice(None)))
+        values = logged(self._effects, self.sensor, self.stamps, self.given_out(trajectory, slice(None)))
         kept = (self.taken <= trajectory.end) & self.kept
         sensor = self.sensor
         return Stream(

@@ -159,7 +159,7 @@ class SimulatedEffect:
         """
         return values
 
-    def logged(self, sensor: Sensor, values: Array) -> Array:
+    def logged(self, sensor: Sensor, stamps: Array, values: Array) -> Array:
         """What the bag holds instead of what the sensor gave out, shape (m, channels); the controller sees none."""
         return values
 

@@ -40,8 +40,8 @@ def distort(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array, v
     return values
 
 
-def logged(effects: Sequence[SimulatedEffect], sensor: Sensor, values: Array) -> Array:
+def logged(effects: Sequence[SimulatedEffect], sensor: Sensor, stamps: Array, values: Array) -> Array:
     """What the bag holds of what a sensor gave out, shape (m, channels)."""
     for effect in effects:
-        values = effect.logged(sensor, values)
+        values = effect.logged(sensor, stamps, values)
     return values

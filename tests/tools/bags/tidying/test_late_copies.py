@@ -19,9 +19,10 @@ def driver(n=400, seed=1):
     return STEP * np.arange(n), np.column_stack([np.sin(3 * t), np.cos(5 * t)]) + noise
 
 
-def with_relay(later, every):
-    """The driver's messages among those of a relay, and which are the relay's."""
+def with_relay(later, every, resting=0):
+    """The driver's messages among those of a relay, and which are the relay's; the driver rests now and then."""
     stamps, values = driver()
+    values[np.arange(len(values)) % 100 < resting] = 0.25
     repeated = np.flatnonzero(stamps + later < stamps[-1])[::every]
     both = np.concatenate([stamps, stamps[repeated] + later])
     order = np.argsort(both, kind="stable")
@@ -37,6 +38,15 @@ def test_messages_of_a_relay_are_left_out_and_said(later, every):
     assert kept.stamps.tolist() == samples.stamps[~is_relay].tolist()
     assert notice.kind == "foreign" and notice.count == is_relay.sum()
     assert f"{is_relay.sum()} messages of a second node that repeats those of the driver" in notice.text
+
+
+@pytest.mark.parametrize("resting", (10, 35, 70))
+@pytest.mark.parametrize("later", (61_000_000, 305_000_000))
+def test_a_relay_of_commands_that_rest_is_left_out_whole(later, resting):
+    samples, is_relay = with_relay(later, 1, resting)
+    kept, (notice,) = without_late_copies("command", samples)
+    assert kept.stamps.tolist() == samples.stamps[~is_relay].tolist()
+    assert notice.count == is_relay.sum()
 
 
 def test_a_driver_alone_loses_nothing():

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import math
 
-from jointscope.graphs.calibration.motion_regimes import REGIMES
 from jointscope.graphs.comparison.failure_analysis import ChannelFailure, FailureAnalysis
+from jointscope.graphs.problem.motion_regimes import REGIMES
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.report.page.heat_table import HeatCell, heat_table
 from jointscope.tools.report.page.page import Section

@@ -2,8 +2,15 @@
 """What frequency responses tell of the shared values, as one Gaussian factor that holds what is in doubt.
 
 With slopes g = J'r and information A = J'J of the whitened residuals at some values, the slope has not the covariance A
-that white residuals give it, but S: what bands of neighbouring lines have in common where that is more, and the slope
-that friction of the other size would add. The values that the responses alone prefer then have the information
+that white residuals give it, but S, which in coordinates where A is one is one and more:
+
+- where bands of neighbouring lines have one cause, what they have in common;
+- in the directions of the friction what periods show: noise of a velocity that turns over is a push, and comes back at
+  all lines;
+- what friction does above the band of the velocities. Halves of the band differ by ever less, by a factor rho, each in
+  another direction, so that all above it adds up to the last difference over the root of rho^2 - 1.
+
+The values that the responses alone prefer then have the information
 
     M = A S^-1 A  <=  A
 
@@ -21,9 +28,12 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.robots.model.robot import Robot
+from jointscope.robots.files.frequency_section import COULOMB
+from jointscope.robots.model.robot import SHARPNESS, Robot
 
 Array = NDArray[np.float64]
+DRY = (COULOMB, SHARPNESS)  # parameters of the dry friction
+LEAST_FALL = np.sqrt(2.0)  # of what half of the band is worth, from half to half
 TOLD = 1e-9  # of the largest eigenvalue, in prior sigmas: directions with less information are not told
 
 
@@ -49,12 +59,14 @@ class FrequencySummary:
     priors: tuple[()] = field(default=(), init=False)
 
     @staticmethod
-    def of(problems: Sequence[FrequencySet], calibration: Calibration) -> FrequencySummary:
+    def of(problems: Sequence[FrequencySet], calibration: Calibration, apart: bool = False) -> FrequencySummary:
         """Summary of poses at their last stage.
 
         Args:
             problems: the poses.
             calibration: values that were found, of blocks that they touch.
+            apart: whether these recordings may prefer other values, as a part of those that found these: what all their
+                bands have in common is then no doubt, but what they ask for.
         """
         robot = problems[0].robot
         unit = np.array([robot.parameters[name].coordinate_sigma for name in calibration.names])
@@ -64,11 +76,16 @@ class FrequencySummary:
         size, V = np.linalg.eigh(A)
         told = size > TOLD * size[-1]
         root = V[:, told] / np.sqrt(size[told])  # A^-1/2 on what is told
-        bands = np.vstack([problem.slopes(calibration) for problem in problems]) * unit @ root
-        doubt = np.sum([problem.doubt(calibration) for problem in problems], axis=0) * unit @ root
-        common, U = np.linalg.eigh(bands.T @ bands)
-        S = (U * np.maximum(common, 1.0)) @ U.T + np.outer(doubt, doubt)
+        slopes = [problem.slopes(calibration) for problem in problems]
+        bands = np.vstack([_about_mean(part) for part in slopes] if apart else slopes) * unit @ root
         half = V[:, told] * np.sqrt(size[told])
+        common, U = np.linalg.eigh(bands.T @ bands)
+        doubt = _doubt(problems, calibration, unit, root)
+        S = (U * np.maximum(common, 1.0)) @ U.T + np.outer(doubt, doubt)
+        friction = [i for i, name in enumerate(calibration.names) if name.endswith(DRY)]
+        S += _pushes(
+            np.vstack([problem.noise_slopes(calibration) for problem in problems]) * unit @ root, half[friction]
+        )
         M = half @ np.linalg.solve(S, half.T)
         preferred = calibration.dynamics - unit * (root @ (root.T @ g))
         return FrequencySummary(robot, M / np.outer(unit, unit), preferred, sum(p.measured for p in problems))
@@ -89,3 +106,29 @@ class FrequencySummary:
         system.g_p += self.information @ away
         system.cost += 0.5 * float(away @ self.information @ away)
         return system
+
+
+def _about_mean(bands: Array) -> Array:
+    """Slopes of bands, shape (b, p), without what they have in common."""
+    b = len(bands)
+    return np.asarray((bands - bands.mean(axis=0)) * np.sqrt(b / max(b - 1, 1)))
+
+
+def _pushes(noise: Array, friction: Array) -> Array:
+    """What noise adds to S in the directions of friction.
+
+    Args:
+        noise: slopes by it, shape (s, m).
+        friction: these directions, shape (f, m).
+    """
+    Q = np.linalg.qr(friction.T)[0]
+    size, U = np.linalg.eigh(Q.T @ noise.T @ noise @ Q)
+    return np.asarray((Q @ U * np.maximum(size - 1.0, 0.0)) @ (Q @ U).T)
+
+
+def _doubt(problems: Sequence[FrequencySet], calibration: Calibration, unit: Array, root: Array) -> Array:
+    """Slope that all friction above the band of the velocities may add, shape (m,)."""
+    last, before = (sum(p.doubt(calibration, share) for p in problems) * unit @ root for share in (1.0, 0.5))
+    size = float(np.linalg.norm(last))
+    fall = max(float(np.linalg.norm(before)) / size, LEAST_FALL) if size > 0.0 else LEAST_FALL
+    return np.asarray(last / np.sqrt(fall**2 - 1.0))

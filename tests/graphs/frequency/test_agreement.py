@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jointscope.graphs.joint_kinds.agreement import agreement
+from jointscope.graphs.frequency.agreement import agreement
 
 
 def told(H, true, rng):

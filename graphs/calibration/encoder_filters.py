@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The filters of encoders: held until the noise is known, then found by the cost of several of them.
+
+Readings of a filter hang on accelerations. While the process noise is loose these follow every sample, and the longest
+filter, which asks for the least of them, costs least. Where the noise is small, friction that turns over has kinks
+there that no iteration crosses. The cost of solutions with given filters has neither trouble: it is a parabola.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.calibration.whole_stage import WholeStage, anchored
+from jointscope.graphs.scoring.lacking_effects import LackingEffect
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
+from jointscope.robots.errors import SolveError
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.robot import Robot
+
+TRIED = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0]) * 1e-3  # [s] time constants of first order
+ITERATIONS = 12  # of each trial
+PARABOLAS = 3  # at the most
+FAR = 4.0  # times the lowest cost, beyond which no longer filter is tried
+SURELY = 5.0  # [sigma] from which a delay is one
+LABEL = "encoder_filter@robot"
+NEAR = 0.03  # relative change of a variance that changes nothing
+ROUNDS = 3  # of a filter, and of the noise that is found with it
+
+
+def free_filters(robot: Robot) -> tuple[str, ...]:
+    """Full names of the variances that a calibration looks for."""
+    filters = [here for here in robot.effects if isinstance(here.effect, SmoothedReading)]
+    names = [here.parameter(here.effect.variance) for here in filters if isinstance(here.effect, SmoothedReading)]
+    return tuple(name for name in names if not robot.parameters[name].fixed)
+
+
+def with_filters(robot: Robot, values: dict[str, float], fixed: bool) -> Robot:
+    """The robot with these variances, held or free."""
+    own = {n: replace(robot.parameters[n], value=value, fixed=fixed) for n, value in values.items()}
+    return replace(robot, parameters={**robot.parameters, **own})
+
+
+def solved_with_filters(stage: WholeStage, held: Solved, names: tuple[str, ...]) -> Solved:
+    """The solution with filters free, from the one with filters held.
+
+    Args:
+        stage: solves.
+        held: where the robot's filters are held at their start.
+        names: of their variances.
+    """
+    values = {name: held.robot.parameters[name].value for name in names}
+    for _ in range(ROUNDS):
+        before = dict(values)
+        for name in names:
+            values = {**values, name: _Trials(stage, held, with_filters(held.robot, values, True), name).best()}
+        robot = with_filters(held.robot, values, fixed=True)
+        held = _settled(stage, held, robot)
+        if all(abs(values[name] - before[name]) < NEAR * before[name] for name in names):
+            break
+    return _settled(stage, held, with_filters(held.robot, values, fixed=False))
+
+
+def _settled(stage: WholeStage, solved: Solved, robot: Robot) -> Solved:
+    """The solution of another robot from here."""
+    estimate = solved.solution.estimate
+    calibrations = tuple(c.carried_to(Calibration.of(robot)) for c in estimate.calibrations)
+    problems = anchored([p.of_robot(robot) for p in solved.problems], calibrations)
+    noise = solved.problems[0].dynamics.steps.noise
+    return stage.settled(problems, noise, Estimate(estimate.states, calibrations))
+
+
+def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
+    """Filters of all encoders, where a delay was found and the same noise makes them likelier than none.
+
+    A linear step does not tell: it freezes the moments at which joints turn over, and a filter moves them.
+
+    Args:
+        stage: solves.
+        solved: a solution without filters.
+    """
+    robot = solved.robot
+    if not _is_late(robot, solved) or any(isinstance(here.effect, SmoothedReading) for here in robot.effects):
+        return None
+    effect, owner = LABEL.split("@")
+    with_one = add_effect(robot, LABEL)
+    (name,) = free_filters(with_one)
+    trials = _Trials(stage, solved, with_filters(with_one, {name: float(TRIED[0]) ** 2}, True), name)
+    best = trials.best()
+    fall = solved.solution.cost - trials.costs[best]
+    if not trials.is_between(best) or not fall > 0.0:
+        return None
+    calibration = trials.found[best].calibrations[0]
+    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    return LackingEffect(effect, owner, float(chdtrc(1.0, 2.0 * fall)), fall, values, tried=True)
+
+
+def _is_late(robot: Robot, solved: Solved) -> bool:
+    """Whether the calibration found a delay that is one."""
+    names = solved.solution.estimate.calibrations[0].names
+    sigmas = np.sqrt(np.diag(solved.covariance))
+    found = dict(zip(names, solved.solution.estimate.calibrations[0].values.tolist(), strict=True))
+    late = [i for i, n in enumerate(names) if n in robot.parameters and n.endswith(".delay")]
+    return any(found[names[i]] > SURELY * sigmas[i] for i in late)
+
+
+@dataclass
+class _Trials:
+    """Costs by the variance of one filter, all other values free, the noise as it is.
+
+    Attributes:
+        stage: solves.
+        solved: where to start, and the noise.
+        robot: the model with all filters held.
+        name: of the variance that is tried.
+        costs, found: by variance.
+    """
+
+    stage: WholeStage
+    solved: Solved
+    robot: Robot
+    name: str
+    costs: dict[float, float] = field(default_factory=dict)
+    found: dict[float, Estimate] = field(default_factory=dict)
+
+    def best(self) -> float:
+        """The variance at which the cost is lowest."""
+        start = estimate = self.solved.solution.estimate
+        for variance in sorted({*(TRIED**2).tolist(), self.robot.parameters[self.name].value}):
+            estimate = self._tried(variance, estimate)
+            if self.costs[variance] > FAR * min(self.costs.values()):
+                break
+        for _ in range(PARABOLAS):
+            lowest = min(self.costs, key=self.costs.__getitem__)
+            between = _vertex(self.costs, lowest)
+            if between is None or abs(between - lowest) < NEAR * lowest:
+                break
+            self._tried(between, self.found.get(lowest, start))
+        return min(self.costs, key=self.costs.__getitem__)
+
+    def is_between(self, variance: float) -> bool:
+        """Whether larger and smaller ones were tried and cost more."""
+        return min(self.costs) < variance < max(self.costs)
+
+    def _tried(self, variance: float, estimate: Estimate) -> Estimate:
+        robot = with_filters(self.robot, {self.name: variance}, fixed=True)
+        problems = anchored([p.of_robot(robot) for p in self.solved.problems], estimate.calibrations)
+        noise = self.solved.problems[0].dynamics.steps.noise
+        try:
+            solution = self.stage.step("filters of encoders", problems, noise, estimate, ITERATIONS)
+        except SolveError:
+            self.costs[variance] = float("inf")
+            return estimate
+        self.costs[variance], self.found[variance] = solution.cost, solution.estimate
+        return solution.estimate
+
+
+def _vertex(costs: dict[float, float], lowest: float) -> float | None:
+    """Lowest point of the parabola through a value and its neighbours; None at an end."""
+    values = sorted(costs)
+    i = values.index(lowest)
+    if not 0 < i < len(values) - 1:
+        return None
+    near = np.array(values[i - 1 : i + 2])
+    a, b, _ = np.polyfit(near - lowest, [costs[value] for value in near.tolist()], 2)
+    return float(lowest - b / (2.0 * a)) if np.isfinite(a) and a > 0.0 else None
