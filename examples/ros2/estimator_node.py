@@ -44,8 +44,9 @@ class EstimatorNode(Node):
         for stream in needed_streams(robot):
             if stream.source.msgtype not in TYPES:
                 raise js.errors.RobotError(f"{stream.source.topic}: expected one of {', '.join(TYPES)}")
-            take = partial(self.take, stream)
-            self.create_subscription(TYPES[stream.source.msgtype], stream.source.topic, take, qos_profile_sensor_data)
+            take, kind = partial(self.take, stream), TYPES[stream.source.msgtype]
+            for topic in map(str.strip, stream.source.topic.split("+")):  # one for each joint: /a/states + /b/states
+                self.create_subscription(kind, topic, take, qos_profile_sensor_data)
         self.states = self.create_publisher(JointState, "~/joint_states", 10)
         self.means = self.create_publisher(Float64MultiArray, "~/state", 10)
         self.covariances = self.create_publisher(Float64MultiArray, "~/covariance", 10)

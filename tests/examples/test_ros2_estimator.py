@@ -105,6 +105,23 @@ def yaml_value(text: str):
         return text
 
 
+def test_joints_with_topics_of_their_own_are_all_heard(module, doggy, monkeypatch):
+    joined = dataclasses.replace(doggy.motor_encoder.source, topic="/a/states + /b/states")
+    robot = doggy.with_sensors({doggy.motor_encoder.name: dataclasses.replace(doggy.motor_encoder, source=joined)})
+    monkeypatch.setattr(module.js, "load_robot", lambda name: robot)
+    node = module.EstimatorNode()
+    assert {"/a/states", "/b/states"} <= set(node.heard)
+    assert not any("+" in topic for topic in node.heard)
+    stamp = SimpleNamespace(sec=EPOCH, nanosec=0)
+    taken = []
+    monkeypatch.setattr(node.estimator, "sample", lambda name, t, values: taken.append((name, values.tolist())))
+    for topic, joint, position in (("/a/states", "joint1", 0.25), ("/b/states", "joint3", 0.5)):
+        ((_, callback),) = node.heard[topic]
+        callback(JointState(header=SimpleNamespace(stamp=stamp), name=[joint], position=[position]))
+    assert [name for name, _ in taken] == ["motor_encoder"] * 2
+    np.testing.assert_array_equal([values for _, values in taken], [[0.25, np.nan, np.nan], [np.nan, np.nan, 0.5]])
+
+
 def test_messages_for_other_joints_alone_are_not_taken(module):
     node = module.EstimatorNode()
     stream = next(s for s in needed_streams(module.js.load_robot("doggy")) if s.name == "motor_encoder")

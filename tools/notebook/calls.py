@@ -239,7 +239,7 @@ def simulate(
         robot: the truth, where it has no published values.
         bag: where to write the recording; nowhere if not given.
         motion: "calibration", or "moves" to judge by.
-        seconds: duration [s].
+        seconds: duration [s]; 65 for the motion "calibration" and 30 for "moves" if not given.
         seed: of robot, motion and noise; the same seed is the same robot.
         effects: ID@OWNER[:param=value,...] that the robot has.
         conditions: everything else that `jointscope.tools.simulator.simulation.simulate` takes, as friction="smooth".

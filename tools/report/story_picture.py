@@ -26,4 +26,4 @@ def story_picture(result: Discovery) -> str:
     for window in compared.models[0].worst[:1]:
         plots = window_plots(compared, window, LEFT + BAR + RIGHT)
         parts.append(stacked(plots, window_keys(compared), WINDOW))
-    return picture(stacked(parts))
+    return picture(stacked(parts, spoken=f"{STEPS}; {WINDOW[0].lower()}{WINDOW[1:]}"))

@@ -44,11 +44,12 @@ def run_frequency_calibration(
     from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
     from jointscope.tools.report.frequency_report import frequency_report
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
+    from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not frequency responses; use --report")
     result = calibrate_frequency(robot, read_all_shaken(robot, paths, progress), progress)
-    content = result.to_json()
+    content = result.to_json() | judge_frequency(result).to_json()
     checked = check_models(limits, {robot.name: content})
     page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
     write_still(files, result.robot, frequency_origin(result, robot), page, content)

@@ -16,6 +16,7 @@ from jointscope.tools.report import calibration_report, comparison_report, diagn
 from jointscope.tools.report.page.page import Key
 from jointscope.tools.report.page.report_figures import report_figures
 from jointscope.tools.report.page.stacked import stacked
+from jointscope.tools.report.story_picture import story_picture
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_comparison
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -77,3 +78,19 @@ def test_a_folder_that_cannot_be_is_told_before_the_work(tmp_path):
         ResultFiles(figures=tmp_path / "file")
     with pytest.raises(JointscopeError, match=r"the folder .*no does not exist; create it first$"):
         ResultFiles(figures=tmp_path / "no" / "pictures")
+
+
+def test_a_legend_shows_a_dot_for_dots_and_an_area_for_a_band():
+    keys = [Key("measured", "k0", "dots"), Key("model", "k1"), Key("two sigmas", "k1", "band")]
+    root = ElementTree.fromstring(stacked(['<svg viewBox="0 0 100 50"></svg>'], keys))
+    shapes = [path.attrib["d"] for path in root.iter("path")]
+    assert re.fullmatch(r"M[\d.]+ [\d.]+h0", shapes[0])
+    assert re.fullmatch(r"M[\d.]+ [\d.]+h[1-9]\d*", shapes[1])
+    assert shapes[2].endswith("z")
+
+
+def test_the_picture_of_a_story_says_what_it_shows_to_those_who_hear_it():
+    outer = ElementTree.fromstring(story_picture(fake_discovery()))
+    assert "step by step" in outer.attrib["aria-label"]
+    kept = ElementTree.parse(Path(__file__).parents[3] / "docs" / "pictures" / "story.svg").getroot()
+    assert kept.attrib["aria-label"] == outer.attrib["aria-label"]

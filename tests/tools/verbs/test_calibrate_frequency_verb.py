@@ -97,6 +97,8 @@ def test_robot_file_report_and_json_are_written(tmp_path, capsys):
     robot = load_robot(tmp_path / "arm.yaml")
     assert 0.0 < robot.parameters["joint1.stiffness"].sigma < 1000.0
     content = json.loads((tmp_path / "arm.json").read_text())
+    assert content["verdict"]["text"] in (tmp_path / "arm.html").read_text()
+    assert all(check["name"] and check["verdict"] and check["why"] for check in content["checks"])
     assert content["undetermined"] == [{"joint2.bearing.damping_x": 1.0}]
     assert set(content["frequency"]["entries"]) == {f"{i},{j}" for i in (1, 2, 3) for j in (1, 2, 3)}
     page = (tmp_path / "arm.html").read_text()

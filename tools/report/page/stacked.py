@@ -18,13 +18,14 @@ OPENING = re.compile(r"<svg\b([^>]*)>")
 SIZE = re.compile(r' (?:width|height|style)="[^"]*"')
 
 
-def stacked(elements: Sequence[str], keys: Sequence[Key] = (), title: str = "") -> str:
+def stacked(elements: Sequence[str], keys: Sequence[Key] = (), title: str = "", spoken: str = "") -> str:
     """Puts pictures beside each other while there is room, the others below.
 
     Args:
         elements: SVG elements with a viewBox in pixels.
         keys: legend above them.
         title: line above everything; plain text.
+        spoken: what it shows, for those who hear it; the title if not given.
 
     Returns:
         One SVG element with a viewBox in pixels.
@@ -41,9 +42,13 @@ def stacked(elements: Sequence[str], keys: Sequence[Key] = (), title: str = "") 
         width = max(width, x - GAP)
     head = f'<text class="title" x="0" y="13">{escape(title)}</text>' if title else ""
     return (
-        f'<svg viewBox="0 0 {width:g} {y + row:g}" role="img" aria-label="{escape(title, quote=True)}">'
+        f'<svg viewBox="0 0 {width:g} {y + row:g}" role="img" aria-label="{escape(spoken or title, quote=True)}">'
         f"{head}{legend}{''.join(placed)}</svg>"
     )
+
+
+_SAMPLES = {"band": "M{x:g} {top:g}h{width}v8h-{width}z", "dots": "M{centre:g} {middle:g}h0"}
+"""What a legend shows of a style; a line of all others."""
 
 
 def _legend(keys: Sequence[Key], width: float, y: float) -> tuple[str, float]:
@@ -53,7 +58,9 @@ def _legend(keys: Sequence[Key], width: float, y: float) -> tuple[str, float]:
         length = SAMPLE + 8 + CHARACTER * len(key.text) + 16
         if x and x + length > width:
             x, y = 0.0, y + LINE
-        shape = f"M{x:g} {y + 6:g}h{SAMPLE}v8h-{SAMPLE}z" if key.style == "band" else f"M{x:g} {y + 10:g}h{SAMPLE}"
+        shape = _SAMPLES.get(key.style, "M{x:g} {middle:g}h{width}").format(
+            x=x, top=y + 6.0, middle=y + 10.0, width=SAMPLE, centre=x + 0.5 * SAMPLE
+        )
         parts.append(
             f'<path class="{key.style} {key.colour}" d="{shape}"/>'
             f'<text class="name" x="{x + SAMPLE + 6:g}" y="{y + 10:g}">{escape(key.text)}</text>'
