@@ -149,9 +149,12 @@ class WholeStage:
             self.progress("residuals and uncertainties", 0.9)
             solved = Solved.of([p.with_noise(noise) for p in problems], solution, self.hold, self._sets_of(problems))
             yield solved
-            other = _with_sigmas(problems, solved, self.stated) if self.sigmas else None
             better = scaled(noise, solved.evidence.factors) if noise.estimate else noise
-            if other is None and np.all(np.abs(np.log(densities(better) / densities(noise))) < NOISE_AGREES):
+            change = np.log(densities(better) / densities(noise))
+            # states that a large process noise lets follow the samples leave less of their noise than there is
+            follow = bool(np.any(change < -NOISE_AGREES))
+            other = _with_sigmas(problems, solved, self.stated) if self.sigmas and not follow else None
+            if other is None and np.all(np.abs(change) < NOISE_AGREES):
                 break
             noise = updates.update(noise, solved.evidence.factors) if noise.estimate else noise
             problems, estimate = other or problems, solution.estimate

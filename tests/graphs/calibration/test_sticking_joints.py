@@ -71,3 +71,16 @@ def test_a_push_on_a_sticking_arm_is_found_when_and_where_it_was(robot):
     assert moment.row == "j1.link"
     assert moment.t0 < PUSH[0] + 0.1 and moment.t1 > PUSH[1] - 0.1
     assert moment.torque == pytest.approx(PUSH[3], rel=0.2)
+
+
+@pytest.mark.parametrize("stated", [2.0e-5, 2.3e-5])
+def test_a_sticking_arm_that_is_sampled_slowly_keeps_the_noise_of_its_encoder(tmp_path, stated):
+    heavy = Arm("yy", inertia=(0.3, 0.08), dry=(4.0, 1.2), viscous=(0.4, 0.1))
+    encoder, command = moved(heavy, encoder_rate=50.0, command_rate=50.0, noise=2e-5, sticks=True)
+    path = robot_file(heavy, tmp_path)
+    path.write_text(path.read_text().replace("sigma: 1.0e-5", f"sigma: {stated}"))
+    result = calibrate(load_robot(path), [Recording("slow.mcap", "", 10**18, {"encoder": encoder, "command": command})])
+    assert_right(heavy, result.parameters, rel=0.015)
+    # at a process noise that is still too large the states follow the samples, and what they leave looks smaller
+    np.testing.assert_allclose(result.robot.motor_encoder.sigmas, 2e-5, rtol=0.2)
+    assert judge(result).level in ("good", "warn")
