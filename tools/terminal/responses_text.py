@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, entries
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
-from jointscope.tools.presentation.numbers import percent, with_sigma
+from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
@@ -73,3 +78,58 @@ def frequency_calibration_text(result: FrequencyCalibration) -> str:
         text_table(["parameter", "start", "value", "± sigma", "unit", ""], value_rows(result), "<>>><<"),
     ]
     return "\n".join(lines)
+
+
+ERROR_HEAD = ["model", "from", "to", "error [dB]", "floor [dB]", "error [sigma]"]
+BALANCE_HEAD = ["model", "pose", "motor", "torque left", "times the noise"]
+
+
+def error_rows(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> list[list[str]]:
+    """Each entry of each model, over lines and poses."""
+    rows = []
+    for label, poses in by_label.items():
+        matrix = poses[0].pose.matrix
+        for key, entry in entries(poses).items():
+            i, j = (int(place) - 1 for place in key.split(","))
+            numbers = (significant(entry[part], 2) for part in ("db", "floor_db", "sigmas"))
+            rows.append([label, matrix.inputs[j], matrix.outputs[i], *numbers])
+    return rows
+
+
+def balance_rows(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> list[list[str]]:
+    """What each model leaves of each motor's torque, pose by pose."""
+    rows = []
+    for label, poses in by_label.items():
+        for one in poses:
+            for i, motor in enumerate(one.pose.matrix.inputs):
+                noise = one.fit.over_noise
+                times = "one period" if noise is None else significant(float(noise[i]), 2)
+                rows.append([label, one.pose.path, motor, percent(float(one.fit.left[i])), times])
+    return rows
+
+
+def frequency_errors_text(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> str:
+    """A comparison of models."""
+    first = next(iter(by_label.values()))
+    count = sum(len(one.pose.lines) for one in first)
+    lines = [
+        f"{len(first)} poses, {count} lines: size of the model's matrix over the measured one, what the spread of the "
+        "measured one alone would make of it, and the distance in its sigmas (root mean squares)",
+        text_table(ERROR_HEAD, error_rows(by_label), "<<<>>>"),
+        "",
+        "What the torque balance, which knows dry friction, leaves, and its power over that of the noise",
+        text_table(BALANCE_HEAD, balance_rows(by_label), "<<<>>"),
+    ]
+    worst = [
+        f"{label} is furthest off at {far[1]:.3g} Hz in {far[2]}: {significant(far[0], 2)} sigmas"
+        for label, poses in by_label.items()
+        for far in [max(_furthest(one) for one in poses)]
+    ]
+    return "\n".join([*lines, "", *(f"  - {text}" for text in worst)])
+
+
+def _furthest(one: FrequencyErrors) -> tuple[float, float, str]:
+    """Largest distance of a pose in sigmas, its frequency, and the path."""
+    by_line = one.sigmas.max(axis=(1, 2))
+    k = int(np.argmax(by_line))
+    return float(by_line[k]), float(one.pose.w[k] / (2.0 * np.pi)), one.pose.path
