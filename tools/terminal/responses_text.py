@@ -21,9 +21,12 @@ def response_text(found: MeasuredResponse) -> str:
     """The summary of one recording."""
     matrix, excitation = found.matrix, found.spectra.excitation
     f = matrix.frequencies
+    periods = f"{len(found.spectra.U)} experiments of {matrix.periods} steady periods"
+    whole = found.distortions is not None
+    apart = excitation.f0 if whole else float(np.median(np.diff(f)))
     lines = [
-        f"{found.spectra.path}: {len(f)} lines from {f[0]:g} to {f[-1]:g} Hz, {excitation.f0:.6g} Hz apart; "
-        f"{len(found.spectra.U)} experiments of {matrix.periods} steady periods"
+        f"{found.spectra.path}: {len(f)} lines from {f[0]:.6g} to {f[-1]:.6g} Hz, {apart:.6g} Hz apart; "
+        + (periods if whole else f"a stretch of {1.0 / excitation.f0:.4g} s without whole periods")
         + (" (pairs of both signs)" if found.spectra.common is not None else ""),
         f"  excitation: {excitation.source}; total covariance: {matrix.total_from}",
         "",
@@ -31,8 +34,16 @@ def response_text(found: MeasuredResponse) -> str:
     ]
     if found.resonances:
         lines += ["", text_table(RESONANCE_HEAD, resonance_rows(found), "<<<>>>>")]
-    even, odd = len(found.distortions.even.frequencies), len(found.distortions.odd.frequencies)
-    if not even + odd:
+    d = found.distortions
+    if d is None:
+        lines += [
+            "",
+            "Without whole periods noise and distortions cannot be told apart; resonances narrower than the lines",
+        ]
+        lines[-1] += (
+            " about each come out too flat, with larger sigmas. Record two periods or more (docs/frequency.md)."
+        )
+    elif not len(d.even.frequencies) + len(d.odd.frequencies):
         lines += ["", "All lines were excited, so even and odd distortions cannot be told apart."]
     return "\n".join(lines)
 
@@ -42,7 +53,7 @@ def entry_rows(matrix: ResponseMatrix) -> list[list[str]]:
     noise = None if matrix.noise is None else matrix.relative(matrix.noise)
     total = matrix.relative(matrix.total)
     return [
-        [source, target, "one period" if noise is None else percent(float(noise[i, j])), percent(float(total[i, j]))]
+        [source, target, "not told" if noise is None else percent(float(noise[i, j])), percent(float(total[i, j]))]
         for i, target in enumerate(matrix.outputs)
         for j, source in enumerate(matrix.inputs)
     ]
