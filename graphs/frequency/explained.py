@@ -112,7 +112,7 @@ def explained(robot: Robot, problems: Sequence[FrequencySet]) -> Explained:
         problems: the poses.
     """
     at = Calibration.of(robot).only([DYNAMICS])
-    poses = tuple(_fit(problem, at) for problem in problems)
+    poses = tuple(pose_fit(problem, at) for problem in problems)
     paths = [problem.pose.path for problem in problems]
     alone = {path: [problem] for path, problem in zip(paths, problems, strict=True)}
     numbers = sorted({int(r) for problem in problems for r in problem.pose.found.realisations})
@@ -124,7 +124,8 @@ def explained(robot: Robot, problems: Sequence[FrequencySet]) -> Explained:
     return Explained(poses, _against_others(robot, alone, at), _against_others(robot, parts, at), heldout, fitted)
 
 
-def _fit(problem: FrequencySet, at: Calibration) -> PoseFit:
+def pose_fit(problem: FrequencySet, at: Calibration) -> PoseFit:
+    """What the balance of a pose leaves at some values."""
     pose, values = problem.pose, problem.values(at)
     r = problem.torque_balance(values, problem.stiffness(values))
     left = np.sqrt(np.mean(np.abs(r) ** 2, axis=(0, 1)) / np.mean(np.abs(pose.torques) ** 2, axis=(0, 1)))

@@ -32,6 +32,10 @@ APART = 10.0  # between lines that are excited and those that are not
 LEAST = 16  # samples of a period
 
 
+class NoPeriodsError(RecordingError):
+    """A recording that does not repeat itself for two whole periods."""
+
+
 def find_excitation(drive: Signal, inputs: int, path: str) -> Excitation:
     """The excitation of a recording.
 
@@ -41,7 +45,8 @@ def find_excitation(drive: Signal, inputs: int, path: str) -> Excitation:
         path: of the recording.
 
     Raises:
-        RecordingError: it never repeats itself, or nothing stands out.
+        NoPeriodsError: it never repeats itself.
+        RecordingError: it never changes, or nothing stands out.
     """
     edges = np.flatnonzero(np.diff(drive.times) > GAP * drive.step) + 1
     stretches = np.split(np.arange(len(drive.times)), edges)
@@ -53,7 +58,7 @@ def find_excitation(drive: Signal, inputs: int, path: str) -> Excitation:
     N = _period([u[s] for s in stretches], path)
     found = [(s[a], count) for s in stretches for a, count in _repeats(u[s], N)]
     if not found:
-        raise RecordingError(_no_periods(path))
+        raise NoPeriodsError(_no_periods(path))
     spectra = np.array(
         [np.fft.rfft(u[a : a + count * N].reshape(count, N, -1).mean(axis=0), axis=0) for a, count in found]
     )
@@ -93,7 +98,7 @@ def _period(stretches: Sequence[Array], path: str) -> int:
             off = np.concatenate([_off(u, N)[0] for u in stretches if len(u) > N])
             found.append((N, float(np.median(off))))
     if not found:
-        raise RecordingError(_no_periods(path))
+        raise NoPeriodsError(_no_periods(path))
     least = min(off for _, off in found)
     return next(N for N, off in found if off <= AS_GOOD * least + EXACTLY)
 

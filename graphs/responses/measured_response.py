@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from jointscope.graphs.responses.distortions import Distortions, distortions
+from jointscope.graphs.responses.local_polynomials import response_without_periods
 from jointscope.graphs.responses.resonances import Resonance, resonances
 from jointscope.graphs.responses.response_matrix import ResponseMatrix, response_matrix
 from jointscope.graphs.responses.spectra import Spectra, spectra
@@ -20,26 +21,34 @@ class MeasuredResponse:
     Attributes:
         spectra: of its experiments.
         matrix: with covariances.
-        distortions: on lines that were not excited.
+        distortions: on lines that were not excited; None without whole periods.
         resonances: and anti-resonances.
     """
 
     spectra: Spectra
     matrix: ResponseMatrix
-    distortions: Distortions
+    distortions: Distortions | None
     resonances: tuple[Resonance, ...]
 
     @staticmethod
-    def of(signals: Signals, excitation: Excitation) -> MeasuredResponse:
+    def of(signals: Signals, excitation: Excitation | None) -> MeasuredResponse:
         """The response that a recording shows.
+
+        Args:
+            signals: inputs and outputs.
+            excitation: its whole periods; None where there are none.
 
         Raises:
             RecordingError: it cannot show one.
         """
-        found = spectra(signals, excitation)
-        matrix = response_matrix(found)
+        if excitation is None:
+            found, matrix = response_without_periods(signals)
+        else:
+            found = spectra(signals, excitation)
+            matrix = response_matrix(found)
         peaks = resonances(matrix.frequencies, matrix.G, matrix.sigmas(matrix.total))
-        return MeasuredResponse(found, matrix, distortions(found, matrix), tuple(peaks))
+        odd = None if excitation is None else distortions(found, matrix)
+        return MeasuredResponse(found, matrix, odd, tuple(peaks))
 
     def to_json(self) -> dict[str, Any]:
         """The content of `--json`."""
@@ -52,6 +61,7 @@ class MeasuredResponse:
                 "f0": self.spectra.excitation.f0,
                 "lines": self.spectra.excitation.lines.tolist(),
                 "experiments": len(self.spectra.U),
+                "whole_periods": self.distortions is not None,
                 "periods": m.periods,
                 "realisations": len(m.each),
                 "pairs": self.spectra.common is not None,

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from jointscope.graphs.responses.distortions import Levels
+from jointscope.graphs.responses.distortions import Distortions, Levels
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
@@ -39,8 +39,9 @@ def _sections(found: MeasuredResponse, suffix: str) -> list[Section]:
             lead,
         ),
         bode_grid(found, f"bode{suffix}", f"Response{name}"),
-        _distortions(found, f"distortions{suffix}", f"Distortions{name}"),
     ]
+    if found.distortions is not None:
+        made.append(_distortions(found, found.distortions, f"distortions{suffix}", f"Distortions{name}"))
     if found.resonances:
         rows = [[escape(cell) for cell in row] for row in resonance_rows(found)]
         made.append(Section(f"peaks{suffix}", f"Resonances{name}", table(RESONANCE_HEAD, rows, range(3, 7)), PEAKS))
@@ -81,8 +82,8 @@ def bode_grid(found: MeasuredResponse, id: str, title: str) -> Section:
     return Section(id, title, figure(panels, keys), lead)
 
 
-def _distortions(found: MeasuredResponse, id: str, title: str) -> Section:
-    d, panels = found.distortions, []
+def _distortions(found: MeasuredResponse, d: Distortions, id: str, title: str) -> Section:
+    panels = []
     kinds: list[tuple[str, Levels | None, str]] = [
         ("excited lines", d.excited, "k0"),
         ("even lines", d.even, "k1"),

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, 
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_report, write_still
 from jointscope.tools.writing.origin import made_from
+from jointscope.tools.writing.whole_file import whole_file, write_json
 
 
 def add_frequency_option(parser: argparse.ArgumentParser) -> None:
@@ -65,6 +67,53 @@ def read_all_shaken(robot: Robot, paths: Sequence[Path], progress: Progress) -> 
         progress(f"reading {path.name}", i / len(paths))
         recordings.append(read_shaken(path, robot))
     return recordings
+
+
+def run_frequency_comparison(
+    robots: Mapping[str, Robot], paths: Sequence[Path], files: ResultFiles, limits: Sequence[Limit], progress: Progress
+) -> tuple[str, AcceptedBy]:
+    """Compares models, writes the files, and returns what the screen says, and which limits are kept.
+
+    Args:
+        robots: by their labels; each has a section `frequency`.
+        paths: of the bags.
+        files: without a viewer recording.
+        limits: that the user has declared.
+        progress: called with a text and the share done.
+
+    Raises:
+        RobotError: a viewer recording was asked for, or models shake other motors.
+        JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
+    """
+    from jointscope.graphs.frequency.compare_frequency import errors_json, frequency_errors
+    from jointscope.tools.report.frequency_comparison_report import frequency_comparison_report
+    from jointscope.tools.terminal.responses_text import frequency_errors_text
+
+    if files.rrd is not None:
+        raise RobotError("--rrd shows motion, not frequency responses; use --report")
+    by_label = {}
+    for label, robot in robots.items():
+        recordings = read_all_shaken(robot, paths, progress)
+        progress(f"comparing {label}", 1.0)
+        by_label[label] = frequency_errors(robot, recordings)
+    _check_motors(robots)
+    models = {label: {"frequency": errors_json(poses)} for label, poses in by_label.items()}
+    used = [{"kind": "frequency", "path": one.pose.path, "sha256": one.pose.sha256} for one in by_label[label]]
+    checked = check_models(limits, models)
+    with ExitStack() as stack:
+        write_report(stack, files, lambda: frequency_comparison_report(by_label, checked))
+        if files.json is not None:
+            content = {"models": models, "recordings": used} | acceptance_json(checked)
+            write_json(stack.enter_context(whole_file(files.json)), content)
+    return frequency_errors_text(by_label), checked
+
+
+def _check_motors(robots: Mapping[str, Robot]) -> None:
+    shaken = {label: robot.frequency.joints for label, robot in robots.items() if robot.frequency is not None}
+    (first, joints), *others = shaken.items()
+    other = next((label for label, names in others if names != joints), None)
+    if other is not None:
+        raise RobotError(f"{other} shakes {', '.join(shaken[other])}, {first} {', '.join(joints)}; compare them apart")
 
 
 def frequency_origin(result: Any, start: Robot) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
+from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, run_frequency_comparison
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, compare_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
@@ -24,7 +25,8 @@ EXAMPLE = """example:
   jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
 
 The last argument is the bag; all before it are robots. Use a recording that was not used for calibration. With poses:
-  jointscope compare arm.yaml --poses other_poses.csv"""
+  jointscope compare arm.yaml --poses other_poses.csv
+  jointscope compare tx90l arm.yaml --frequency frequency_P2 --report matrix.html"""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -39,6 +41,7 @@ def add_parser(subparsers: Any) -> None:
     add_models_and_bag(parser)
     add_poses_option(parser)
     add_rests_option(parser)
+    add_frequency_option(parser)
     add_accept_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
@@ -62,18 +65,18 @@ def run(args: argparse.Namespace) -> int:
     files = ResultFiles.of(args)
     poses: list[Path] = getattr(args, "poses", [])
     rests: list[Path] = getattr(args, "rests", [])
-    if poses and rests:
-        raise RobotError("poses and rests are compared one after the other; leave one out")
-    if not poses and not rests:
+    frequency: list[Path] = getattr(args, "frequency", [])
+    still = [*poses, *rests, *frequency]
+    if sum(map(bool, (poses, rests, frequency))) > 1:
+        raise RobotError("poses, rests and frequency responses are compared one after the other; give one kind")
+    if not still:
         *args.robots, bag = args.robots
         args.bag = Path(bag)
         if not args.robots:
             args.parser.error(f"expected ROBOT... BAG, got {bag} alone; to compare on poses: --poses TABLE-or-BAG")
     names = labels(args.robots)
     robot_files = [robot for robot in args.robots if Path(robot).is_file()]
-    check_outputs(
-        files.all, inputs=[*([] if poses or rests else [args.bag]), *poses, *rests, *robot_files, *args.effects]
-    )
+    check_outputs(files.all, inputs=[*([] if still else [args.bag]), *still, *robot_files, *args.effects])
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.needed_streams import check_same_streams
     from jointscope.tools.bags.read_recording import read_recording
@@ -87,6 +90,8 @@ def run(args: argparse.Namespace) -> int:
         return _on_poses(robots, poses, files, limits)
     if rests:
         return _on_rests(robots, rests, files, limits)
+    if frequency:
+        return _on_frequency(robots, frequency, files, limits)
     check_same_streams(robots)  # before the bag is read for the first of them
     for robot in robots.values():
         check_viewer(robot, files)
@@ -112,6 +117,15 @@ def _on_rests(robots: dict[str, Any], rests: Sequence[Path], files: ResultFiles,
     with progress_bar() as progress:
         text, content = compare_rests(robots, rests, progress)
     return _told(text, content, files, limits)
+
+
+def _on_frequency(robots: dict[str, Any], bags: Sequence[Path], files: ResultFiles, limits: Sequence[Limit]) -> int:
+    """Compares the models on frequency responses."""
+    with progress_bar() as progress:
+        text, checked = run_frequency_comparison(robots, bags, files, limits, progress)
+    print(text)
+    files.tell()
+    return print_acceptance(checked)
 
 
 def _no_pictures(files: ResultFiles, kind: str) -> None:

@@ -57,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
         raise RecordingError(f"{args.output}: expected a name that ends with .npz or .csv")
     files = ResultFiles(args.report, json=args.json, figures=args.figures)
     check_outputs([args.output, *files.all], inputs=[*args.bags, *filter(None, [args.excitation])])
+    from jointscope.graphs.responses.find_excitation import NoPeriodsError
     from jointscope.graphs.responses.measured_response import MeasuredResponse
     from jointscope.tools.bags.read_signals import excitation_of, read_signals
     from jointscope.tools.report.responses_report import responses_report
@@ -67,7 +68,10 @@ def run(args: argparse.Namespace) -> int:
         for i, bag in enumerate(args.bags):
             progress(f"reading {bag.name}", i / len(args.bags))
             signals, drive = read_signals(bag, args.source, args.target)
-            excitation = excitation_of(bag, drive, len(signals.inputs.names), args.excitation)
+            try:
+                excitation = excitation_of(bag, drive, len(signals.inputs.names), args.excitation)
+            except NoPeriodsError:
+                excitation = None
             found.append(MeasuredResponse.of(signals, excitation))
     with ExitStack() as stack:
         if args.output is not None:

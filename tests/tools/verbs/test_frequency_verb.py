@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from periodic_systems import recorded, true_response, two_by_two
+from periodic_systems import RATE, recorded, true_response, two_by_two
 
 from jointscope.tools.bags.write_bag import joint_states, write_topics
 from jointscope.tools.command_line import main
@@ -147,3 +147,26 @@ def test_the_motors_of_an_arm_are_taken_by_themselves_and_friction_is_not_noise(
     assert content["excitation"]["pairs"] and content["excitation"]["realisations"] == 2
     noise, total = np.array(content["noise"]), np.array(content["total"])
     assert np.diag(noise).max() < 1e-3 and np.all(np.diag(total) > 50.0 * np.diag(noise))
+
+
+def test_a_record_without_whole_periods_goes_by_local_polynomials_and_says_so(tmp_path, capsys):
+    u = np.random.default_rng(0).standard_normal((4000, 2))
+    y = two_by_two(u)
+    stamps = np.rint(np.arange(len(u)) / RATE * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
+    fields = {"effort": u, "position": y}
+    write_topics(tmp_path / "noise", [joint_states("/joint_states", ("a", "b"), stamps, fields)])
+    files = {"-o": "f.npz", "--report": "f.html", "--json": "f.json"}
+    options = [text for option, name in files.items() for text in (option, str(tmp_path / name))]
+    assert main(["frequency", str(tmp_path / "noise"), *options]) == 0
+    screen = capsys.readouterr().out
+    assert "a stretch of 20 s without whole periods" in screen and "polynomials of order 2 over 17 lines" in screen
+    assert "Record two periods or more" in screen
+    arrays = np.load(tmp_path / "f.npz")
+    f = arrays["frequency_hz"]
+    middle = (f > 15.0) & (f < 40.0)
+    np.testing.assert_allclose(arrays["response"][middle], true_response(f[middle]), atol=2e-4)
+    assert "noise_covariance" not in arrays and arrays["total_covariance"].shape == (len(f), 4, 4)
+    (content,) = json.loads((tmp_path / "f.json").read_text())["responses"]
+    assert content["excitation"]["whole_periods"] is False and content["noise"] is None
+    page = (tmp_path / "f.html").read_text()
+    assert "two sigmas, total" in page and "even lines" not in page
