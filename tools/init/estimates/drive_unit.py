@@ -61,8 +61,7 @@ def drive_unit(
     mixed = f"; {', '.join(one)} could be N m: if so, check the masses beyond the others" if one else ""
     alike = f"; alike on all joints: or torques before gears of that ratio ({_ratio(told)})" if _all_alike(told) else ""
     others = f"{_volts(largest)}{alike}{mixed}"
-    below = all(LOADED < gain.value < 1.0 for gain in told.values()) and not (one or alike)
-    others += "; or N m, if it carries a load that the URDF lacks: --unit Nm" if below else ""
+    others += "; or N m, if it carries a load that the URDF lacks: --unit Nm" if _loaded(told) and not one else ""
     return "A", f"with the masses of the URDF one unit makes {constants} N m, not 1{others}"
 
 
@@ -74,6 +73,15 @@ def _of(joints: Sequence[str], told: dict[str, Value]) -> str:
 
 def _is_one(gain: Value) -> bool:
     return _near(gain, MASSES) or abs(gain.value - 1.0) < SURE * gain.sigma
+
+
+def _loaded(gains: dict[str, Value]) -> bool:
+    """Whether a load on the last link would do the same to commands in N m: all move more than the masses say.
+
+    The nearer a joint is to the load, the less of what it carries is in the URDF; only the first carries the whole arm.
+    """
+    values = [gain.value for gain in gains.values()]
+    return values[0] > LOADED and all(0.0 < value < 1.0 for value in values)
 
 
 def _near(gain: Value, relative: float) -> bool:
@@ -101,7 +109,16 @@ def _range(gains: Sequence[Value]) -> str:
 def _off(gains: dict[str, Value]) -> str:
     """Joints whose constant is clearly not one, if not by much."""
     joints = [j for j, g in gains.items() if abs(g.value - 1.0) > max(ALIKE, SURE * g.sigma)]
-    return f"; as that is not 1, masses or torques of {', '.join(joints)} are off by as much" if joints else ""
+    return (
+        f"; as that is not 1, masses or torques of {', '.join(joints)} are off by as much{_or_tilted(gains)}"
+        if joints
+        else ""
+    )
+
+
+def _or_tilted(gains: dict[str, Value]) -> str:
+    """A base that is not level turns the weight of several joints at once; one joint alone speaks of itself."""
+    return ", or the base is not level" if len(gains) > 1 else ""
 
 
 def _volts(largest: float) -> str:

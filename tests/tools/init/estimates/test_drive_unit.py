@@ -31,11 +31,18 @@ def unit_of(*gains, largest=20.0, sigma=0.01, **more):
         ((1.02,), 0.9, "N m", "one unit is 1.02 N m on every joint"),
         ((2.0, 2.0), 300.0, "A", "not 1; alike"),
         ((0.54, 0.63, 0.7), 40.0, "A", "or N m, if it carries a load that the URDF lacks: --unit Nm"),
+        ((0.447, 0.42, 0.09), 40.0, "A", "or N m, if it carries a load that the URDF lacks: --unit Nm"),
+        ((1.15, 0.85, 1.0), 80.0, "N m", "off by as much, or the base is not level"),
     ],
 )
 def test_constants_tell_the_unit(gains, largest, unit, said):
     found, reason = unit_of(*gains, largest=largest)
     assert found == unit and said in reason
+
+
+@pytest.mark.parametrize("gains", [(0.2, 0.15, 0.09), (0.5, 1.6, 0.4)])
+def test_what_no_load_explains_is_not_said_to_be_one(gains):
+    assert "a load" not in unit_of(*gains)[1]
 
 
 def test_a_joint_that_tells_nothing_does_not_vote():
