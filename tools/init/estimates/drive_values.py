@@ -59,7 +59,8 @@ class DriveValues:
         sign: -1 where the command turns the joint backwards.
         confidence: how far the sign is from the other one [sigma].
         link: inertia of everything behind the joint at the first posture [kg m2]; 1 where masses are not known.
-        unknown_scale: whether all values are relative to a guessed rotor inertia, as the recording gives ratios only.
+        unknown_scale: whether all values are relative to a guessed constant or rotor inertia, as the recording gives
+            ratios only.
         sharpness: k in tanh(k v) of dry friction, from which a calibration may look for it [s/rad]; None where the
             encoder does not show how the joint turns over, or the joint is so fast that it does not matter.
     """
@@ -152,13 +153,26 @@ def find_drives(
     massless = all(equation.carries_nothing for equation in equations)
     told = (unit, TYPED) if unit else drive_unit(tree.joints, gains, largest, heavy, massless=massless)
     known = {GAIN: 1.0} if told[0] == "N m" else {}
-    drives = [
-        _drive(equation, known, direction, link, joint in elastic)
-        for joint, equation, direction, link in zip(tree.joints, equations, directions, links, strict=True)
-    ]
+    like = [0.0] * tree.n
+    for _ in range(2):  # then with constants of neighbours, where a joint's own cannot be told
+        drives = [
+            _drive(equation, known, direction, link, joint in elastic, own)
+            for joint, equation, direction, link, own in zip(
+                tree.joints, equations, directions, links, like, strict=True
+            )
+        ]
+        if not any(drive.unknown_scale for drive in drives):
+            break
+        like = _like_neighbours(drives)
     shown = _turn_over(tree, equations, slope_noise(encoder, sigmas), elastic)
     drives = [replace(drive, sharpness=k) for drive, k in zip(drives, shown, strict=True)]
     return Drives(told, drives, tree.gravity, reason, held)
+
+
+def _like_neighbours(drives: Sequence[DriveValues]) -> list[float]:
+    """Constant of the nearest joint whose own is told, shape (n,); 0 without any. Drives of one arm are alike."""
+    told = [j for j, drive in enumerate(drives) if not drive.unknown_scale]
+    return [drives[min(told, key=lambda k: abs(k - j))].start[GAIN] if told else 0.0 for j in range(len(drives))]
 
 
 def _turn_over(
@@ -231,14 +245,20 @@ def _gain(equation: DriveEquation, sign: float) -> Value | None:
 
 
 def _drive(
-    equation: DriveEquation, known: Mapping[str, float], direction: tuple[float, float], link: float, elastic: bool
+    equation: DriveEquation,
+    known: Mapping[str, float],
+    direction: tuple[float, float],
+    link: float,
+    elastic: bool,
+    like: float,
 ) -> DriveValues:
+    """A drive; where nothing tells its constant, with `like`, or for 0 with a rotor as heavy as what it moves."""
     sign, confidence = direction
     given = {name: sign * value for name, value in known.items()}
     found = equation.solve(given)
     guessed = not given and (GAIN not in found or found[GAIN].value * sign <= TOLD * found[GAIN].sigma)
-    if guessed and equation.carries_nothing:
-        given = {GAIN: sign}
+    if guessed and (like or equation.carries_nothing):
+        given = {GAIN: sign * (like or 1.0)}
         found = equation.solve(given)
     elif guessed:
         given = {INERTIA: MATCHED * link}

@@ -44,3 +44,16 @@ def test_values_that_are_lost_get_small_starts_and_say_so(tmp_path):
     assert first.is_lost("viscous") and second.is_lost("dry")
     assert not first.is_lost("dry") and not second.is_lost("viscous")
     assert 0.0 < second.start["dry"] < 0.3 and 0.0 < first.start["viscous"] < 1.0
+
+
+def test_a_constant_that_nothing_tells_is_like_that_of_the_next_joint(tmp_path):
+    """Rotor and friction of a wrist hide its masses; a rotor as heavy as these would be a hundred times too light."""
+    arm = Arm("yz", inertia=(0.7, 1.0), dry=(2.0, 8.0), viscous=(1.5, 9.0))
+    tree = RigidTree(written(arm, tmp_path), arm.joints, np.array(arm.gravity))
+    encoder, command = moved(arm, counts=1024)
+    currents = replace(command, values=command.values / np.array([8.0, 5.0]))
+    first, second = find_drives(tree, encoder, currents, np.full(2, 1.8e-3), unit="A").joints
+    assert not first.unknown_scale and first.start["gain"] == pytest.approx(8.0, rel=0.02)
+    assert second.unknown_scale and second.start["gain"] == first.start["gain"]
+    assert second.start["inertia"] / second.start["gain"] == pytest.approx(1.0 / 5.0, rel=0.05)
+    assert second.start["dry"] / second.start["gain"] == pytest.approx(8.0 / 5.0, rel=0.05)
