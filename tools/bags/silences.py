@@ -58,9 +58,14 @@ def _all_speak(recording: Recording, encoder: str, stretches: Sequence[Stretch])
     """From when until when all drivers of one topic speak [s]: one may begin late or end early."""
     begin, end = -np.inf, np.inf
     for stream in (recording.command, recording.streams[encoder]):
-        begin = max([begin, *(t1 for t0, t1 in stretches if t0 == stream.times[0])])
-        end = min([end, *(t0 for t0, t1 in stretches if t1 == stream.times[-1])])
-    return float(begin), float(np.nextafter(end, np.inf))
+        first, last = float(stream.times[0]), float(stream.times[-1])
+        for k in range(len(stream.channels)):
+            own = stream.channel(k).times
+            if len(own) and first < own[0] and (first, own[0]) in stretches:
+                begin = max(begin, float(own[0]))
+            if len(own) and own[-1] < last and (own[-1], last) in stretches:
+                end = min(end, float(own[-1]))
+    return begin, float(np.nextafter(end, np.inf))
 
 
 def _is_silence(stream: Stream, stretches: list[Stretch]) -> bool:
