@@ -156,6 +156,26 @@ def test_nodes_may_speak_just_behind_each_other_begin_late_and_end_early(fast, t
         assert json.loads(told.read_text())["nis_mean"] < 1.5
 
 
+def test_positions_that_one_node_wraps_are_unwrapped_between_its_own_messages(fast, tmp_path, capsys):
+    urdf, motion = fast
+    every = np.arange(len(motion.times))
+    topics = {"/cmd": motion.commands(["shoulder", "elbow"]) | {"rows": every[::4]}}
+    for joint, own in (("shoulder", every[::10]), ("elbow", every[3::10])):
+        states = motion.states([joint])
+        topics[f"/joint_states#{joint}"] = states | {"position": np.mod(states["position"], 2 * np.pi), "rows": own}
+    bag = write_arm_bag(tmp_path / "wrapped.mcap", motion.times, topics)
+    robot, found, told = tmp_path / "arm.yaml", tmp_path / "found.yaml", tmp_path / "found.json"
+    assert main(["init", str(urdf), str(bag), "-o", str(robot)]) == 0
+    assert "the recording can be used with it" in capsys.readouterr().out
+    assert "wraps: 6.283" in robot.read_text()
+    assert main(["calibrate", str(robot), str(bag), "-o", str(found), "--json", str(told)]) == 0
+    values = json.loads(told.read_text())["parameters"]
+    for joint in ("shoulder", "elbow"):
+        for name, true in TRUE.items():
+            got = values[f"{joint}.{name}"]
+            assert abs(got["value"] - true) < max(0.01 * true, 3.5 * got["sigma"]), name
+
+
 @pytest.mark.parametrize("aggregated", (40, 4))
 def test_an_aggregator_that_repeats_what_two_nodes_say_is_left_out_unless_it_says_more(
     fast, tmp_path, capsys, aggregated

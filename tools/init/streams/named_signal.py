@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.recordings.wrapped_counter import continued, wrapping_jump
 from jointscope.tools.init.streams.joint_names import match_names
@@ -142,7 +143,11 @@ def _unclear(signal: Signal, ambiguous: Sequence[tuple[str, tuple[str, ...]]]) -
 def _turns(signal: Signal) -> dict[str, float]:
     """Periods of counters that begin anew, by the name or place of their column."""
     labels = signal.names or tuple(map(str, range(signal.values.shape[1])))
-    jumps = {label: wrapping_jump(signal.times, column) for label, column in zip(labels, signal.values.T, strict=True)}
+    own = [_own(signal, k) for k in range(len(labels))]
+    jumps = {
+        label: wrapping_jump(signal.times[rows], signal.values[rows, k])
+        for k, (label, rows) in enumerate(zip(labels, own, strict=True))
+    }
     found = {
         label: next((turn for turn in TURNS if abs(jump / turn - 1.0) < NEAR_A_TURN), 0.0)
         for label, jump in jumps.items()
@@ -157,7 +162,12 @@ def _continued(signal: Signal, turns: Mapping[str, float]) -> Signal:
     values = signal.values.copy()
     for k, label in enumerate(labels):
         if label in turns:
-            own = np.ones(len(values), bool) if signal.filled is None else ~signal.filled[:, k]
+            own = _own(signal, k)
             whole = continued(values[own][:, [k]], turns[label])[:, 0]
             values[:, k] = np.interp(signal.times, signal.times[own], whole)
     return replace(signal, values=values)
+
+
+def _own(signal: Signal, column: int) -> NDArray[np.bool_]:
+    """Rows that a column was told in, shape (n,): other nodes may speak in between."""
+    return np.ones(len(signal.values), bool) if signal.filled is None else np.asarray(~signal.filled[:, column])
