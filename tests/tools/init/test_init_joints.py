@@ -224,6 +224,20 @@ def test_commands_on_a_topic_for_each_joint_are_put_together(arm, held, tmp_path
     np.testing.assert_allclose(np.vstack([block.values[place] for block in blocks]), held.torque, rtol=1e-6)
 
 
+def test_an_array_that_holds_joints_that_stand_drives_those_that_move(arm, held, tmp_path, capsys):
+    """A controller has one value for each of its joints, and no bag says which it has beside those that move."""
+    efforts = held.commands(("shoulder", "elbow"))["effort"]
+    still = np.full(len(efforts), 0.7)
+    topics = {"/joint_states": held.states()}
+    topics["/effort_controller/commands"] = {
+        "data": np.column_stack([still, efforts[:, 0], 0.0 * still, efforts[:, 1]])
+    }
+    bag, out = write_arm_bag(tmp_path / "a.mcap", held.times, topics), tmp_path / "a.yaml"
+    assert init(arm, bag, "-o", out) == 0
+    assert "can be used with it" in capsys.readouterr().out
+    np.testing.assert_allclose(read_recording(bag, load_robot(out)).command.values, efforts)
+
+
 @pytest.mark.parametrize("together", [True, False])
 def test_goal_positions_are_no_drive(arm, held, tmp_path, together):
     """Position controllers command where to be; what drives the motors is the effort beside the positions."""

@@ -171,3 +171,20 @@ def _continued(signal: Signal, turns: Mapping[str, float]) -> Signal:
 def _own(signal: Signal, column: int) -> NDArray[np.bool_]:
     """Rows that a column was told in, shape (n,): other nodes may speak in between."""
     return np.ones(len(signal.values), bool) if signal.filled is None else np.asarray(~signal.filled[:, column])
+
+
+def by_place(signal: Signal, fits: tuple[str, ...], moving: tuple[str, ...]) -> NamedSignal:
+    """A signal that names nobody: its columns belong to joints in their order.
+
+    Args:
+        signal: the numbers.
+        fits: joints, as many as it has columns; empty where nothing tells who they are.
+        moving: joints that then have its columns that vary, if they are as many: controllers hold others that stand.
+    """
+    places = list(range(len(fits))) or [
+        k for k, column in enumerate(signal.values.T) if len(np.unique(column[np.isfinite(column)])) > 1
+    ]
+    joints = fits or moving
+    if len(joints) != len(places):
+        return NamedSignal(signal, {})
+    return NamedSignal(signal, {joint: str(place) for joint, place in zip(joints, places, strict=True)})

@@ -15,7 +15,7 @@ import numpy as np
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.screening import MIN_SAMPLES
 from jointscope.tools.init.streams.known_fields import IMU
-from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, named_signal
+from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, by_place, named_signal
 from jointscope.tools.init.streams.signals import Signal, complain_of_lengths
 from jointscope.tools.init.streams.standing import Stance, stances
 
@@ -278,7 +278,7 @@ def _driving(
     fits = next((c for c in (chosen, shown, moving, urdf_joints) if len(c) == signal.values.shape[1]), ())
     if signal.topic == motors.signal.topic and not motors.signal.names:
         return NamedSignal(signal, motors.names)  # of the same message, in the same order
-    return NamedSignal(signal, {joint: str(place) for place, joint in enumerate(fits)})
+    return by_place(signal, fits, moving)
 
 
 def _torque(
