@@ -124,13 +124,20 @@ def megabytes() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+def _is_one_line(err: str) -> bool:
+    """Whether an error is one line, behind the notes of a first look at the recording at the most."""
+    *notes, error = err.splitlines() or [""]
+    noted = not notes or notes[-1].startswith("Look at this first: ")
+    return noted and err.endswith("\n") and error.startswith("jointscope: error: ")
+
+
 def _type(line: Sequence[str], folder: Path, before: set[str]) -> tuple[list[str], str]:
     """Runs a verb; says which rules it broke and where."""
     broken = []
     code, _, err = _run(line, folder)
     if code not in (0, 1, 2):
         broken.append(f"exit code {code}")
-    if code == 1 and (err.count("\n") != 1 or not err.startswith("jointscope: error: ")):
+    if code == 1 and not _is_one_line(err):
         broken.append(f"the error is not one line: {err[:300]!r}")
     if "bug in jointscope" in err or "out of memory" in err or "Traceback" in err:
         broken.append(err.strip()[-400:])
