@@ -35,8 +35,7 @@ ROUNDS = 3  # of a filter, and of the noise that is found with it
 
 def free_filters(robot: Robot) -> tuple[str, ...]:
     """Full names of the variances that a calibration looks for."""
-    filters = [here for here in robot.effects if isinstance(here.effect, SmoothedReading)]
-    names = [here.parameter(here.effect.variance) for here in filters if isinstance(here.effect, SmoothedReading)]
+    names = [here.parameter(here.effect.variance) for here in robot.effects if isinstance(here.effect, SmoothedReading)]
     return tuple(name for name in names if not robot.parameters[name].fixed)
 
 

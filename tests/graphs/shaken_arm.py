@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from jointscope.robots.recordings.signals import Excitation, Experiment, Signal, Signals
+from jointscope.tools.bags.write_bag import joint_states, write_topics
 
 TX90L = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "tx90l"
 POSE = np.array([0.1, 0.72, 0.62, 1.2, 1.0, 0.3])
@@ -53,3 +54,13 @@ def truth(name):
             found[f"joint{j}.{part}"] = elastic[f"{letter}{j}"]
             found |= {f"joint{j}.bearing.{part}_{axis}": elastic[f"{letter}{j}{axis}"] for axis in "xy"}
     return found
+
+
+def made_up_bag(path):
+    """A bag of the made-up arm without a carrier, with torques of all joints."""
+    signals, _ = made_up(carrier=0.0)
+    stamps = np.rint(signals.outputs.times * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
+    torques = np.hstack([signals.inputs.values, np.zeros_like(signals.inputs.values)])
+    fields = {"effort": torques, "position": signals.outputs.values}
+    write_topics(path, [joint_states("/joint_states", signals.outputs.names, stamps, fields)])
+    return path

@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
-from shaken_arm import TX90L, made_up
+from shaken_arm import TX90L, made_up_bag
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.write_bag import joint_states, write_topics
 from jointscope.tools.command_line import main
 
 OPTION = "--frequency"
@@ -19,14 +17,7 @@ OPTION = "--frequency"
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """A bag of the made-up arm, with torques of all joints."""
-    path = tmp_path_factory.mktemp("shaken") / "shaken"
-    signals, _ = made_up(carrier=0.0)
-    stamps = np.rint(signals.outputs.times * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
-    torques = np.hstack([signals.inputs.values, np.zeros_like(signals.inputs.values)])
-    fields = {"effort": torques, "position": signals.outputs.values}
-    write_topics(path, [joint_states("/joint_states", signals.outputs.names, stamps, fields)])
-    return path
+    return made_up_bag(tmp_path_factory.mktemp("shaken") / "shaken")
 
 
 def refused(arguments, capsys):

@@ -137,12 +137,12 @@ def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, b
         )
 
 
-def _in_runs(rows: Flags, length: int = RUN) -> Flags:
+def _in_runs(rows: Flags) -> Flags:
     """Of some rows those that stand in a run of at least so many, shape (n,)."""
     edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     found = np.zeros_like(rows)
     for begin, end in edges:
-        found[begin:end] = end - begin >= length
+        found[begin:end] = end - begin >= RUN
     return found
 
 
