@@ -67,8 +67,7 @@ def motor_stiffness(
         values: of all parameters by name.
     """
     M, C, G = parts
-    s = 1j * w[:, None]
-    kappa = np.array([values[x.stiffness] for x in arm.springs]) + s * [values[x.damping] for x in arm.springs]
+    s, kappa = 1j * w[:, None], arm.dynamic(w, values)
     n, E = len(M), arm.driven
     A = -(w**2)[:, None, None] * M + s[:, :, None] * C + G + kappa[:, :, None] * np.eye(n)
     own = kappa[:, E]

@@ -3,7 +3,7 @@
 
     rnea(x, x', x'') + D x' + K x = E (d m' + k m),    tau = k (m - x) + d (m' - x') + J m''
 
-m is the motion of the motors as it was measured, x that of the arm behind its springs, E picks the drives from x.
+m is the motion of the motors as it was measured, with the offsets of their drives where these have some, x that of the arm behind its springs, E picks the drives from x.
 Inertias change with the motion: with the part that carries the excitation, whose lines answer lines beside them, and
 with the excitation itself. The rigid body is taken in time, springs and dampers line by line, and x is found in steps
 
@@ -49,7 +49,11 @@ class MovingArm:
 
 
 def moving_arm(
-    arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], begin: Complex | None = None
+    arm: FlexibleArm,
+    pose: ShakenPose,
+    values: Mapping[str, float],
+    begin: Complex | None = None,
+    offset: Complex | float = 0.0,
 ) -> MovingArm:
     """The arm of a pose under the motion that was measured.
 
@@ -58,15 +62,17 @@ def moving_arm(
         pose: the motion.
         values: of all parameters by name.
         begin: the arm's motion at values nearby, shape (b, K, n) [rad]; None for that of the motors.
+        offset: of the drives, shape (b, K, nu) [rad].
     """
     K, f0 = pose.motion.shape[1], pose.found.excitation.f0
     w = np.asarray(2.0 * np.pi * f0 * np.arange(K), dtype=np.float64)
     s = 1j * w[:, None]
-    kappa = np.array([values[x.stiffness] for x in arm.springs]) + s * [values[x.damping] for x in arm.springs]
+    kappa = arm.dynamic(w, values)
     own, driven = kappa[:, arm.driven], arm.driven
     m = pose.motions
+    turned = m + offset
     pull = np.zeros((*m.shape[:2], kappa.shape[1]), dtype=complex)
-    pull[:, :, driven] = own * m
+    pull[:, :, driven] = own * turned
     x = np.zeros_like(pull)
     x[:, :, driven] = m
     x = x if begin is None else begin
@@ -90,7 +96,7 @@ def moving_arm(
         x = nearer
         left.append(size)
     inertias = np.array([values[f"{joint}.inertia"] for joint in arm.joints])
-    torques = own * (m - x[:, :, driven]) - (w**2)[:, None] * inertias * m
+    torques = own * (turned - x[:, :, driven]) - (w**2)[:, None] * inertias * m
     return MovingArm(pose.both_signs(torques), x, tuple(left))
 
 

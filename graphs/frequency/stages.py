@@ -8,6 +8,7 @@ of them, then ever fewer, for a resonance at the wrong place makes a few lines l
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +16,12 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
-from jointscope.graphs.frequency.motor_stiffness import motor_stiffness
+from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_torques, motor_effects
+from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
-from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS
+from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS, LINK_INERTIA, LINK_MASS, PAYLOAD
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
 
@@ -27,7 +29,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
 NARROWER = 4  # times fewer lines from stage to stage
-STEP = {"length": 1e-4, "angle": 1e-4}  # [m], [rad] of the differences for columns of geometry
+STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [rad], [kg], [kg m2] of differences
 
 
 def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
@@ -58,19 +60,53 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     width = max(before.stage.width // NARROWER, NEIGHBOURS)
     parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
     k, slopes = motor_stiffness(arm, parts, pose.w, values), before.stage.slopes
-    columns = k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines])
-    geometry = dict(zip(slopes.names, columns, strict=True))
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
-    stage = Stage(parts, eye, 0.0, pose.friction(sharpness), sharpness, geometry, values, False, width, slopes)
-    moving = moving_arm(arm, pose, values, before.stage.x)
-    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, pose.lines])
-    stage = replace(stage, shift=moving.torques[:, pose.lines] - standing, x=moving.x)
+    shift, x, columns = _moving(before, values, k, sharpness)
+    columns |= dict(
+        zip(slopes.names, k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines]), strict=True)
+    )
+    stage = Stage(parts, eye, shift, pose.friction(sharpness), sharpness, columns, values, False, width, slopes, x=x)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
     root = np.linalg.cholesky(_covariance(r, width))
     size = 4.0 * len(r) * float(np.sum(np.log(np.einsum("lii->li", root).real)))  # real and imaginary part
     whiten = np.asarray(np.linalg.solve(root, now.with_friction(k.Z, values)), dtype=np.complex128)
     return replace(now, stage=replace(stage, whiten=whiten, unlikely=size))
+
+
+def _moving(
+    before: FrequencySet, values: Mapping[str, float], k: MotorStiffness, sharpness: Array
+) -> tuple[Complex, Complex, dict[str, Complex]]:
+    """Shift of the torques because the arm moves as it does, its motion, and columns of effects by name."""
+    pose, arm, lines, x = before.pose, before.arm, before.pose.lines, before.stage.x
+    shape = pose.motions.shape
+    known = None if x is None else motor_effects(arm, pose, values, sharpness, x)
+    moving = moving_arm(arm, pose, values, x, 0.0 if known is None else known.offset(values, shape))
+    effects = motor_effects(arm, pose, values, sharpness, moving.x)
+    beside = pose.both_signs(effects.torque(values, shape))
+    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, lines])
+    true, columns = measured_torques(arm.joints, pose.torques, pose.w, values)
+    shift = (moving.torques + beside)[:, lines] - standing - (true - pose.torques)
+    for name, column in _of_effects(before, values, k, effects).items():
+        columns[name] = column
+    return np.asarray(shift), moving.x, columns
+
+
+def _of_effects(
+    before: FrequencySet, values: Mapping[str, float], k: MotorStiffness, effects: MotorEffects
+) -> dict[str, Complex]:
+    """Torques by effects of unit size, shape (e, l, nu)."""
+    pose, lines = before.pose, before.pose.lines
+    inertias = np.array([values[f"{joint}.inertia"] for joint in before.arm.joints])
+    springs = k.Z + (pose.w**2)[:, None, None] * np.diag(inertias)
+    found: dict[str, Complex] = {}
+    for name, (motor, wave) in effects.offsets.items():
+        found[name] = np.einsum("li,el->eli", springs[:, :, motor], pose.both_signs(wave)[:, lines])
+    for name, (motor, wave) in effects.torques.items():
+        own = np.zeros((len(pose.motion), len(lines), len(inertias)), dtype=complex)
+        own[:, :, motor] = pose.both_signs(wave)[:, lines]
+        found[name] = found.get(name, 0.0) + own
+    return found
 
 
 def _covariance(r: Complex, width: int) -> Complex:
@@ -87,13 +123,14 @@ def _covariance(r: Complex, width: int) -> Complex:
 
 
 def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose) -> GeometrySlopes:
-    """How M, C and G follow the geometric errors that are parameters of the robot, by differences.
+    """How M, C and G follow geometric errors and errors of masses that are parameters of the robot, by differences.
 
     They change by thousandths where geometry does by millimetres, so one look serves all stages.
     """
     values = {name: p.value for name, p in robot.parameters.items()}
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
-    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()}
+    kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]}
+    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {PAYLOAD: STEP["mass"]}
     free = [name for name in steps if name in robot.parameters and not robot.parameters[name].fixed]
     parts, shape = arm.linearised(pose.q, values).mean, (len(free), len(arm.springs), len(arm.springs))
     moved = [arm.linearised(pose.q, {**values, name: values[name] + steps[name]}).mean for name in free]

@@ -27,7 +27,7 @@ from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, with_e
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
-from jointscope.robots.geometry.pose_effects import PoseHypothesis, hypotheses
+from jointscope.robots.geometry.arm_effects import ArmHypothesis, hypotheses
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 
@@ -55,7 +55,7 @@ class PoseCandidate:
         verdict: missing, possible or absent.
     """
 
-    hypothesis: PoseHypothesis
+    hypothesis: ArmHypothesis
     score: float
     p_value: float
     gain: float
@@ -172,7 +172,7 @@ class _Judge:
         self._left = float(linear.left(nothing, base).sum())
         self._before = self._left_out(nothing, np.zeros(0))
 
-    def candidate(self, hypothesis: PoseHypothesis, extra: Array) -> PoseCandidate:
+    def candidate(self, hypothesis: ArmHypothesis, extra: Array) -> PoseCandidate:
         """An effect with whitened columns of shape (3 m, k)."""
         linear, kind = self._linear, hypothesis.kind
         sigmas = np.full(extra.shape[1], kind.size)

@@ -17,7 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.robots.geometry.error_parameters import RIPPLE
-from jointscope.robots.geometry.pose_effects import PoseHypothesis
+from jointscope.robots.geometry.arm_effects import ArmHypothesis
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 
@@ -119,7 +119,7 @@ class LinearPoses:
         return float(np.sum(rows[held] ** 2))
 
 
-def columns_of(result: PoseCalibration, hypothesis: PoseHypothesis) -> Array:
+def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
     """What the parameters of an effect that is not there would do to the targets, shape (m, 3, k).
 
     Of a stiffness its compliance counts, which is zero in a rigid joint.
@@ -137,7 +137,7 @@ def columns_of(result: PoseCalibration, hypothesis: PoseHypothesis) -> Array:
     return np.concatenate(found)
 
 
-def with_effect(robot: Robot, hypothesis: PoseHypothesis, values: dict[str, float]) -> Robot:
+def with_effect(robot: Robot, hypothesis: ArmHypothesis, values: dict[str, float]) -> Robot:
     """The robot with an effect whose sizes begin at some values."""
     kind, parameters = hypothesis.kind, dict(robot.parameters)
     for name in hypothesis.names:

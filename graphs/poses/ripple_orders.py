@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.linear_poses import LinearPoses
-from jointscope.robots.geometry.pose_effects import PoseHypothesis
+from jointscope.robots.geometry.arm_effects import ArmHypothesis
 
 Array = NDArray[np.float64]
 
 
-def with_best_order(linear: LinearPoses, result: PoseCalibration, hypothesis: PoseHypothesis) -> PoseHypothesis:
+def with_best_order(linear: LinearPoses, result: PoseCalibration, hypothesis: ArmHypothesis) -> ArmHypothesis:
     """The effect with the best of its orders; one without orders as it is."""
     if not hypothesis.kind.orders:
         return hypothesis

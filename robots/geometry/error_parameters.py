@@ -25,6 +25,11 @@ DAMPING = "damping"  # of a drive
 TILT_DAMPING = ("bearing.damping_x", "bearing.damping_y")
 PAYLOAD = "robot.payload.mass"  # a point at the target, which the URDF does not know
 LINK_MASS = "link_mass.mass"  # what the link behind a joint weighs more than in the URDF, at its centre of mass
+LINK_INERTIA = "inertia_error.about_axis"  # of the link behind a joint, more than in the URDF, about the joint's axis
+TORQUE_SHARE = "torque_constant_error.share"  # motors make 1 + share of the torque that they say
+TORQUE_DELAY = "robot.torque_delay.seconds"  # by which torques are said too late
+STRIBECK = "motor_stribeck.torque"  # of the breakaway of a motor's dry friction over that while it turns
+LOAD_FRICTION = "load_dependent_friction.coefficient"  # of the torque that a drive passes on
 
 
 def error_names(joints: Sequence[str]) -> tuple[str, ...]:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An arm with a spring behind each motor that is shaken and springs in its bearings, linearised about a motion.
 
+Other joints are locked, rigidly, or by a spring where the robot has a stiffness for them.
+
     M(t) x'' + C(t) x' + G(t) x + D x' + K x = E (d m' + k m)
 
 x are the turns of the joints behind the drives and the tilts of their bearings about y' and x', m the turns of the
-motors; K and D are diagonal. Other joints are locked. Where a motion carries the excitation, M, C and G change with its
+motors; K and D are diagonal. Where a motion carries the excitation, M, C and G change with its
 phase; they come as coefficients of a Fourier series in it.
 """
 
@@ -20,7 +22,16 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.equations_of_motion import FreeEquations
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_chain import across, turned
-from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, LENGTHS, STIFFNESS, TILT_DAMPING
+from jointscope.robots.geometry.error_parameters import (
+    BEARING,
+    DAMPING,
+    LENGTHS,
+    LINK_INERTIA,
+    LINK_MASS,
+    PAYLOAD,
+    STIFFNESS,
+    TILT_DAMPING,
+)
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.urdf.motion_axis import motion_axis
 
@@ -28,6 +39,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 PHASES = 16  # of the motion at which the arm is linearised
 LOOKS = 3  # at gravity, for the place where the arm sags
+LOSS = 3e-4  # [s] damping over stiffness of a spring without a damper in the robot file: 1 % of critical at 10 Hz
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,7 @@ class Spring:
     Attributes:
         stiffness, damping: names of their parameters.
         coordinate: place in x.
-        motor: number of the motor on its other side; None for a bearing.
+        motor: number of the motor on its other side; None for a bearing and for a joint that is locked.
     """
 
     stiffness: str
@@ -87,19 +99,33 @@ class FlexibleArm:
         if slide is not None:
             raise RobotError(f"{robot.path.name}: frequency.joints: {slide} slides; expected joints that turn")
         self._tree, self.joints = robot.tree, robot.frequency.joints
+        self._target = None if robot.poses is None else (robot.poses.link, robot.poses.at)
         springs: list[Spring] = []
-        model = robot.tree.model
-        self._order = [model.names[j] for j in range(1, model.njoints) if model.names[j] in self.joints]
-        for joint in self._order:
-            motor = self.joints.index(joint)
-            springs.append(Spring(f"{joint}.{STIFFNESS}", f"{joint}.{DAMPING}", len(springs), motor))
-            if all(f"{joint}.{part}" in robot.parameters for part in (*BEARING, *TILT_DAMPING)):
+        model, parameters = robot.tree.model, robot.parameters
+        moving = [name for name in model.names[1:] if name in robot.tree.joints and not robot.tree.is_slide(name)]
+        for joint in moving:
+            motor = self.joints.index(joint) if joint in self.joints else None
+            if motor is not None or f"{joint}.{STIFFNESS}" in parameters:
+                springs.append(Spring(f"{joint}.{STIFFNESS}", f"{joint}.{DAMPING}", len(springs), motor))
+            if all(f"{joint}.{part}" in parameters for part in BEARING):
                 for i in (1, 0):  # y', then x'
                     names = f"{joint}.{BEARING[i]}", f"{joint}.{TILT_DAMPING[i]}"
                     springs.append(Spring(*names, len(springs), None))
         self.springs = tuple(springs)
         self.driven = np.array([next(s.coordinate for s in springs if s.motor == i) for i in range(len(self.joints))])
-        self._soft = {spring.stiffness.split(".")[0] for spring in springs if spring.motor is None}
+        self._turning = {s.stiffness.split(".")[0] for s in springs if s.stiffness.endswith(f".{STIFFNESS}")}
+        self._tilting = {s.stiffness.split(".")[0] for s in springs if s.stiffness.endswith(BEARING)}
+
+    def dynamic(self, w: Array, values: Mapping[str, float]) -> Complex:
+        """Stiffness k + j w d of every spring at some frequencies, shape (l, s) [N m/rad].
+
+        Args:
+            w: shape (l,) [rad/s].
+            values: of stiffnesses and dampings by name.
+        """
+        k = np.array([values[spring.stiffness] for spring in self.springs])
+        d = [values.get(s.damping, LOSS * size) for s, size in zip(self.springs, k, strict=True)]
+        return np.asarray(k + 1j * w[:, None] * d)
 
     def linearised(
         self,
@@ -160,17 +186,22 @@ class FlexibleArm:
             name, (parent, T) = old.names[j], host[old.parents[j]]
             along, x, y = across(motion_axis(old.joints[j])[3:])
             placed = T * _with_errors(old.jointPlacements[j], name, values, (along, x, y))
-            if name in self.joints:
-                parent = new.addJoint(parent, pin.JointModelRevoluteUnaligned(along), placed, name)
-                for axis, end in ((y, ".y"), (x, ".x")) if name in self._soft else ():
-                    parent = new.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), pin.SE3.Identity(), name + end)
-                host[j] = parent, pin.SE3.Identity()
-            elif name in self._tree.joints:
-                turn = turned(along, np.array(q[self._tree.joints.index(name)]))
-                host[j] = parent, placed * pin.SE3(turn, np.zeros(3))
+            turn = turned(along, np.array(q[self._tree.joints.index(name)] if name in self._tree.joints else 0.0))
+            locked = pin.SE3(turn, np.zeros(3))
+            if name in self._turning:
+                placed = placed if name in self.joints else placed * locked
+                parent, placed = new.addJoint(parent, _hinge(along), placed, name), pin.SE3.Identity()
             else:
-                host[j] = parent, placed
-            new.appendBodyToJoint(host[j][0], old.inertias[j], host[j][1])
+                placed = placed * locked
+            for axis, end in ((y, ".y"), (x, ".x")) if name in self._tilting else ():
+                parent, placed = new.addJoint(parent, _hinge(axis), placed, name + end), pin.SE3.Identity()
+            host[j] = parent, placed
+            new.appendBodyToJoint(parent, _with_masses(old.inertias[j], name, along, values), placed)
+        if values.get(PAYLOAD, 0.0) and self._target is not None:
+            frame = old.frames[self._tree.frame_id(self._target[0])]
+            parent, placed = host[frame.parentJoint]
+            point = pin.Inertia(values[PAYLOAD], np.array(frame.placement.act(self._target[1])), np.zeros((3, 3)))
+            new.appendBodyToJoint(parent, point, placed)
         return new
 
 
@@ -184,3 +215,15 @@ def _with_errors(
         R = R @ turned(axis, np.array(values.get(f"{name}.{part}", 0.0)))
     shift = np.array([values.get(f"{name}.{part}", 0.0) for part in LENGTHS])
     return pin.SE3(R, np.array(placement.translation) + shift)
+
+
+def _hinge(axis: Array) -> pin.JointModelRevoluteUnaligned:
+    return pin.JointModelRevoluteUnaligned(axis)
+
+
+def _with_masses(body: pin.Inertia, name: str, along: Array, values: Mapping[str, float]) -> pin.Inertia:
+    """A link that weighs more than in the URDF, at its centre of mass, and that has more inertia about its joint."""
+    mass, more = values.get(f"{name}.{LINK_MASS}", 0.0), values.get(f"{name}.{LINK_INERTIA}", 0.0)
+    if not mass and not more:
+        return body
+    return pin.Inertia(body.mass + mass, np.array(body.lever), np.array(body.inertia) + more * np.outer(along, along))

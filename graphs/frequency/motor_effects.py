@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What drives and motors do that is not linear, as the motion that was measured makes them do it.
+
+A wave of a gear, a gap and a spring that hardens are an offset u between motor and link, whose torque then is that of
+the spring turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
+
+    u = p_BL (-sign d), c cos(o q) + s sin(o q), -k3 d^3 / k        p = pull u'(q), T e^(-(v / v_s)^2) tanh(k v), c |pull| tanh(k v)
+
+with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
+parameter, along the motion of the stage before; measured torques that are late or scaled are linear at every line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.robots.geometry.error_parameters import (
+    BACKLASH,
+    CUBIC,
+    LOAD_FRICTION,
+    RIPPLE,
+    STRIBECK,
+    TORQUE_DELAY,
+    TORQUE_SHARE,
+)
+from jointscope.robots.geometry.flexible_arm import FlexibleArm
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+FINER = 8  # samples by the lines of the motion: what turns over within a swing has many of them
+SHARP = 1e-5  # [rad] over which a gap turns over, at least
+BREAKAWAY = 0.02  # [rad/s] v_s, which a swing of some degrees per second passes through at every turn
+
+
+@dataclass(frozen=True)
+class MotorEffects:
+    """What effects of unit size do to the motors of a pose, by the name of their parameter.
+
+    Attributes:
+        offsets: motor, and turns that its drive is off by, in every experiment as it was, shape (b, K) [rad].
+        torques: motor, and torques that it needs beside, shape (b, K) [N m].
+    """
+
+    offsets: Mapping[str, tuple[int, Complex]]
+    torques: Mapping[str, tuple[int, Complex]]
+
+    def offset(self, values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
+        """Sum of all offsets at some sizes, shape (b, K, nu) [rad]."""
+        return _summed(self.offsets, values, shape)
+
+    def torque(self, values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
+        """Sum of all torques at some sizes, shape (b, K, nu) [N m]."""
+        return _summed(self.torques, values, shape)
+
+
+def motor_effects(
+    arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], sharpness: Array, x: Complex
+) -> MotorEffects:
+    """The effects that `values` name.
+
+    Args:
+        arm: its springs.
+        pose: the motion of the motors.
+        values: of all parameters by name.
+        sharpness: of the dry friction of each motor, shape (nu,) [s/rad].
+        x: motion of the arm behind its springs, shape (b, K, n) [rad].
+    """
+    offsets: dict[str, tuple[int, Complex]] = {}
+    torques: dict[str, tuple[int, Complex]] = {}
+    for i, joint in enumerate(arm.joints):
+        laws = list(_laws(joint, values))
+        if not laws:
+            continue
+        motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
+        for part in laws:
+            u, p = motion.does(part, joint, values)
+            for found, wave in ((offsets, u), (torques, p)):
+                if wave is not None:
+                    found[f"{joint}.{part}"] = i, motion.lines(wave)
+    return MotorEffects(offsets, torques)
+
+
+def measured_torques(
+    joints: tuple[str, ...], tau: Complex, w: Array, values: Mapping[str, float]
+) -> tuple[Complex, dict[str, Complex]]:
+    """Torques of the motors from those that were measured, and derivatives of what the balance lacks by name.
+
+    Args:
+        joints: whose motors they are.
+        tau: measured, shape (e, l, nu) [N m].
+        w: of the lines, shape (l,) [rad/s].
+        values: of all parameters by name.
+    """
+    early = np.exp(1j * w * values.get(TORQUE_DELAY, 0.0))[:, None]
+    shares = np.array([values.get(f"{joint}.{TORQUE_SHARE}", 0.0) for joint in joints])
+    true = (1.0 + shares) * early * tau
+    columns = {f"{joint}.{TORQUE_SHARE}": -early * tau * own for joint, own in zip(joints, np.eye(len(joints)))}
+    columns[TORQUE_DELAY] = -1j * w[:, None] * true
+    return true, {name: column for name, column in columns.items() if name in values}
+
+
+def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
+    for part in (*RIPPLE[:2], BACKLASH, CUBIC, STRIBECK, LOAD_FRICTION):
+        if f"{joint}.{part}" in values:
+            yield part
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A motor and its drive in time, shape (b, N) each."""
+
+    q: Array
+    v: Array
+    d: Array
+    pull: Array
+    stiffness: float
+    sharpness: float
+    kept: int
+
+    @staticmethod
+    def of(
+        arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex, i: int, sharpness: float
+    ) -> _Motion:
+        m, spring = pose.motions[:, :, i], arm.springs[arm.driven[i]]
+        K = m.shape[1]
+        count = next_fast_len(FINER * K, real=True)
+        s = 2j * np.pi * pose.found.excitation.f0 * np.arange(K)
+        d = x[:, :, arm.driven[i]] - m
+        kappa = arm.dynamic(s.imag, values)[:, arm.driven[i]]
+        q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, s * m, d, -kappa * d))
+        return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, K)
+
+    def lines(self, wave: Array) -> Complex:
+        return np.asarray(np.fft.rfft(wave, axis=1)[:, : self.kept] / wave.shape[1])
+
+    def does(self, part: str, joint: str, values: Mapping[str, float]) -> tuple[Array | None, Array | None]:
+        """Offset and torque of unit size."""
+        if part in RIPPLE[:2]:
+            order = values[f"{joint}.{RIPPLE[2]}"]
+            c, s = np.cos(order * self.q), np.sin(order * self.q)
+            wave, slope = (c, -order * s) if part == RIPPLE[0] else (s, order * c)
+            return wave, self.pull * slope
+        if part == BACKLASH:
+            return -np.tanh(self.d / max(abs(values[f"{joint}.{part}"]), SHARP)), None
+        if part == CUBIC:
+            return -(self.d**3) / self.stiffness, None
+        turn = np.tanh(self.sharpness * self.v)
+        if part == STRIBECK:
+            return None, np.exp(-((self.v / BREAKAWAY) ** 2)) * turn
+        return None, np.abs(self.pull) * turn
+
+
+def _summed(parts: Mapping[str, tuple[int, Complex]], values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
+    total = np.zeros(shape, dtype=complex)
+    for name, (motor, wave) in parts.items():
+        total[:, :, motor] += values[name] * wave
+    return total
