@@ -8,7 +8,7 @@ of them, then ever fewer, for a resonance at the wrong place makes a few lines l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -74,6 +74,23 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     return replace(now, stage=replace(stage, whiten=whiten, unlikely=size))
 
 
+def with_columns(problem: FrequencySet, robot: Robot) -> FrequencySet:
+    """A pose at its last stage with columns of effects that a robot has beside, all of which do nothing yet."""
+    pose, old = problem.pose, problem.stage
+    assert old.x is not None
+    other = FrequencySet(robot, pose, old)
+    values = {name: p.value for name, p in robot.parameters.items()}
+    parts, sharpness = other.arm.linearised(pose.q, values).mean, other.sharpness(values)
+    k = motor_stiffness(other.arm, parts, pose.w, values)
+    slopes = geometry_slopes(other.arm, robot, pose, set(problem.robot.parameters))
+    more = k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines])
+    columns = dict(old.geometry) | dict(zip(slopes.names, more, strict=True))
+    effects = motor_effects(problem.arm, pose, values, sharpness, old.x)
+    columns |= measured_torques(problem.arm.joints, pose.torques, pose.w, values)[1]
+    columns |= _of_effects(problem, values, k, effects)
+    return replace(other, stage=replace(old, parts=parts, geometry=columns, values=values))
+
+
 def _moving(
     before: FrequencySet, values: Mapping[str, float], k: MotorStiffness, sharpness: Array
 ) -> tuple[Complex, Complex, dict[str, Complex]]:
@@ -122,7 +139,9 @@ def _covariance(r: Complex, width: int) -> Complex:
     return np.asarray(mean + floor)
 
 
-def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose) -> GeometrySlopes:
+def geometry_slopes(
+    arm: FlexibleArm, robot: Robot, pose: ShakenPose, known: Collection[str] = ()
+) -> GeometrySlopes:
     """How M, C and G follow geometric errors and errors of masses that are parameters of the robot, by differences.
 
     They change by thousandths where geometry does by millimetres, so one look serves all stages.
@@ -132,6 +151,7 @@ def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose) -> Geometr
     kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]}
     steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {PAYLOAD: STEP["mass"]}
     free = [name for name in steps if name in robot.parameters and not robot.parameters[name].fixed]
+    free = [name for name in free if name not in known]
     parts, shape = arm.linearised(pose.q, values).mean, (len(free), len(arm.springs), len(arm.springs))
     moved = [arm.linearised(pose.q, {**values, name: values[name] + steps[name]}).mean for name in free]
     M, C, G = (

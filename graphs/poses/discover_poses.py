@@ -23,7 +23,7 @@ from jointscope.graphs.poses.calibrate_poses import (
     placed,
     squared_distances,
 )
-from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, with_effect
+from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors

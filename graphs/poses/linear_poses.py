@@ -7,6 +7,7 @@ some poses or on all, are then small systems of equations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,26 +17,23 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.robots.geometry.error_parameters import RIPPLE
-from jointscope.robots.geometry.arm_effects import ArmHypothesis
+from jointscope.robots.geometry.added_effect import RIGID, at_null
+from jointscope.robots.geometry.arm_effects import POSES, ArmHypothesis
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.parameter import Parameter
 
 Array = NDArray[np.float64]
 SPREAD = 1.0  # [m] prior sigma of the point of a contact, so that one that was left out has one
-ORDER_SIGMA = 0.3  # of the waves per turn, about the best whole number
-RIGID = 1e12  # [N m/rad] start of a stiffness whose compliance is looked for
+FOLDS = 10
 
 
 @dataclass(frozen=True)
 class LinearPoses:
-    """Whitened rows of all poses: residual r + J d of a step d away from the calibrated values.
+    """Whitened rows of all poses: residual r + J d of a step d away from the calibrated values (`LinearKind`).
 
     Attributes:
         r: shape (3 m,) [sigma].
         J: columns of the values and of the points of contacts, shape (3 m, p).
         tied: information on the columns from priors and known distances, shape (p, p).
-        pull: slope of the cost of these at the calibrated values, which that of the poses balances, shape (p,).
         groups: number of the group of each pose, shape (m,).
         contacts: number of the contact of each pose, shape (m,); -1 where a tracker measured.
         whiten: of each pose, shape (m, 3, 3).
@@ -44,10 +42,11 @@ class LinearPoses:
     r: Array
     J: Array
     tied: Array
-    pull: Array
     groups: NDArray[np.intp]
     contacts: NDArray[np.intp]
     whiten: Array
+
+    kind = POSES
 
     @staticmethod
     def of(result: PoseCalibration) -> LinearPoses:
@@ -55,8 +54,7 @@ class LinearPoses:
         pieces, names, held, size = [], list[str](), list[int](), len(result.names)
         total = size + 3 * sum(len(problem.contacts) for problem in result.problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
-        sigmas = np.array([result.robot.parameters[name].coordinate_sigma for name in result.names])
-        tied[:size, :size] = np.diag(sigmas**-2)
+        tied[:size, :size] = prior_information(result.robot, result.names)
         first = size
         for problem, calibration in zip(result.problems, result.calibrations, strict=True):
             index = calibration.columns[DYNAMICS]
@@ -76,7 +74,22 @@ class LinearPoses:
         groups = {name: i for i, name in enumerate(dict.fromkeys(names))}
         r, J, W = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         numbers = np.array([groups[name] for name in names])
-        return LinearPoses(r, J, tied, -J.T @ r, numbers, np.array(held), W)
+        return LinearPoses(r, J, tied, numbers, np.array(held), W)
+
+    @cached_property
+    def fold_of(self) -> NDArray[np.intp]:
+        """Fold of each pose: whole groups, every tenth one together, so that neighbours in time are apart."""
+        return np.asarray(self.groups % min(FOLDS, int(self.groups.max()) + 1))
+
+    @property
+    def folds(self) -> int:
+        """Number of folds."""
+        return int(self.fold_of.max()) + 1
+
+    @property
+    def counted(self) -> float:
+        """Number of measured coordinates."""
+        return float(len(self.r))
 
     @cached_property
     def basis(self) -> Array:
@@ -89,34 +102,38 @@ class LinearPoses:
 
     def beside(self, extra: Array) -> Array:
         """What is left of columns when everything else may explain them, shape (3 m + p, k)."""
-        wide = np.vstack([extra, np.zeros((len(self.pull), extra.shape[1]))])
+        wide = np.vstack([extra, np.zeros((len(self.tied), extra.shape[1]))])
         return np.asarray(wide - self.basis @ (self.basis.T @ wide))
 
-    def fitted(self, extra: Array, sigmas: Array, kept: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
-        """Step of all columns and of extra ones on some poses, shape (p + k,), and its covariance."""
-        rows = slice(None) if kept is None else np.repeat(kept, 3)
-        A, p = np.hstack([self.J, extra])[rows], len(self.pull)
-        H, slope = A.T @ A, A.T @ self.r[rows]
-        H[:p, :p] += self.tied
-        H[p:, p:] += np.diag(sigmas**-2.0)
-        slope[:p] += self.pull
-        covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-        return -covariance @ slope, covariance
+    def equations(self, extra: Array, out: int | None = None) -> tuple[Array, Array]:
+        """As `LinearKind` says."""
+        rows = slice(None) if out is None else np.repeat(self.fold_of != out, 3)
+        A = self._wide(extra)[rows]
+        return A.T @ A, A.T @ self.r[rows]
 
-    def left(self, extra: Array, step: Array) -> Array:
-        """Squared distances of the poses after a step [sigma^2], shape (m,)."""
-        rows = self.r + np.hstack([self.J, extra]) @ step
-        return np.asarray(np.sum(rows.reshape(-1, 3) ** 2, axis=1))
+    def fall(self, extra: Array, step: Array) -> float:
+        """As `LinearKind` says."""
+        rows = self.r + self._wide(extra) @ step
+        return float(self.r @ self.r - rows @ rows)
 
-    def left_out(self, extra: Array, step: Array, held: NDArray[np.bool_]) -> float:
-        """Sum of squared distances of poses that a step was not fitted to; their contacts are where they fit best."""
-        rows = (self.r + np.hstack([self.J, extra]) @ step).reshape(-1, 3)
+    def left_out(self, extra: Array, step: Array, fold: int) -> float:
+        """As `LinearKind` says; contacts of the poses that were left out are where they fit best."""
+        rows = (self.r + self._wide(extra) @ step).reshape(-1, 3)
+        held = self.fold_of == fold
         for contact in set(self.contacts[held].tolist()) - {-1}:
             mine = self.contacts == contact
             W = self.whiten[mine]
             H, slope = np.einsum("mij,mik->jk", W, W), np.einsum("mij,mi->j", W, rows[mine])
             rows[mine] -= W @ np.linalg.solve(H, slope)
         return float(np.sum(rows[held] ** 2))
+
+    def _wide(self, extra: Array) -> Array:
+        return np.hstack([self.J, extra]) if extra.size else self.J
+
+
+def prior_information(robot: Robot, names: Sequence[str]) -> Array:
+    """Of the priors on some parameters, shape (p, p)."""
+    return np.diag([robot.parameters[name].coordinate_sigma ** -2.0 for name in names])
 
 
 def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
@@ -125,9 +142,7 @@ def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
     Of a stiffness its compliance counts, which is zero in a rigid joint.
     """
     found = []
-    robot = with_effect(
-        result.robot, hypothesis, dict.fromkeys(hypothesis.names, RIGID if hypothesis.kind.soft else 0.0)
-    )
+    robot = at_null(result.robot, [hypothesis])
     for problem, calibration in zip(result.problems, result.calibrations, strict=True):
         other = replace(problem, robot=robot)
         added = {n: p.value for n, p in robot.parameters.items() if n not in result.robot.parameters}
@@ -135,19 +150,6 @@ def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
         columns = np.stack([by_value[name] for name in hypothesis.names], axis=2)
         found.append(-columns * RIGID**2 if hypothesis.kind.soft else columns)
     return np.concatenate(found)
-
-
-def with_effect(robot: Robot, hypothesis: ArmHypothesis, values: dict[str, float]) -> Robot:
-    """The robot with an effect whose sizes begin at some values."""
-    kind, parameters = hypothesis.kind, dict(robot.parameters)
-    for name in hypothesis.names:
-        value = values[name]
-        prior, sigma = (value, 1.1 * value) if kind.soft else (0.0, kind.size)
-        parameters[name] = Parameter(name, value, kind.unit, prior, sigma, positive=kind.soft, effect=kind.id)
-    if kind.orders:
-        name, order = f"{hypothesis.owner}.{RIPPLE[2]}", float(hypothesis.order or kind.orders[0])
-        parameters[name] = Parameter(name, order, "1", order, ORDER_SIGMA, positive=False, effect=kind.id)
-    return replace(robot, parameters=parameters)
 
 
 def _whitened(problem: PoseSet, calibration: Calibration) -> tuple[Array, Array, Array]:

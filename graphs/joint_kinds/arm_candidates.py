@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All effects that a calibrated arm lacks, judged by poses, by frequency responses, or by both together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.frequency.linear_responses import STIFFNESSES, LinearResponses, ResponseColumns
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, with_look_alikes
+from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
+from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information
+from jointscope.graphs.poses.ripple_orders import with_best_order
+from jointscope.robots.errors import RobotError
+from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis, hypotheses
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+ALIKE = 0.95  # correlation of columns after all else
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """An arm calibrated from one kind or both in one graph.
+
+    Attributes:
+        poses: what poses are at the values; None without.
+        frequency: what frequency responses are at them; None without.
+    """
+
+    poses: PoseCalibration | None
+    frequency: FrequencyCalibration | None
+
+    @property
+    def robot(self) -> Robot:
+        """With the values that were found."""
+        found = self.poses or self.frequency
+        assert found is not None
+        return found.robot
+
+    @property
+    def effects(self) -> list[ArmHypothesis]:
+        """What the model lacks, as far as one of the kinds shows it."""
+        tracked, shaken, joints = False, None, self.robot.joints
+        if self.poses is not None:
+            tracked = any(problem.poses.target is not None for problem in self.poses.problems)
+            joints = self.poses.problems[0].arm.chain.joints
+        if self.frequency is not None and self.robot.frequency is not None:
+            shaken = self.robot.frequency.joints
+        found = hypotheses(joints, self.robot.parameters, tracked, shaken)
+        return found if self.poses is not None else [h for h in found if not _needs_poses(h, shaken or ())]
+
+
+def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
+    """All effects that a calibrated arm lacks, best first.
+
+    Raises:
+        RobotError: nothing was calibrated.
+    """
+    if result.poses is None and result.frequency is None:
+        raise RobotError(f"{result.robot.name}: no recordings")
+    poses = None if result.poses is None else LinearPoses.of(result.poses)
+    responses, columns = None, None
+    effects, robot = result.effects, result.robot
+    if poses is not None and result.poses is not None:
+        effects = [with_best_order(poses, result.poses, h) for h in effects]
+    if result.frequency is not None:
+        columns = ResponseColumns(robot, result.frequency.problems, effects)
+        responses = columns.linear(0 if poses is None else poses.J.shape[1] - len(result.frequency.names))
+    tied = prior_information(robot, result.frequency.names) if poses is None and result.frequency else None
+    parts: list[LinearKind] = [part for part in (poses, responses) if part is not None]
+    linear = LinearKinds(parts, poses.tied if poses is not None else np.asarray(tied))
+    judge = EffectJudge(linear, len(effects))
+    extras, found = [], []
+    for hypothesis in effects:
+        extra: dict[str, Array] = {}
+        if poses is not None and result.poses is not None and POSES not in hypothesis.kind.unseen:
+            extra[POSES] = poses.whitened(columns_of(result.poses, hypothesis))
+        looks = max(len(hypothesis.kind.orders), 1)
+        if columns is not None and FREQUENCY not in hypothesis.kind.unseen:
+            extra, looks = _with_responses(judge, columns, hypothesis, extra, looks)
+        extras.append(extra)
+        found.append(judge.candidate(hypothesis, extra, looks))
+    kinds = {part.kind: _spaces(part, linear, extras) for part in parts}
+    alone = {kind: _alike(spaces) for kind, spaces in kinds.items()} if len(parts) > 1 else {}
+    both = _alike(_together(parts, linear, extras) if len(parts) > 1 else kinds[parts[0].kind])
+    found = with_look_alikes(found, alone, both)
+    return sorted(found, key=lambda c: -c.evidence)
+
+
+def _with_responses(
+    judge: EffectJudge, columns: ResponseColumns, hypothesis: ArmHypothesis, extra: Mapping[str, Array], looks: int
+) -> tuple[dict[str, Array], int]:
+    """The columns of an effect with those in the responses; a spring is the best one of some."""
+    if not hypothesis.kind.soft:
+        return {**extra, FREQUENCY: columns.of(hypothesis)}, looks
+    tried = [{**extra, FREQUENCY: columns.of(hypothesis, k)} for k in STIFFNESSES]
+    return max(tried, key=lambda each: judge.score(hypothesis, each)), looks * len(STIFFNESSES)
+
+
+def _needs_poses(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
+    """Whether frequency responses alone have nothing to say: no motion, or waves whose number poses tell."""
+    moves = hypothesis.kind.soft or hypothesis.owner in (*shaken, "robot") or hypothesis.kind.id in ("link_mass", "inertia_error")
+    return FREQUENCY in hypothesis.kind.unseen or bool(hypothesis.kind.orders) or not moves
+
+
+def _spaces(part: LinearKind, linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:
+    """What is left of the columns of each effect in a kind when all else may explain them."""
+    root = np.linalg.cholesky(linear.tied).T
+    assert isinstance(part, (LinearPoses, LinearResponses))
+    basis = np.linalg.qr(np.vstack([part.J, root]))[0]
+    return [_left(basis, np.vstack([e[part.kind], np.zeros((len(root), e[part.kind].shape[1]))]))
+            if part.kind in e else np.zeros((len(basis), 0)) for e in extras]  # fmt: skip
+
+
+def _together(
+    parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]
+) -> list[Array]:
+    root = np.linalg.cholesky(linear.tied).T
+    rows = [part for part in parts if isinstance(part, (LinearPoses, LinearResponses))]
+    basis = np.linalg.qr(np.vstack([*(part.J for part in rows), root]))[0]
+    found = []
+    for extra in extras:
+        k = next(iter(extra.values())).shape[1]
+        wide = [extra.get(part.kind, np.zeros((len(part.r), k))) for part in rows]
+        found.append(_left(basis, np.vstack([*wide, np.zeros((len(root), k))])))
+    return found
+
+
+def _left(basis: Array, wide: Array) -> Array:
+    """Orthonormal basis of what is left of columns."""
+    U, s, _ = np.linalg.svd(wide - basis @ (basis.T @ wide), full_matrices=False)
+    return np.asarray(U[:, s > 1e-9 * max(float(s.max(initial=0.0)), 1e-300)])
+
+
+def _alike(spaces: Sequence[Array]) -> list[list[int]]:
+    """Numbers of the spaces that each one is nearly in line with."""
+    return [
+        [j for j, other in enumerate(spaces) if j != i and _overlap(one, other) > ALIKE] for i, one in enumerate(spaces)
+    ]
+
+
+def _overlap(one: Array, other: Array) -> float:
+    """Largest correlation of two spaces."""
+    if not one.size or not other.size:
+        return 0.0
+    return float(np.linalg.svd(one.T @ other, compute_uv=False).max())
+
+
