@@ -18,8 +18,8 @@ from measured_page import environment, write_section
 from tx90l_frequency import frequency_rows
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.joint_kinds.discover_arm import discover_arm
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
-from jointscope.graphs.poses.discover_poses import discover_poses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import contact_distances, tip_errors, without_sag
 from jointscope.robots.files.robot_file import load_robot
@@ -154,7 +154,7 @@ def _row(robot: Robot, seed: int, effects: tuple[str, ...], count: int = 40) -> 
     train, _ = simulate_poses(robot, count, seed, conditions)
     held, _ = simulate_poses(robot, 150, seed, conditions, session="held out")
     began = time.perf_counter()
-    found = discover_poses(robot, [train], [held])
+    found = discover_arm(robot, [train], [held])
     seconds = time.perf_counter() - began
     p90 = [step.heldout.to_json()["p90_mm"] for step in found.steps if step.heldout is not None]
     names = [step.added.hypothesis.label for step in found.steps if step.added is not None]

@@ -176,7 +176,7 @@ class ResponseColumns:
         if hypothesis.kind.soft and stiffness is not None:
             return np.stack([self._whole(name, stiffness) for name in hypothesis.names], axis=1)
         places = [self._place[name] for name in hypothesis.names]
-        scale = -RIGID**2 if hypothesis.kind.soft else 1.0
+        scale = -(RIGID**2) if hypothesis.kind.soft else 1.0
         found = [J[..., places].reshape(-1, len(places)) for _, J in self._rows]
         return np.concatenate(found) * scale / self._by_value[places]
 
@@ -207,5 +207,3 @@ class ResponseColumns:
             moved = turns - inverse @ problem.torque_balance(values, k).transpose(1, 2, 0)
             found.append((k.Z, moved, problem.stage.whiten @ inverse))
         return found
-
-

@@ -4,7 +4,8 @@
 A wave of a gear, a gap and a spring that hardens are an offset u between motor and link, whose torque then is that of
 the spring turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
 
-    u = p_BL (-sign d), c cos(o q) + s sin(o q), -k3 d^3 / k        p = pull u'(q), T e^(-(v / v_s)^2) tanh(k v), c |pull| tanh(k v)
+    u = -p_BL sign d,    c cos(o q) + s sin(o q),    -k3 d^3 / k
+    p = pull u'(q),      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
 
 with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
 parameter, along the motion of the stage before; measured torques that are late or scaled are linear at every line.
@@ -100,7 +101,9 @@ def measured_torques(
     early = np.exp(1j * w * values.get(TORQUE_DELAY, 0.0))[:, None]
     shares = np.array([values.get(f"{joint}.{TORQUE_SHARE}", 0.0) for joint in joints])
     true = (1.0 + shares) * early * tau
-    columns = {f"{joint}.{TORQUE_SHARE}": -early * tau * own for joint, own in zip(joints, np.eye(len(joints)))}
+    columns = {
+        f"{joint}.{TORQUE_SHARE}": -early * tau * own for joint, own in zip(joints, np.eye(len(joints)), strict=True)
+    }
     columns[TORQUE_DELAY] = -1j * w[:, None] * true
     return true, {name: column for name, column in columns.items() if name in values}
 

@@ -3,7 +3,8 @@
 
     rnea(x, x', x'') + D x' + K x = E (d m' + k m),    tau = k (m - x) + d (m' - x') + J m''
 
-m is the motion of the motors as it was measured, with the offsets of their drives where these have some, x that of the arm behind its springs, E picks the drives from x.
+m is the motion of the motors as it was measured, with the offsets of their drives where these have some, x that of the
+arm behind its springs, E picks the drives from x.
 Inertias change with the motion: with the part that carries the excitation, whose lines answer lines beside them, and
 with the excitation itself. The rigid body is taken in time, springs and dampers line by line, and x is found in steps
 

@@ -62,9 +62,7 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     k, slopes = motor_stiffness(arm, parts, pose.w, values), before.stage.slopes
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
     shift, x, columns = _moving(before, values, k, sharpness)
-    columns |= dict(
-        zip(slopes.names, k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines]), strict=True)
-    )
+    columns |= dict(zip(slopes.names, k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines]), strict=True))
     stage = Stage(parts, eye, shift, pose.friction(sharpness), sharpness, columns, values, False, width, slopes, x=x)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
@@ -139,9 +137,7 @@ def _covariance(r: Complex, width: int) -> Complex:
     return np.asarray(mean + floor)
 
 
-def geometry_slopes(
-    arm: FlexibleArm, robot: Robot, pose: ShakenPose, known: Collection[str] = ()
-) -> GeometrySlopes:
+def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose, known: Collection[str] = ()) -> GeometrySlopes:
     """How M, C and G follow geometric errors and errors of masses that are parameters of the robot, by differences.
 
     They change by thousandths where geometry does by millimetres, so one look serves all stages.
@@ -149,7 +145,9 @@ def geometry_slopes(
     values = {name: p.value for name, p in robot.parameters.items()}
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
     kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]}
-    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {PAYLOAD: STEP["mass"]}
+    steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {
+        PAYLOAD: STEP["mass"]
+    }
     free = [name for name in steps if name in robot.parameters and not robot.parameters[name].fixed]
     free = [name for name in free if name not in known]
     parts, shape = arm.linearised(pose.q, values).mean, (len(free), len(arm.springs), len(arm.springs))

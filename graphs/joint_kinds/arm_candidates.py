@@ -105,7 +105,11 @@ def _with_responses(
 
 def _needs_poses(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
     """Whether frequency responses alone have nothing to say: no motion, or waves whose number poses tell."""
-    moves = hypothesis.kind.soft or hypothesis.owner in (*shaken, "robot") or hypothesis.kind.id in ("link_mass", "inertia_error")
+    moves = (
+        hypothesis.kind.soft
+        or hypothesis.owner in (*shaken, "robot")
+        or hypothesis.kind.id in ("link_mass", "inertia_error")
+    )
     return FREQUENCY in hypothesis.kind.unseen or bool(hypothesis.kind.orders) or not moves
 
 
@@ -118,9 +122,7 @@ def _spaces(part: LinearKind, linear: LinearKinds, extras: Sequence[Mapping[str,
             if part.kind in e else np.zeros((len(basis), 0)) for e in extras]  # fmt: skip
 
 
-def _together(
-    parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]
-) -> list[Array]:
+def _together(parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:
     root = np.linalg.cholesky(linear.tied).T
     rows = [part for part in parts if isinstance(part, (LinearPoses, LinearResponses))]
     basis = np.linalg.qr(np.vstack([*(part.J for part in rows), root]))[0]
@@ -150,5 +152,3 @@ def _overlap(one: Array, other: Array) -> float:
     if not one.size or not other.size:
         return 0.0
     return float(np.linalg.svd(one.T @ other, compute_uv=False).max())
-
-

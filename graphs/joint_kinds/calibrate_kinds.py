@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.agreement import Agreement, agreement
-from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration, settled_stages
+from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
+from jointscope.graphs.frequency.settled_stages import MOST_STAGES, settled_stages
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage
 from jointscope.graphs.poses.calibrate_poses import AGREES, PoseCalibration, calibrate_poses, squared_distances
@@ -73,6 +74,8 @@ def calibrate_kinds(
     recordings: Sequence[tuple[Signals, Excitation]],
     sessions: Sequence[Poses],
     progress: Progress | None = None,
+    near: bool = False,
+    most: int = MOST_STAGES,
 ) -> KindsCalibration:
     """Calibrates an arm from both kinds.
 
@@ -81,6 +84,8 @@ def calibrate_kinds(
         recordings: as of `calibrate_frequency`.
         sessions: as of `calibrate_poses`.
         progress: called with a text and the share done.
+        near: whether the values of the robot are near the end.
+        most: number of stages.
 
     Raises:
         JointscopeError: as of both.
@@ -92,8 +97,9 @@ def calibrate_kinds(
     iterations = stages = 0
     for _ in range(MOST_PASSES):
         before = poses
-        problems, solution, steps, more = settled_stages(first, list(poses.problems), report)
-        iterations, stages = iterations + steps, stages + more
+        at = settled_stages(first, list(poses.problems), report, near, most)
+        problems, solution = at.problems, at.solution
+        iterations, stages = iterations + at.iterations, stages + at.stages
         summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])
         poses = calibrate_poses(robot, sessions, report, [summary])
         moved = abs(np.log(poses.repeatability / before.repeatability))
@@ -103,7 +109,7 @@ def calibrate_kinds(
     seconds = time.perf_counter() - began
     found = tuple(problem.of_robot(poses.robot) for problem in problems)
     frequency = FrequencyCalibration(
-        poses.robot, robot, found, poses.names, poses.covariance, iterations, stages, solution.cost, seconds
+        poses.robot, robot, found, poses.names, poses.covariance, iterations, stages, solution.cost, seconds, at.settled
     )
     return KindsCalibration(poses.robot, poses, frequency, alone, summary, _agreement(alone, summary), seconds)
 

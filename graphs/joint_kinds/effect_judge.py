@@ -160,9 +160,9 @@ class EffectJudge:
         return found
 
 
-def with_look_alikes(found: list[ArmCandidate], alike: Mapping[str, list[list[int]]], both: list[list[int]]) -> list[
-    ArmCandidate
-]:
+def with_look_alikes(
+    found: list[ArmCandidate], alike: Mapping[str, list[list[int]]], both: list[list[int]]
+) -> list[ArmCandidate]:
     """Names of what does the same, in all kinds together and in each kind alone.
 
     Args:

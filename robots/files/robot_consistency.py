@@ -7,8 +7,8 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.frequency_section import check_frequency, frequency_units
 from jointscope.robots.files.needed_spring import needed_spring
 from jointscope.robots.files.transmission_section import check_transmission, element_units
-from jointscope.robots.geometry.error_parameters import pose_units
 from jointscope.robots.geometry.arm_effects import effect_units
+from jointscope.robots.geometry.error_parameters import pose_units
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean

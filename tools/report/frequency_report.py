@@ -33,14 +33,14 @@ def frequency_report(
         more: sections at the end.
     """
     paths = ", ".join(problem.pose.path for problem in result.problems)
-    sections = [
-        _verdict(result),
-        *acceptance(checked),
-        _values(result),
-        *response_sections(result),
-        *more,
-    ]
+    verdict, *others = frequency_sections(result)
+    sections = [verdict, *acceptance(checked), *others, *more]
     return page(f"{result.robot.name}: drives and bearings from frequency responses", paths, sections)
+
+
+def frequency_sections(result: FrequencyCalibration) -> list[Section]:
+    """What a page says of frequency responses; the verdict comes first."""
+    return [_verdict(result), _values(result), *response_sections(result)]
 
 
 def _verdict(result: FrequencyCalibration) -> Section:

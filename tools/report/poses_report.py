@@ -10,16 +10,16 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
-from jointscope.graphs.poses.discover_poses import PoseDiscovery
 from jointscope.graphs.poses.tip_errors import parts_of, summary
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
-from jointscope.tools.terminal.pose_discovery_text import step_table
+from jointscope.tools.terminal.arm_discovery_text import step_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 Array = NDArray[np.float64]
@@ -29,7 +29,6 @@ MM, MICRO = 1e3, 1e6
 
 def poses_report(
     result: PoseCalibration,
-    found: PoseDiscovery | None = None,
     checked: AcceptedBy = NO_LIMITS,
     more: Sequence[Section] = (),
 ) -> str:
@@ -37,14 +36,11 @@ def poses_report(
 
     Args:
         result: the calibration.
-        found: the discovery whose last step it is.
         checked: limits that the user has declared, as they came out.
         more: sections at the end.
     """
     paths = ", ".join(problem.poses.path for problem in result.problems)
     sections = pose_sections(result)
-    if found is not None:
-        sections.insert(1, _steps(found))
     sections[1:1] = acceptance(checked)
     return page(f"{result.robot.name}: geometry and sag from poses", paths, [*sections, *more])
 
@@ -55,7 +51,7 @@ def pose_sections(result: PoseCalibration) -> list[Section]:
     return [make(result) for make in makers]
 
 
-def _steps(found: PoseDiscovery) -> Section:
+def steps_section(found: ArmDiscovery) -> Section:
     """The waterfall: what each effect that was added is worth."""
     head, rows = step_table(found)
     rows = [[escape(cell) for cell in row] for row in rows]

@@ -13,6 +13,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
 from jointscope.tools.verb_parts.first_look import first_look
+from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, add_holdout_frequency_option
 from jointscope.tools.verb_parts.pose_runs import add_holdout_poses_option, add_poses_option, check_one_kind
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
@@ -33,6 +34,8 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_poses_option(parser)
     add_holdout_poses_option(parser)
+    add_frequency_option(parser)
+    add_holdout_frequency_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -40,24 +43,29 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
 def input_files(args: argparse.Namespace) -> list[Path]:
     """Everything that must not be overwritten."""
     robot = [Path(args.robot)] if Path(args.robot).is_file() else []
-    poses = [*args.poses, *args.holdout_poses]
-    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *poses, *args.effects]
+    still = [*args.poses, *args.holdout_poses, *args.frequency, *args.holdout_frequency]
+    return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *still, *args.effects]
 
 
 def check_kind(args: argparse.Namespace) -> None:
-    """One kind of recording, and no option of the other.
+    """Kinds of recordings that go together, and no option of another.
 
     Raises:
-        RecordingError: none, both, or such an option.
+        RecordingError: none, kinds that do not go together, or such an option.
     """
     of_motion = {
         "--holdout": args.holdout is not None,
         "--holdout-share": args.holdout_share is not None,
         "--leave-out": bool(args.leave_out),
     }
-    check_one_kind(args.bags, args.poses, None, of_motion)
+    check_one_kind(args.bags, args.poses, None, of_motion, args.frequency)
     if args.holdout_poses and not args.poses:
         raise RecordingError("--holdout-poses goes with --poses")
+    if args.holdout_frequency and not args.frequency:
+        raise RecordingError("--holdout-frequency goes with --frequency")
+    twice = next((path for path in args.holdout_frequency if path in args.frequency), None)
+    if twice is not None:
+        raise RecordingError(f"{twice} is given with --frequency and held out; leave it out once")
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:

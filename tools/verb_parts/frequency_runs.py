@@ -34,6 +34,18 @@ def add_frequency_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_holdout_frequency_option(parser: argparse.ArgumentParser) -> None:
+    """Adds --holdout-frequency."""
+    parser.add_argument(
+        "--holdout-frequency",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="BAG",
+        help="recordings of the arm shaken that are scored once per step and never choose",
+    )
+
+
 def run_frequency_calibration(
     robot: Robot, paths: Sequence[Path], files: ResultFiles, limits: Sequence[Limit], progress: Progress
 ) -> tuple[str, AcceptedBy]:

@@ -17,7 +17,6 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from
-from jointscope.tools.writing.whole_file import write_json
 
 
 def add_poses_option(parser: argparse.ArgumentParser) -> None:
@@ -152,80 +151,6 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
     }
     used = [{"kind": "poses", "path": poses.path, "sha256": poses.sha256} for poses in sessions]
     return pose_errors_text(by_label, count), {"models": content, "recordings": used}
-
-
-def run_pose_search(
-    robot: Robot, paths: Sequence[Path], holdout: Sequence[Path], files: ResultFiles, search: bool, progress: Progress
-) -> str:
-    """Looks for effects, adds them if `search`, writes the files, and returns what the screen says.
-
-    Raises:
-        RobotError: pictures were asked for that poses do not have.
-        JointscopeError: the poses cannot be used, or a file cannot be written; then none is.
-    """
-    from jointscope.graphs.poses.calibrate_poses import calibrate_poses
-    from jointscope.graphs.poses.discover_poses import discover_poses, pose_candidates
-    from jointscope.tools.bags.at_poses.read_poses import read_poses
-    from jointscope.tools.report.poses_report import poses_report
-    from jointscope.tools.terminal.pose_discovery_text import pose_discovery_text, pose_ranking_text
-
-    if files.rrd is not None or (files.pictures and not search):
-        raise RobotError(f"{robot.name}: poses have a report with `calibrate` and `discover`; leave the option out")
-    sessions = [read_poses(path, robot) for path in paths]
-    if not search:
-        result = calibrate_poses(robot, sessions, progress)
-        candidates = pose_candidates(result)
-        if files.json is not None:
-            write_json(
-                files.json, {"adequate": _adequate(candidates), "candidates": [_candidate(c) for c in candidates]}
-            )
-        return pose_ranking_text(candidates, result.count)
-    found = discover_poses(robot, sessions, [read_poses(path, robot) for path in holdout], progress)
-    last = found.steps[-1].result
-    made, content = pose_origin(last, robot), _discovery(found, files.robot)
-    write_still(files, found.robot, made, partial(poses_report, last, found), content)
-    return pose_discovery_text(found)
-
-
-def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:
-    steps = []
-    for step in found.steps:
-        train = found.whitened(step, step.result.problems)
-        held = found.whitened(step, found.holdout) if found.holdout else None
-        errors = {"train_error": train, "heldout_error": held, "floor": 1.0}
-        by_kind = {"by_kind": {"poses": train if held is None else held}}
-        mm = {"poses": None if step.heldout is None else step.heldout.to_json()}
-        added = {"added": step.added.hypothesis.label if step.added else None, "removed": None}
-        steps.append(added | errors | by_kind | mm | {"candidates": [_candidate(c) for c in step.candidates]})
-    last = found.steps[-1].candidates
-    return {
-        "steps": steps,
-        "stop_reason": found.stop_reason,
-        "adequate": _adequate(last),
-        "robot_file": None if robot_file is None else str(robot_file),
-    }
-
-
-def _adequate(candidates: Sequence[Any]) -> bool:
-    return not any(c.verdict == "missing" for c in candidates)
-
-
-def _candidate(c: Any) -> dict[str, Any]:
-    kind = c.hypothesis.kind
-    unit = "rad/(N m)" if kind.soft else kind.unit
-    names = [n.replace("stiffness", "compliance") if kind.soft else n for n in c.hypothesis.names]
-    sizes = zip(names, c.sizes, c.sigmas, strict=True)
-    return {
-        "effect": kind.id,
-        "owner": c.hypothesis.owner,
-        "score": c.score,
-        "dof": len(c.sizes),
-        "p_value": c.p_value,
-        "parameters": {name: {"value": value, "sigma": sigma, "unit": unit} for name, value, sigma in sizes},
-        "gain": c.gain,
-        "look_alikes": list(c.look_alikes),
-        "verdict": c.verdict,
-    }
 
 
 def pose_json(result: Any) -> dict[str, Any]:

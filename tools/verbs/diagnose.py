@@ -8,14 +8,15 @@ from typing import Any
 
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
-from jointscope.tools.verb_parts.pose_runs import run_pose_search
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
+from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
+  jointscope diagnose tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv
 
 The robot is calibrated first. Effects are chosen by blocks of the training recordings that were left out; the held-out
 recording never chooses. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
@@ -47,9 +48,10 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
-    if args.poses:
+    if args.poses or args.frequency:
+        given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:
-            print(run_pose_search(robot, args.poses, (), files, False, progress))
+            print(run_arm_search(robot, given, held, files, False, progress))
         return 0
     check_viewer(robot, files)
     with progress_bar() as progress, workers_of(args) as workers:

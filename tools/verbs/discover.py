@@ -13,8 +13,8 @@ from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
-from jointscope.tools.verb_parts.pose_runs import run_pose_search
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
+from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
@@ -22,6 +22,7 @@ from jointscope.tools.writing.whole_file import check_outputs
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
   jointscope discover tx90l --poses poses.csv --holdout-poses others.csv -o found.yaml
+  jointscope discover tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv -o found.yaml
 
 Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
 after the last finished step; found.discovery.json remembers what it started from."""
@@ -61,9 +62,10 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.discovery_text import discovery_text
 
     robot = load_robot(args.robot)
-    if args.poses:
+    if args.poses or args.frequency:
+        given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:
-            print(run_pose_search(robot, args.poses, args.holdout_poses, files, True, progress))
+            print(run_arm_search(robot, given, held, files, True, progress))
         files.tell()
         return 0
     check_viewer(robot, files)

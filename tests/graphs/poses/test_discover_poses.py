@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candidates
+from jointscope.graphs.joint_kinds.discover_arm import discover_arm
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
-from jointscope.graphs.poses.discover_poses import discover_poses, pose_candidates
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.robots.errors import EffectError, SimulationError
@@ -48,7 +49,7 @@ def test_the_engine_and_the_model_agree_about_an_arm_that_sags(tx90l):
 
 @pytest.mark.parametrize("seed", [0, 5, 6])
 def test_nothing_is_found_on_an_arm_to_which_nothing_was_done(tx90l, seed):
-    found = discover_poses(tx90l, [sessions(tx90l, seed)[0]])
+    found = discover_arm(tx90l, [sessions(tx90l, seed)[0]])
     assert [step.added for step in found.steps] == [None]
     assert "no effect is significant" in found.stop_reason
 
@@ -56,7 +57,7 @@ def test_nothing_is_found_on_an_arm_to_which_nothing_was_done(tx90l, seed):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_what_was_hidden_is_named_first_with_its_size(tx90l, fault):
     train, others, _ = sessions(tx90l, 21 if "cubic" in fault else 20, [fault])
-    found = discover_poses(tx90l, [train], [others])
+    found = discover_arm(tx90l, [train], [others])
     assert [step.added.hypothesis.label for step in found.steps[1:]] == [fault.partition(":")[0]]
     name, truth = FAULTS[fault]
     p = found.robot.parameters[name]
@@ -68,12 +69,14 @@ def test_what_was_hidden_is_named_first_with_its_size(tx90l, fault):
 
 def test_two_effects_are_found_one_after_the_other(tx90l):
     hidden = ["encoder_eccentricity@joint2:cos=2e-4", "joint_elasticity@joint5"]
-    found = discover_poses(tx90l, [sessions(tx90l, 3, hidden)[0]])
+    found = discover_arm(tx90l, [sessions(tx90l, 3, hidden)[0]])
     assert {step.added.hypothesis.label for step in found.steps[1:]} == {text.partition(":")[0] for text in hidden}
 
 
 def test_backlash_does_not_win_over_the_softness_that_it_looks_like(tx90l):
-    candidates = pose_candidates(calibrate_poses(tx90l, [sessions(tx90l, 20, ["joint_elasticity@joint5"])[0]]))
+    candidates = arm_candidates(
+        Calibrated(calibrate_poses(tx90l, [sessions(tx90l, 20, ["joint_elasticity@joint5"])[0]]), None)
+    )
     assert candidates[0].hypothesis.label == "joint_elasticity@joint5"
 
 

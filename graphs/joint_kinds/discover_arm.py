@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a model of an arm lacks, from poses, frequency responses or both: effects are added as long as one is missing.
+
+Every step calibrates the model with all recordings in one graph and judges all effects that it lacks, from one linear
+system. Where frequency responses are among the recordings, a step of a spring or a gap is no small one, so the leading
+effects are calibrated for real, and the one that makes the recordings likeliest is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
+from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, frequency_errors
+from jointscope.graphs.frequency.frequency_set import BAND
+from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candidates
+from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, placed, squared_distances
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
+from jointscope.robots.errors import SolveError
+from jointscope.robots.geometry.added_effect import with_effect
+from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.recordings.signals import Excitation, Signals
+
+Array = NDArray[np.float64]
+Shaken = tuple[Signals, Excitation]
+Report = Callable[[str, float], None]
+MOST_STEPS = 8
+STAGES = 10  # of a model that may lack something, which need not come to rest
+LEADING, NEARLY = 3, 0.3  # effects that are calibrated for real, and their evidence over that of the best one
+
+
+@dataclass(frozen=True)
+class ArmStep:
+    """One model on the way: what was added, its calibration, its errors where they were not fitted."""
+
+    added: ArmCandidate | None
+    calibrated: Calibrated
+    heldout: TipErrors | None
+    shaken: tuple[FrequencyErrors, ...]
+    candidates: tuple[ArmCandidate, ...]
+
+    @property
+    def result(self) -> PoseCalibration:
+        """The calibration of the poses, where there are any."""
+        assert self.calibrated.poses is not None
+        return self.calibrated.poses
+
+    @property
+    def left(self) -> float:
+        """Share of the torques that the model leaves where the arm was shaken, rms."""
+        assert self.calibrated.frequency is not None
+        return _rms([pose.left for pose in self.calibrated.frequency.explained.poses])
+
+    @property
+    def left_heldout(self) -> float:
+        """The same in recordings that never chose."""
+        return _rms([errors.fit.left for errors in self.shaken])
+
+
+@dataclass(frozen=True)
+class ArmDiscovery:
+    """All steps, why it ended, and the recordings that never chose."""
+
+    steps: tuple[ArmStep, ...]
+    stop_reason: str
+    holdout: tuple[PoseSet, ...] = ()
+
+    @property
+    def robot(self) -> Robot:
+        """The last model."""
+        return self.steps[-1].calibrated.robot
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of the recordings."""
+        last = self.steps[-1].calibrated
+        return tuple(kind for kind, there in ((POSES, last.poses), (FREQUENCY, last.frequency)) if there is not None)
+
+    def whitened(self, step: ArmStep, sessions: Sequence[PoseSet]) -> float:
+        """Root mean square error of a model on poses, per coordinate [sigma of the last model's noise]; 1 is noise."""
+        found = []
+        for problem in sessions:
+            robot = replace(step.calibrated.robot, poses=self.robot.poses)
+            other = replace(problem, robot=robot, repeatability=1.0)
+            found.append(squared_distances(other, other.start(Calibration.of(robot))[1]))
+        return float(np.sqrt(np.mean(np.concatenate(found)) / 3.0))
+
+
+def discover_arm(
+    robot: Robot,
+    sessions: Sequence[Poses] = (),
+    holdout: Sequence[Poses] = (),
+    progress: Report | None = None,
+    recordings: Sequence[Shaken] = (),
+    shaken_holdout: Sequence[Shaken] = (),
+) -> ArmDiscovery:
+    """Grows a model effect by effect.
+
+    Args:
+        robot: with a section `poses`, `frequency`, or both.
+        sessions: poses for training.
+        holdout: poses that are scored once per step and never choose.
+        progress: called with a text and the share done.
+        recordings: of the arm shaken, for training.
+        shaken_holdout: recordings that are scored once per step and never choose.
+
+    Raises:
+        As `calibrate_poses`, `calibrate_frequency` and `calibrate_kinds`.
+    """
+    report = progress or (lambda text, share: None)
+    report("base model", 0.0)
+    result = calibrated(robot, sessions, recordings)
+    steps: list[ArmStep] = []
+    added: ArmCandidate | None = None
+    while True:
+        report(f"looking for effect {len(steps) + 1}", len(steps) / (MOST_STEPS + 1))
+        candidates = arm_candidates(result)
+        leading = _leading(candidates)
+        following = None
+        if leading and len(steps) < MOST_STEPS:
+            following = _best(result, leading, sessions, recordings, report)
+            if following is None:
+                candidates = [replace(c, verdict="possible") if c in leading else c for c in candidates]
+        shaken = frequency_errors(result.robot, shaken_holdout) if shaken_holdout else ()
+        steps.append(ArmStep(added, result, _heldout(result.robot, holdout), shaken, tuple(candidates)))
+        if following is None:
+            why = f"{MOST_STEPS} effects were added, the largest number allowed"
+            if len(steps) <= MOST_STEPS:
+                why = "no effect is significant and meets left-out recordings better"
+                why = why.replace("recordings", "poses") if not recordings else why
+            return ArmDiscovery(tuple(steps), why, tuple(placed(result.robot, holdout)[1]) if holdout else ())
+        added, result = following
+
+
+def calibrated(robot: Robot, sessions: Sequence[Poses], recordings: Sequence[Shaken], near: bool = False) -> Calibrated:
+    """Calibrates with what there is, in one graph.
+
+    Args:
+        robot: the model.
+        sessions: poses.
+        recordings: of the arm shaken.
+        near: whether its values are near the end.
+    """
+    if not recordings:
+        return Calibrated(calibrate_poses(robot, sessions), None)
+    if not sessions:
+        return Calibrated(None, calibrate_frequency(robot, recordings, near=near, most=STAGES))
+    both = calibrate_kinds(robot, recordings, sessions, near=near, most=STAGES)
+    return Calibrated(both.poses, both.frequency)
+
+
+def _leading(candidates: Sequence[ArmCandidate]) -> list[ArmCandidate]:
+    """Missing effects that may turn out to be the best one."""
+    found = sorted((c for c in candidates if c.verdict == "missing"), key=lambda c: -c.evidence)
+    return [c for c in found if c.evidence > NEARLY * found[0].evidence][:LEADING]
+
+
+def _best(
+    result: Calibrated,
+    leading: Sequence[ArmCandidate],
+    sessions: Sequence[Poses],
+    recordings: Sequence[Shaken],
+    report: Report,
+) -> tuple[ArmCandidate, Calibrated] | None:
+    """The effect that makes the recordings likeliest, and the model with it; None where none of them does."""
+    if not recordings:
+        return leading[0], calibrated(_with(result.robot, leading[0]), sessions, ())
+    before, found = _unlikely(result, result), []
+    for candidate in leading:
+        report(f"calibrating with {candidate.hypothesis.label}", 0.5)
+        try:
+            other = calibrated(_with(result.robot, candidate), sessions, recordings, near=True)
+        except SolveError:
+            continue  # an effect that takes the place of another one may have no end
+        found.append((_unlikely(other, result) - before, candidate, other))
+    best = min(found, key=lambda each: each[0], default=None)
+    return None if best is None or best[0] >= 0.0 else best[1:]
+
+
+def _unlikely(result: Calibrated, base: Calibrated) -> float:
+    """Minus twice the logarithm of the likelihood of all recordings, but for a constant.
+
+    A band of neighbouring lines counts as one; of poses the size of the noise is open, its shape is that of `base`.
+    """
+    total = 0.0
+    if result.frequency is not None:
+        total += sum(problem.stage.unlikely for problem in result.frequency.problems) / BAND
+    if result.poses is not None and base.poses is not None:
+        pairs = zip(base.poses.problems, result.poses.problems, result.poses.calibrations, strict=True)
+        squares = [
+            squared_distances(replace(p, robot=replace(own.robot, poses=p.robot.poses)), c).sum() for p, own, c in pairs
+        ]
+        total += sum(problem.measured for problem in base.poses.problems) * float(np.log(sum(squares)))
+    return total
+
+
+def _with(robot: Robot, found: ArmCandidate) -> Robot:
+    """The robot with an effect, beginning at the sizes that were seen."""
+    hypothesis = found.hypothesis
+    if hypothesis.kind.soft:
+        largest = max(found.sizes)
+        sizes = [1.0 / max(size, 0.1 * largest) for size in found.sizes]
+    else:
+        sizes = list(found.sizes)
+    return with_effect(robot, hypothesis, dict(zip(hypothesis.names, sizes, strict=True)))
+
+
+def _heldout(robot: Robot, holdout: Sequence[Poses]) -> TipErrors | None:
+    if not holdout:
+        return None
+    _, problems = placed(robot, holdout)
+    return summary([tip_errors(problem) for problem in problems])
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))

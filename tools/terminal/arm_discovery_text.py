@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What poses and frequency responses say a model lacks: the ranking of effects, and the steps of a discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.poses.tip_errors import TipErrors, summary
+from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
+from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.tools.terminal.text_table import text_table
+
+SHOWN = 8
+TOLD = ("p90_mm", "max_mm")
+WORDS = {POSES: "poses", FREQUENCY: "responses"}
+ALONE = {POSES: "poses alone", FREQUENCY: "frequency responses alone"}
+WITH = {POSES: "with poses", FREQUENCY: "with frequency responses"}
+
+
+def ranking_text(candidates: Sequence[ArmCandidate], said: str, kinds: Sequence[str]) -> str:
+    """The effects that were looked at, best first.
+
+    Args:
+        candidates: all of them.
+        said: what they were fitted to.
+        kinds: of recordings that were used.
+    """
+    rows = []
+    for c in candidates[:SHOWN]:
+        row = [c.hypothesis.label, c.verdict, significant(c.score, 3), f"{c.p_value:.1g}"]
+        for kind in kinds:
+            gain = c.gains.get(kind)
+            row += ["-", "-"] if gain is None else [f"{100.0 * gain.share:.1f} %", f"{100.0 * gain.helped:.0f} %"]
+        shown_by = c.shown_by if c.verdict == "missing" else ()
+        shown = [", ".join(WORDS[kind] for kind in shown_by)] if len(kinds) > 1 else []
+        rows.append([*row, *shown, ", ".join(c.look_alikes)])
+    head = ["effect", "verdict", "chi2 falls by", "p"]
+    for kind in kinds:
+        head += [f"left-out {WORDS[kind]} better by", "of the folds"]
+    head += [*(["shown by"] if len(kinds) > 1 else []), "look-alikes"]
+    told = f"{said}; {len(candidates)} effects were fitted to all but one fold of them and judged by that, in turn"
+    shown_by = "<" if len(kinds) > 1 else ""
+    return f"{told}\n{text_table(head, rows, '<<>>' + '>>' * len(kinds) + shown_by + '<')}"
+
+
+def told_apart(candidate: ArmCandidate) -> list[str]:
+    """What each kind alone would have said of an effect, where all kinds together know more."""
+    found = []
+    label, together = candidate.hypothesis.label, {*candidate.look_alikes}
+    kinds = tuple(candidate.gains)
+    for kind, names in candidate.alone.items():
+        others = [k for k in kinds if k != kind]
+        if others and set(names) - together:
+            rest = " or ".join([label, *candidate.look_alikes])
+            found.append(f"{ALONE[kind]}: {' or '.join([label, *names])}; {WITH[others[0]]}: {rest}")
+    return found
+
+
+def unseen_sentences(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> list[str]:
+    """Effects that one of the kinds cannot show, and why."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for c in candidates:
+        for kind in kinds:
+            if kind in c.hypothesis.kind.unseen and c.hypothesis.kind.id not in found.setdefault(
+                (kind, c.hypothesis.kind.unseen[kind]), []
+            ):
+                found[kind, c.hypothesis.kind.unseen[kind]].append(c.hypothesis.kind.id)
+    return [f"{', '.join(ids)} not testable by {WORDS[kind]}: {why}" for (kind, why), ids in found.items() if ids]
+
+
+def size_sentence(candidate: ArmCandidate) -> str:
+    """The sizes that a linear step gives."""
+    kind = candidate.hypothesis.kind
+    unit = "rad/(N m)" if kind.soft else kind.unit
+    names = [n.replace("stiffness", "compliance") if kind.soft else n for n in candidate.hypothesis.names]
+    sizes = zip(names, candidate.sizes, candidate.sigmas, strict=True)
+    parts = [f"{name} = {significant(value, 3)} +- {significant(sigma, 2)} {unit}" for name, value, sigma in sizes]
+    return f"{candidate.hypothesis.label}: {', '.join(parts)}"
+
+
+def arm_discovery_text(found: ArmDiscovery) -> str:
+    """The steps, and what was looked at last."""
+    head, rows = step_table(found)
+    last, said = found.steps[-1], list[str]()
+    for step in found.steps[1:]:
+        if step.added is None:
+            continue
+        label = step.added.hypothesis.label
+        if len(found.kinds) > 1 and step.added.shown_by:
+            said.append(f"{label} is shown by {' and '.join(WORDS[kind] for kind in step.added.shown_by)}")
+        if step.added.look_alikes:
+            these = "these poses" if found.kinds == (POSES,) else "these recordings"
+            said.append(f"{label} cannot be told from {', '.join(step.added.look_alikes)} by {these}")
+        said += told_apart(step.added)
+    parts = [
+        text_table(head, rows, "<<" + ">" * (len(head) - 2)),
+        f"It ended because {found.stop_reason}.",
+        *said,
+        ranking_text(last.candidates, recordings_said(found), found.kinds),
+        *unseen_sentences(last.candidates, found.kinds if len(found.kinds) > 1 else ()),
+    ]
+    return "\n\n".join(parts)
+
+
+def recordings_said(found: ArmDiscovery) -> str:
+    """How much was fitted."""
+    last = found.steps[-1].calibrated
+    counts = [] if last.poses is None else [f"{last.poses.count} poses"]
+    if last.frequency is not None:
+        counts.append(f"{len(last.frequency.problems)} recordings of the arm shaken")
+    return " and ".join(counts)
+
+
+def step_table(found: ArmDiscovery) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns, and a row per step; those of recordings that were held out only where there are any."""
+    head, rows = ["step", "added"], []
+    if POSES in found.kinds:
+        head += ["90 % [mm]", "largest [mm]", *(["held out: 90 % [mm]", "largest [mm]"] if found.holdout else [])]
+    shaken = bool(found.steps[-1].shaken)
+    if FREQUENCY in found.kinds:
+        head += ["torques left", *(["held out: torques left"] if shaken else [])]
+    for k, step in enumerate(found.steps):
+        row = [str(k), step.added.hypothesis.label if step.added else "base model"]
+        if POSES in found.kinds:
+            seen: list[TipErrors | None] = [summary(step.result.errors), step.heldout]
+            row += [significant(each.to_json()[key], 3) for each in seen if each is not None for key in TOLD]
+        if FREQUENCY in found.kinds:
+            row += [percent(step.left), *([percent(step.left_heldout)] if shaken else [])]
+        rows.append(row)
+    return head, rows

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`diagnose` and `discover` of arms without recordings of motion."""
