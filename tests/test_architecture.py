@@ -28,7 +28,8 @@ tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init
 tools.presentation tools.verdicts tools.terminal tools.report.pdf tools.report.page tools.report.sections.calibration
 tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
-tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verb_parts.simulations tools.notebook tools.verbs tools
+tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verb_parts.simulations tools.verb_parts.searches
+tools.notebook tools.verbs tools
 """.split()
 """All rooms in the order of their imports: a module imports from its own room and from those before it."""
 MOST_FILES = 16

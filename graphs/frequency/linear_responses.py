@@ -28,6 +28,7 @@ from jointscope.robots.geometry.flexible_arm import LOSS
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 STIFFNESSES = tuple(float(k) for k in np.geomspace(4e3, 1e6, 15))  # [N m/rad] of springs that may be missing
 TOLD = 1e-9  # of the largest information: directions with less are not told
 ALONE = 10  # folds of bands, where there is one realisation of one pose
@@ -196,7 +197,7 @@ class ResponseColumns:
         return {spring.stiffness: spring.damping for spring in self._problems[0].arm.springs}
 
     @cached_property
-    def _balances(self) -> list[tuple[Array, Array, Array]]:
+    def _balances(self) -> list[tuple[Complex, Complex, Complex]]:
         """Stiffness, motion that the torques predict, and what whitens torques, of each pose."""
         found = []
         for problem in self._problems:
@@ -205,5 +206,5 @@ class ResponseColumns:
             inverse = np.linalg.inv(problem.with_friction(k.Z, values))
             turns = problem.pose.motion[:, problem.pose.lines].transpose(1, 2, 0)
             moved = turns - inverse @ problem.torque_balance(values, k).transpose(1, 2, 0)
-            found.append((k.Z, moved, problem.stage.whiten @ inverse))
+            found.append((k.Z, moved, np.asarray(problem.stage.whiten @ inverse)))
         return found

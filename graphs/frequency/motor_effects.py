@@ -135,7 +135,7 @@ class _Motion:
         count = next_fast_len(FINER * K, real=True)
         s = 2j * np.pi * pose.found.excitation.f0 * np.arange(K)
         d = x[:, :, arm.driven[i]] - m
-        kappa = arm.dynamic(s.imag, values)[:, arm.driven[i]]
+        kappa = arm.dynamic(np.asarray(s.imag, dtype=np.float64), values)[:, arm.driven[i]]
         q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, s * m, d, -kappa * d))
         return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, K)
 

@@ -120,7 +120,7 @@ def _of_effects(
     for name, (motor, wave) in effects.torques.items():
         own = np.zeros((len(pose.motion), len(lines), len(inertias)), dtype=complex)
         own[:, :, motor] = pose.both_signs(wave)[:, lines]
-        found[name] = found.get(name, 0.0) + own
+        found[name] = own + found[name] if name in found else own
     return found
 
 

@@ -8,7 +8,7 @@ kind, harms no other kind, and has possible sizes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,7 +148,7 @@ class EffectJudge:
             evidence -= part.counted * float(np.log(left))
         return gains, evidence
 
-    def _left_out(self, extra: Mapping[str, Array], sigmas: Array, parts: object) -> dict[str, Array]:
+    def _left_out(self, extra: Mapping[str, Array], sigmas: Array, parts: Sequence[LinearKind]) -> dict[str, Array]:
         """Squared distances of each fold of each kind, fitted to all others."""
         found = {}
         for part in parts:

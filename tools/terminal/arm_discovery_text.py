@@ -41,8 +41,8 @@ def ranking_text(candidates: Sequence[ArmCandidate], said: str, kinds: Sequence[
         head += [f"left-out {WORDS[kind]} better by", "of the folds"]
     head += [*(["shown by"] if len(kinds) > 1 else []), "look-alikes"]
     told = f"{said}; {len(candidates)} effects were fitted to all but one fold of them and judged by that, in turn"
-    shown_by = "<" if len(kinds) > 1 else ""
-    return f"{told}\n{text_table(head, rows, '<<>>' + '>>' * len(kinds) + shown_by + '<')}"
+    sides = "<<>>" + ">>" * len(kinds) + ("<<" if len(kinds) > 1 else "<")
+    return f"{told}\n{text_table(head, rows, sides)}"
 
 
 def told_apart(candidate: ArmCandidate) -> list[str]:
