@@ -145,22 +145,39 @@ def _best_begin(
     Where two begins lead to the same place, the third is not asked.
     """
     given = Calibration.of(problems[0].robot)
-    solution, logarithm = _solved(problems, others, given)
-    iterations = len(solution.iterations)
-    springs = np.array([STIFFNESS in name for name in given.names])
-    mixed = given.with_points({DYNAMICS: np.where(springs, logarithm.dynamics, given.dynamics)})
+    mixed, logarithm, iterations = logarithm_begin(problems, others)
     found = []
     for begin in (mixed, logarithm, given):
-        at, now = begin, [next_stage(problem, begin.only([DYNAMICS])) for problem in problems]
-        for _ in range(TRIALS):
-            solution, at = _solved(now, others, at)
-            iterations += len(solution.iterations)
-            now = [next_stage(problem, at.only([DYNAMICS])) for problem in now]
+        now, at, more = tried(problems, others, begin)
+        iterations += more
         found.append((sum(problem.stage.unlikely for problem in now), now, at))
         if len(found) == 2 and abs(found[1][0] - found[0][0]) < SAME:
             break
     _, best, common = min(found, key=lambda each: each[0])
     return best, common, iterations
+
+
+def logarithm_begin(
+    problems: Sequence[FrequencySet], others: Sequence[SetProblem]
+) -> tuple[Calibration, Calibration, int]:
+    """Values with the stiffnesses that the logarithm finds, all values that it finds, and iterations."""
+    given = Calibration.of(problems[0].robot)
+    solution, logarithm = _solved(problems, others, given)
+    springs = np.array([STIFFNESS in name for name in given.names])
+    mixed = given.with_points({DYNAMICS: np.where(springs, logarithm.dynamics, given.dynamics)})
+    return mixed, logarithm, len(solution.iterations)
+
+
+def tried(
+    problems: Sequence[FrequencySet], others: Sequence[SetProblem], begin: Calibration
+) -> tuple[list[FrequencySet], Calibration, int]:
+    """Poses some stages of the torque balance after a begin, values, and iterations."""
+    at, now, iterations = begin, [next_stage(problem, begin.only([DYNAMICS])) for problem in problems], 0
+    for _ in range(TRIALS):
+        solution, at = _solved(now, others, at)
+        iterations += len(solution.iterations)
+        now = [next_stage(problem, at.only([DYNAMICS])) for problem in now]
+    return now, at, iterations
 
 
 def _solved(

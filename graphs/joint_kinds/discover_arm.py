@@ -8,7 +8,7 @@ effects are calibrated for real, and the one that makes the recordings likeliest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from jointscope.graphs.frequency.frequency_set import BAND
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candidates
 from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, placed, squared_distances
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
@@ -35,7 +36,7 @@ Array = NDArray[np.float64]
 Shaken = tuple[Signals, Excitation]
 Report = Callable[[str, float], None]
 MOST_STEPS = 8
-STAGES = 10  # of a model that may lack something, which need not come to rest
+STAGES = 8  # of a model that may lack something, which need not come to rest
 LEADING, NEARLY = 3, 0.3  # effects that are calibrated for real, and their evidence over that of the best one
 
 
@@ -124,11 +125,11 @@ def discover_arm(
     added: ArmCandidate | None = None
     while True:
         report(f"looking for effect {len(steps) + 1}", len(steps) / (MOST_STEPS + 1))
-        candidates = arm_candidates(result)
+        candidates, begins = candidates_of(result)
         leading = _leading(candidates)
         following = None
         if leading and len(steps) < MOST_STEPS:
-            following = _best(result, leading, sessions, recordings, report)
+            following = _best(result, leading, begins, sessions, recordings, report)
             if following is None:
                 candidates = [replace(c, verdict="possible") if c in leading else c for c in candidates]
         shaken = frequency_errors(result.robot, shaken_holdout) if shaken_holdout else ()
@@ -140,6 +141,20 @@ def discover_arm(
                 why = why.replace("recordings", "poses") if not recordings else why
             return ArmDiscovery(tuple(steps), why, tuple(placed(result.robot, holdout)[1]) if holdout else ())
         added, result = following
+
+
+def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Robot]]:
+    """All effects that a calibrated arm lacks, best first, and robots that begin with one, by its label.
+
+    Where a response is missing, springs of locked joints are put in and tried, too.
+    """
+    candidates = arm_candidates(result)
+    if result.frequency is None or not badly_explained(result.frequency.explained):
+        return candidates, {}
+    screened = screened_springs(result.frequency, candidates)
+    known = {c.hypothesis.label: c for c, _ in screened}
+    found = [known.get(c.hypothesis.label, c) for c in candidates]
+    return sorted(found, key=lambda c: -c.evidence), {c.hypothesis.label: robot for c, robot in screened}
 
 
 def calibrated(robot: Robot, sessions: Sequence[Poses], recordings: Sequence[Shaken], near: bool = False) -> Calibrated:
@@ -168,6 +183,7 @@ def _leading(candidates: Sequence[ArmCandidate]) -> list[ArmCandidate]:
 def _best(
     result: Calibrated,
     leading: Sequence[ArmCandidate],
+    begins: Mapping[str, Robot],
     sessions: Sequence[Poses],
     recordings: Sequence[Shaken],
     report: Report,
@@ -178,8 +194,9 @@ def _best(
     before, found = _unlikely(result, result), []
     for candidate in leading:
         report(f"calibrating with {candidate.hypothesis.label}", 0.5)
+        begin = begins.get(candidate.hypothesis.label) or _with(result.robot, candidate)
         try:
-            other = calibrated(_with(result.robot, candidate), sessions, recordings, near=True)
+            other = calibrated(begin, sessions, recordings, near=True)
         except SolveError:
             continue  # an effect that takes the place of another one may have no end
         found.append((_unlikely(other, result) - before, candidate, other))

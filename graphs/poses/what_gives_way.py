@@ -96,7 +96,7 @@ class WhatGivesWay:
         for j, name in self._gaps.items():
             found[name] = -by_yield[:, :, j] * np.sign(point.gravity[:, j])[:, None]
         for (j, axis), name in self._bearings.items():
-            tilt = point.bearing_gravity[:, j, axis] / self._values[name] ** 2
+            tilt = point.bearing_gravity[:, j, axis] / self._values[name] / self._values[name]  # a trial may be huge
             found[name] = -by_yield[:, :, n * (1 + axis) + j] * tilt[:, None]
         return found
 

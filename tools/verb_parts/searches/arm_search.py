@@ -42,8 +42,13 @@ def run_arm_search(
         RobotError: pictures were asked for that these recordings do not have.
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
-    from jointscope.graphs.joint_kinds.arm_candidates import arm_candidates
-    from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery, ArmStep, calibrated, discover_arm
+    from jointscope.graphs.joint_kinds.discover_arm import (
+        ArmDiscovery,
+        ArmStep,
+        calibrated,
+        candidates_of,
+        discover_arm,
+    )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.arm_discovery_text import (
         arm_discovery_text,
@@ -64,7 +69,7 @@ def run_arm_search(
         progress("calibrating", 0.0)
         result = calibrated(robot, sessions, recordings)
         progress("looking for effects", 0.9)
-        candidates = arm_candidates(result)
+        candidates, _ = candidates_of(result)
         found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
         if files.json is not None:
             content = {"adequate": _adequate(candidates), "candidates": [candidate_json(c) for c in candidates]}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Springs that a model lacks where it is so wrong that no linear step from it tells which.
+
+A joint or bearing that gives way with its resonance among the lines drives all other springs to values that have no
+meaning, and from there its own slope is not the way back. So each spring of a joint that is locked is put in at the
+values with which the calibration began, and a few stages are solved: how much likelier the recordings become tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import gammaincc
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.frequency.explained import Explained
+from jointscope.graphs.frequency.frequency_set import BAND, FrequencySet
+from jointscope.graphs.frequency.settled_stages import logarithm_begin, tried
+from jointscope.graphs.frequency.stages import first_stage
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, Gain
+from jointscope.robots.geometry.added_effect import with_effect
+from jointscope.robots.geometry.arm_effects import FREQUENCY, ArmHypothesis
+from jointscope.robots.model.robot import Robot
+
+BEGIN = 5e4  # [N m/rad] of a spring that is put in
+ANSWERED, SURE = 0.5, 5.0  # share of what is left in a band that answers the excitation, and its sigmas
+LEAST = 30.0  # of twice the logarithm of the likelihood, a band of lines counted as one
+
+
+def badly_explained(found: Explained) -> bool:
+    """Whether most of what is left in some band answers the excitation, so that a response is missing."""
+    bands = [band for pose in found.poses for band in pose.answered]
+    return any(band.share > max(ANSWERED, SURE * band.sigma) for band in bands)
+
+
+def screened_springs(
+    result: FrequencyCalibration, candidates: Sequence[ArmCandidate]
+) -> list[tuple[ArmCandidate, Robot]]:
+    """Springs of locked joints that make the recordings likelier, best first, each with a robot that begins with it.
+
+    Args:
+        result: of the model without them.
+        candidates: what is known of all effects.
+    """
+    robot, poses = result.start, [problem.pose for problem in result.problems]
+    locked = [c for c in candidates if c.hypothesis.kind.soft and c.hypothesis.owner not in _shaken(robot)]
+    if not locked:
+        return []
+    mixed, _, _ = logarithm_begin([first_stage(robot, pose) for pose in poses], [])
+    robot = robot.with_values(dict(zip(mixed.names, mixed.values.tolist(), strict=True)))
+    before, _ = _few_stages(robot, [first_stage(robot, pose) for pose in poses])
+    found = []
+    for candidate in locked:
+        hypothesis = candidate.hypothesis
+        other = with_effect(robot, hypothesis, dict.fromkeys(hypothesis.names, BEGIN))
+        after, values = _few_stages(other, [first_stage(other, pose) for pose in poses])
+        falls = [(b - a) / BAND for b, a in zip(before, after, strict=True)]
+        if sum(falls) > LEAST:
+            found.append((_with_fall(candidate, falls, values, result), values))
+    return sorted(found, key=lambda each: -each[0].evidence)
+
+
+def _few_stages(robot: Robot, problems: Sequence[FrequencySet]) -> tuple[list[float], Robot]:
+    """How unlikely each recording is after them, and the robot with their values."""
+    now, at, _ = tried(problems, [], Calibration.of(robot))
+    values = dict(zip(at.names, at.values.tolist(), strict=True))
+    return [problem.stage.unlikely for problem in now], robot.with_values(values)
+
+
+def _with_fall(
+    candidate: ArmCandidate, falls: Sequence[float], robot: Robot, result: FrequencyCalibration
+) -> ArmCandidate:
+    """The candidate with what its stages told; its sigmas are not known before it is calibrated."""
+    hypothesis: ArmHypothesis = candidate.hypothesis
+    fall, count = sum(falls), sum(problem.measured for problem in result.problems) / BAND
+    sizes = tuple(1.0 / robot.parameters[name].value for name in hypothesis.names)
+    gain = Gain(1.0 - float(np.exp(-fall / count)), sum(f > 0.0 for f in falls) / len(falls))
+    return replace(
+        candidate,
+        score=fall,
+        p_value=float(gammaincc(float(len(sizes)), fall / 2.0)),
+        evidence=fall,
+        gains={**candidate.gains, FREQUENCY: gain},
+        sizes=sizes,
+        sigmas=tuple(sizes),
+        verdict="missing",
+    )
+
+
+def _shaken(robot: Robot) -> tuple[str, ...]:
+    return () if robot.frequency is None else robot.frequency.joints
