@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [--json FILE]; recordings that another program simulated lie in ../shared/data;
-arms with effects are simulated by MuJoCo.
+Usage: python benchmarks/bench_tx90l.py [kinds] [--json FILE]; with `kinds` poses and frequency responses together, in a
+section of its own. Recordings that another program simulated lie in ../shared/data; arms with effects are simulated by
+MuJoCo.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from measured_page import environment, write_section
 from tx90l_frequency import frequency_rows
+from tx90l_kinds import kinds_rows, search_rows
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.joint_kinds.discover_arm import discover_arm
@@ -58,11 +60,19 @@ TOLD: list[str] = []  # what goes into the page, too
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
+    parser.add_argument("part", nargs="?", choices=["kinds"], help="measure this alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
     arguments = parser.parse_args()
     print(f"# Poses\n\n{environment()}\n")
     robot = load_robot("tx90l")
     found: dict[str, Any] = {}
+    if arguments.part == "kinds":
+        if DATA.is_dir():
+            found |= kinds_rows(robot, DATA, _tell)
+        found |= search_rows(robot, _tell)
+        write_section("\n".join(["## Poses and frequency responses together", *TOLD]), "kinds")
+        _write(arguments.json, found)
+        return
     if DATA.is_dir():
         found |= _made_elsewhere(robot)
         rows, figures = frequency_rows(robot, DATA)
@@ -72,8 +82,12 @@ def main() -> None:
         found |= _real()
     found |= _simulated(robot)
     write_section("\n".join(["## Poses", *TOLD]))
-    if arguments.json:
-        arguments.json.write_text(json.dumps(found, indent=1), encoding="utf-8")
+    _write(arguments.json, found)
+
+
+def _write(path: Path | None, found: dict[str, Any]) -> None:
+    if path:
+        path.write_text(json.dumps(found, indent=1), encoding="utf-8")
 
 
 def _tell(text: str) -> None:

@@ -56,6 +56,7 @@ def run_frequency_calibration(
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
+    from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
     from jointscope.tools.report.frequency_report import frequency_report
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
     from jointscope.tools.verdicts.frequency_judgement import judge_frequency
@@ -63,11 +64,23 @@ def run_frequency_calibration(
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not frequency responses; use --report")
     result = calibrate_frequency(robot, read_all_shaken(robot, paths, progress), progress)
-    content = result.to_json() | judge_frequency(result).to_json()
+    lacks = _lacking(Calibrated(None, result), progress)
+    content = result.to_json() | judge_frequency(result).to_json() | lacks[1]
     checked = check_models(limits, {robot.name: content})
     page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
     write_still(files, result.robot, frequency_origin(result, robot), page, content)
-    return frequency_calibration_text(result), checked
+    return "\n\n".join([frequency_calibration_text(result), *lacks[0]]), checked
+
+
+def _lacking(result: Any, progress: Progress) -> tuple[list[str], dict[str, Any]]:
+    """What the model lacks where a response is left over, for the screen and for JSON."""
+    from jointscope.tools.verdicts.missing_in_arm import missing_in_arm, missing_sentence
+
+    progress("looking for what is missing", 1.0)
+    missing = missing_in_arm(result)
+    if not missing:
+        return [], {}
+    return [missing_sentence(missing)], {"missing": [c.hypothesis.label for c in missing]}
 
 
 def read_all_shaken(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[tuple[Signals, Excitation]]:
@@ -150,6 +163,7 @@ def run_kinds_calibration(
         RobotError: a viewer recording was asked for, or the robot file lacks a section.
         JointscopeError: recordings or poses cannot be used, or a file cannot be written; then none is.
     """
+    from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
     from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.presentation.frequency_sentences import kinds_sentences
@@ -161,7 +175,8 @@ def run_kinds_calibration(
         raise RobotError(f"{robot.name}: --rrd shows motion, not poses or frequency responses; use --report")
     sessions = [read_poses(path, robot) for path in poses]
     result = calibrate_kinds(robot, read_all_shaken(robot, bags, progress), sessions, progress)
-    both, (alone, joint) = result.frequency.to_json(), result.pose_squares
+    lacks = _lacking(Calibrated(result.poses, result.frequency), progress)
+    both, (alone, joint) = result.frequency.to_json() | lacks[1], result.pose_squares
     silent = set(result.frequency.silent)
     content = both | pose_json(result.poses) | {
         "iterations": result.frequency.iterations + result.poses.iterations,
@@ -181,4 +196,4 @@ def run_kinds_calibration(
     write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
     agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
     texts = [pose_calibration_text(result.poses), frequency_calibration_text(result.frequency)]
-    return "\n\n".join([agree, *texts]), checked
+    return "\n\n".join([agree, *lacks[0], *texts]), checked

@@ -27,10 +27,22 @@ SHOWN = 3
 
 def judge_frequency(result: FrequencyCalibration) -> Judgement:
     """Applies all checks."""
-    checks = tuple(make(result) for make in (_answer, _noise, _heldout, _agree, _told, _friction))
+    checks = tuple(make(result) for make in (_settled, _answer, _noise, _heldout, _agree, _told, _friction))
     worst = max(LEVELS.index(check.level) for check in checks)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
     return Judgement(level, ANSWERS[level], checks)
+
+
+def _settled(result: FrequencyCalibration) -> Check:
+    """Covariances follow values, and values covariances; where no end is reached, springs chase what is not theirs."""
+    if result.settled:
+        return Check("good", "Values that came to rest", f"Nothing moves any more after {result.stages} stages.")
+    return Check(
+        "bad",
+        "Values that came to rest",
+        f"No convergence: values still move after {result.stages} stages; torques, units, joints or start values may "
+        "be wrong (look at `jointscope frequency BAG --report frf.html`), or the model lacks an effect.",
+    )
 
 
 def _answer(result: FrequencyCalibration) -> Check:

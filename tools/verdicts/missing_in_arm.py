@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a calibrated arm lacks where a response is left over, named in the verdict of `calibrate`."""
+
+from __future__ import annotations
+
+from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
+from jointscope.graphs.joint_kinds.discover_arm import candidates_of
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.joint_kinds.spring_screen import badly_explained
+from jointscope.tools.presentation.numbers import significant
+
+
+def missing_in_arm(result: Calibrated) -> tuple[ArmCandidate, ...]:
+    """Effects that are missing, best first; none is asked where what is left answers nothing."""
+    frequency = result.frequency
+    if frequency is None or (frequency.settled and not badly_explained(frequency.explained)):
+        return ()
+    return tuple(c for c in candidates_of(result)[0] if c.verdict == "missing")
+
+
+def missing_sentence(missing: tuple[ArmCandidate, ...]) -> str:
+    """What to say of them."""
+    first, *others = missing
+    sizes = ", ".join(significant(size, 3) for size in first.sizes)
+    unit = "rad/(N m)" if first.hypothesis.kind.soft else first.hypothesis.kind.unit
+    also = f"; then {', '.join(c.hypothesis.label for c in others[:2])}" if others else ""
+    return (
+        f"  ! The model lacks {first.hypothesis.label}, about {sizes} {unit}{also}: `jointscope discover` with the "
+        "same recordings adds it and calibrates again"
+    )
