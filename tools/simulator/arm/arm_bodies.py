@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -80,12 +80,15 @@ class ArmBodies:
         k = self._values.get(f"{joint}.bearing.stiffness_{axis}", np.inf)
         return 1.0 / k + self.size("bearing_flexibility", joint, f"compliance_{axis}")
 
-    def add_to(self, spec: Any, angles: Mapping[str, float] | None = None) -> dict[str, tuple[Any, dict[str, Array]]]:
+    def add_to(
+        self, spec: Any, angles: Mapping[str, float] | None = None, giving: Collection[str] = ()
+    ) -> dict[str, tuple[Any, dict[str, Array]]]:
         """Adds the bodies to a `mujoco.MjSpec`.
 
         Args:
             spec: the model.
-            angles: of joints that are welded; none by default.
+            angles: of joints that are locked; none by default.
+            giving: those of them that give way, and whose hinges are at zero there; the others are welded.
 
         Returns:
             Of each joint that is not welded its body, and the axes of the hinges that it may have: "" of the drive,
@@ -110,7 +113,7 @@ class ArmBodies:
                 ipos=inertia.lever,
                 fullinertia=full_inertia(inertia.inertia + 1e-9 * np.eye(3)),
             )
-            if name not in welded:
+            if name not in welded or name in giving:
                 found[name] = parent, {"": axis, ".y": y, ".x": x}
         if robot.poses is not None:
             self._add_target(spec, parent)

@@ -182,8 +182,8 @@ class ShakenArm:
         spec.compiler.balanceinertia = False
         hinge, bodies = mujoco.mjtJoint.mjJNT_HINGE, self._bodies
         soft = [j for j in self._robot.joints if j not in self.joints and bodies.compliance(j) > 0.0]
-        welded = {joint: q for joint, q in self._pose.items() if joint not in (*self.joints, *soft)}
-        found = bodies.add_to(spec, welded)
+        locked = {joint: q for joint, q in self._pose.items() if joint not in self.joints}
+        found = bodies.add_to(spec, locked, soft)
         for joint, (body, axes) in found.items():
             body.add_joint(name=joint, type=hinge, axis=axes[""])
             for axis in "yx":
@@ -194,7 +194,6 @@ class ShakenArm:
         for joint in soft:
             lock = spec.joint(joint)
             _tie(lock, 1.0 / bodies.compliance(joint), WRIST_LOSS / bodies.compliance(joint))
-            lock.springref = lock.ref = self._pose[joint]
         for joint in self.joints:
             rotor = add_light_body(spec, motor_joint(joint), bodies.value(joint, "inertia"))
             turning = rotor.add_joint(name=motor_joint(joint), type=hinge, axis=[0.0, 0.0, 1.0])
