@@ -72,6 +72,8 @@ bench-real: $(VENV)/bench $(VENV)/code
 
 bench-tx90l: $(VENV)/sim $(VENV)/code
 	$(BIN)/python benchmarks/bench_tx90l.py
+	$(BIN)/python benchmarks/bench_tx90l.py kinds
+	$(BIN)/python benchmarks/bench_tx90l.py search
 
 bench-biorob: $(VENV)/code
 	$(BIN)/python benchmarks/bench_biorob.py

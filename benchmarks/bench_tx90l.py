@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds] [--json FILE]; with `kinds` poses and frequency responses together, in a
-section of its own. Recordings that another program simulated lie in ../shared/data; arms with effects are simulated by
-MuJoCo.
+Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE]; with `kinds` poses and frequency responses in
+one graph, with `search` what is found with both, in sections of their own. Recordings that another program simulated
+lie in ../shared/data; arms with effects are simulated by MuJoCo.
 """
 
 from __future__ import annotations
@@ -60,17 +60,17 @@ TOLD: list[str] = []  # what goes into the page, too
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
-    parser.add_argument("part", nargs="?", choices=["kinds"], help="measure this alone")
+    parser.add_argument("part", nargs="?", choices=["kinds", "search"], help="measure this alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
     arguments = parser.parse_args()
     print(f"# Poses\n\n{environment()}\n")
     robot = load_robot("tx90l")
     found: dict[str, Any] = {}
-    if arguments.part == "kinds":
-        if DATA.is_dir():
-            found |= kinds_rows(robot, DATA, _tell)
-        found |= search_rows(robot, _tell)
-        write_section("\n".join(["## Poses and frequency responses together", *TOLD]), "kinds")
+    if arguments.part is not None:
+        together = arguments.part == "kinds"
+        found |= kinds_rows(robot, DATA, _tell) if together else search_rows(robot, _tell)
+        title = "in one graph" if together else "together: what is missing"
+        write_section("\n".join([f"## Poses and frequency responses {title}", *TOLD]), arguments.part)
         _write(arguments.json, found)
         return
     if DATA.is_dir():

@@ -181,6 +181,12 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
     ("arguments", "told"),
     [
         (["discover", "tx90l", "-o", "a.yaml"], "nothing to calibrate from"),
+        (["diagnose", "tx90l", "--poses", "p.csv", "--holdout-frequency", "b.mcap"], "goes with --frequency"),
+        (
+            ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
+            "b.mcap is given with --frequency and held out",
+        ),
+        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "not yet with motion or rests"),
         (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
         (
             ["discover", "doggy", "a.mcap", "--holdout-poses", "p.csv", "-o", "a.yaml"],

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Effects of motors, drives, masses and locked joints in the torque balance: their columns are what they do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shaken_arm import made_up
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.graphs.frequency.stages import first_stage, next_stage, with_columns
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.geometry.added_effect import RIGID, at_null, with_effect
+from jointscope.robots.geometry.arm_effects import KINDS, ArmHypothesis
+from jointscope.robots.geometry.flexible_arm import LOSS
+
+BY_ID = {kind.id: kind for kind in KINDS}
+SMALL = {  # sizes at which the balance is still linear in them
+    "gear_ripple@joint3": 1e-7,
+    "spring_cubic@joint3": 1e6,
+    "payload@robot": 1e-2,
+    "link_mass@joint4": 1e-2,
+    "inertia_error@joint2": 1e-2,
+    "torque_constant_error@joint2": 1e-3,
+    "torque_delay@robot": 1e-6,
+    "motor_stribeck@joint1": 1e-2,
+    "load_dependent_friction@joint2": 1e-4,
+}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("tx90l")
+
+
+@pytest.fixture(scope="module")
+def pose():
+    return ShakenPose.of(*made_up())
+
+
+def effect(label):
+    kind, _, owner = label.partition("@")
+    return ArmHypothesis(BY_ID[kind], owner, 20 if kind == "gear_ripple" else None)
+
+
+def settled(robot, pose, stages=2):
+    problem = first_stage(robot, pose)
+    for _ in range(stages):
+        problem = next_stage(problem, problem.start(Calibration.of(robot))[1])
+    return problem
+
+
+def balance(problem):
+    values = problem.stage.values
+    return problem.torque_balance(values, problem.stiffness(values))
+
+
+@pytest.mark.parametrize("label", SMALL)
+def test_the_column_of_an_effect_is_what_the_whole_balance_does(label, robot, pose):
+    hypothesis, base = effect(label), settled(robot, pose)
+    column = with_columns(base, at_null(robot, [hypothesis])).stage.geometry[hypothesis.names[0]]
+    size = SMALL[label]
+    sizes = {name: size if i == 0 else 0.0 for i, name in enumerate(hypothesis.names)}
+    moved = balance(settled(with_effect(robot, hypothesis, sizes), pose, 3)) - balance(settled(robot, pose, 3))
+    # columns are those of the arm that stands; a wave makes its lines by the motion that carries the excitation
+    share = 0.15 if hypothesis.kind.orders else 0.05
+    assert np.linalg.norm(moved - size * column) < share * np.linalg.norm(moved)
+
+
+def test_a_locked_joint_with_a_rigid_spring_is_a_locked_joint(robot, pose):
+    stiff = at_null(robot, [effect("joint_elasticity@joint5"), effect("bearing_flexibility@joint4")])
+    plain, sprung = (settled(each, pose, 1) for each in (robot, stiff))
+    assert len(sprung.arm.springs) == len(plain.arm.springs) + 3
+    np.testing.assert_allclose(balance(sprung), balance(plain), atol=1e-4 * np.abs(pose.torques).max())
+
+
+def test_a_soft_locked_joint_changes_the_balance_by_its_compliance_at_first(robot, pose):
+    hypothesis = effect("joint_elasticity@joint5")
+    rigid = with_columns(settled(robot, pose), at_null(robot, [hypothesis]))
+    values = dict(rigid.stage.values)
+    k = 1e8  # its resonance is far above the lines
+    change = rigid.stiffness({**values, "joint5.stiffness": k, "joint5.damping": 0.0}).Z - rigid.stiffness(values).Z
+    spring = next(i for i, s in enumerate(rigid.arm.springs) if s.stiffness == "joint5.stiffness")
+    kappa = RIGID * (1.0 + 1j * LOSS * pose.w[:, None, None])
+    slope = -rigid.stiffness(values).by_spring[spring] * kappa**2
+    np.testing.assert_allclose(change * k, slope, rtol=0.02, atol=0.02 * np.abs(slope).max())
