@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What drives and motors do that is not linear, as the motion that was measured makes them do it.
 
-A wave of a gear, a gap and a spring that hardens are an offset u between motor and link, whose torque then is that of
-the spring turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
+A wave of a gear and a spring that hardens are an offset u between motor and link, whose torque then is that of the spring
+turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
 
-    u = -p_BL sign d,    c cos(o q) + s sin(o q),    -k3 d^3 / k
+    u = c cos(o q) + s sin(o q),    -k3 d^3 / k
     p = pull u'(q),      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
 
 with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
@@ -22,7 +22,6 @@ from scipy.fft import next_fast_len
 
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.robots.geometry.error_parameters import (
-    BACKLASH,
     CUBIC,
     LOAD_FRICTION,
     RIPPLE,
@@ -35,7 +34,6 @@ from jointscope.robots.geometry.flexible_arm import FlexibleArm
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FINER = 8  # samples by the lines of the motion: what turns over within a swing has many of them
-SHARP = 1e-5  # [rad] over which a gap turns over, at least
 BREAKAWAY = 0.02  # [rad/s] v_s, which a swing of some degrees per second passes through at every turn
 
 
@@ -109,7 +107,7 @@ def measured_torques(
 
 
 def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
-    for part in (*RIPPLE[:2], BACKLASH, CUBIC, STRIBECK, LOAD_FRICTION):
+    for part in (*RIPPLE[:2], CUBIC, STRIBECK, LOAD_FRICTION):
         if f"{joint}.{part}" in values:
             yield part
 
@@ -149,8 +147,6 @@ class _Motion:
             c, s = np.cos(order * self.q), np.sin(order * self.q)
             wave, slope = (c, -order * s) if part == RIPPLE[0] else (s, order * c)
             return wave, self.pull * slope
-        if part == BACKLASH:
-            return -np.tanh(self.d / max(abs(values[f"{joint}.{part}"]), SHARP)), None
         if part == CUBIC:
             return -(self.d**3) / self.stiffness, None
         turn = np.tanh(self.sharpness * self.v)
