@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What drives and motors do that is not linear, as the motion that was measured makes them do it.
 
-A wave of a gear and a spring that hardens are an offset u between motor and link, whose torque then is that of the spring
-turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
+A wave of a gear and a spring that hardens are an offset u between motor and link, whose torque then is that of the
+spring turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
 
     u = c cos(o q) + s sin(o q),    -k3 d^3 / k
     p = pull u'(q),      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
