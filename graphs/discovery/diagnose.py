@@ -130,8 +130,7 @@ def diagnose(
     refits = {**refits, **elastic}
     clock.stage("springs")
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
-    floor = believed_floor(comparison, holdout or base.recordings[0])
-    share = _unexplained(best, torques, elastic, comparison.judged_error, floor)
+    share, floor = _unexplained(best, torques, elastic, comparison, holdout or base.recordings[0])
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -178,15 +177,20 @@ def _by_torques(
 
 
 def _unexplained(
-    best: Candidate | None, torques: TorqueVerdicts | None, elastic: Mapping[str, Robot], error: float, floor: float
-) -> float:
-    """Share of the squared error that stays unexplained with the best candidate, in the measure that judged it."""
+    best: Candidate | None,
+    torques: TorqueVerdicts | None,
+    elastic: Mapping[str, Robot],
+    comparison: ModelComparison,
+    recording: Recording,
+) -> tuple[float, float]:
+    """Share of the squared error that stays with the best candidate, in the measure that judged it; and the floor."""
+    floor = believed_floor(comparison, recording)
     if torques is not None and (best is None or best.label not in elastic):
-        return torques.unexplained
-    if best is None:
-        return unexplained_share(error, floor)
-    after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
-    return unexplained_share(after, floor)
+        return torques.unexplained, floor
+    after = comparison.judged_error
+    if best is not None:
+        after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
+    return unexplained_share(after, floor), floor
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:

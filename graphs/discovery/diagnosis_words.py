@@ -60,8 +60,8 @@ def _verdict(d: Diagnosis) -> str:
     part = part_in_words(d.unexplained_share)
     if d.missing_torque_percent is not None:
         return (
-            f"Nothing in the catalogue explains what is missing: smooth laws of position and speed would explain {part} "
-            "of the squared missing torque."
+            "Nothing in the catalogue explains what is missing: smooth laws of position and speed would explain "
+            f"{part} of the squared missing torque."
         )
     return (
         f"Nothing in the catalogue explains what is missing: {part} of the squared error ({d.error:.3g} sigma against "

@@ -21,17 +21,18 @@ from jointscope.robots.recordings.recording import Recording
 DOUBTFUL = 1.2  # times the error from which a floor of larger torques cannot be what noise alone would give
 
 
-def believed_floor(comparison: ModelComparison, recording: Recording) -> float:
+def believed_floor(comparison: ModelComparison, recording: Recording | None) -> float:
     """What noise alone would give [sensor sigma], the noise of the sensors where that of the model cannot be believed.
 
     Args:
         comparison: of a model with a recording.
-        recording: the same.
+        recording: the same; None where it is not at hand, then a doubtful floor is never believed.
     """
     floor = comparison.judged_floor
-    if floor <= DOUBTFUL * comparison.judged_error or random_torque(comparison.robot, recording) < ABSOLUTE:
+    if floor <= DOUBTFUL * comparison.judged_error:
         return floor
-    return SENSOR_FLOOR
+    small = recording is not None and random_torque(comparison.robot, recording) < ABSOLUTE
+    return floor if small else SENSOR_FLOOR
 
 
 def random_torque(robot: Robot, recording: Recording) -> float:
@@ -50,7 +51,7 @@ def random_torque(robot: Robot, recording: Recording) -> float:
     return float(np.max(np.divide(own, drives, out=np.full(len(own), np.inf), where=drives > 0.0)))
 
 
-def unexplained(comparison: ModelComparison, recording: Recording) -> float:
+def unexplained(comparison: ModelComparison, recording: Recording | None = None) -> float:
     """Share of a comparison's squared error that its floor does not explain."""
     return unexplained_share(comparison.judged_error, believed_floor(comparison, recording))
 
