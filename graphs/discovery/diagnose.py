@@ -23,6 +23,7 @@ from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.spring_trials import SpringTrials
 from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
+from jointscope.graphs.discovery.unexplained import believed_floor, unexplained, unexplained_share
 from jointscope.graphs.discovery.verdicts import (
     MATTERS,
     SENSOR_FLOOR,
@@ -49,7 +50,6 @@ LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 MUCH = 10.0  # [%] of the drive's torque that no adequate model leaves open, whatever it is
 LOOK_FIRST = "Look at this before any effect"  # how a paragraph about a plain mistake begins
-DOUBTFUL = 1.2  # times the error from which a floor cannot be what noise alone would give
 NEARLY_ALL, NEAR = 0.95, 0.5  # share of the excess after which only scores this near are looked at
 
 
@@ -130,7 +130,7 @@ def diagnose(
     refits = {**refits, **elastic}
     clock.stage("springs")
     best = next((c for c in candidates if c.verdict == "missing" and not c.numerics), None)
-    share = _unexplained(best, torques, elastic, comparison)
+    share, floor = _unexplained(best, torques, elastic, comparison, holdout or base.recordings[0])
     missing = None
     if missing_torque:
         report("the missing torque", 0.95)
@@ -144,7 +144,7 @@ def diagnose(
         and max(percent.values(), default=0.0) < MUCH,
         unexplained_share=share,
         error=comparison.judged_error,
-        floor=comparison.judged_floor,
+        floor=floor,
         validation_error=before.error,
         failure=failure,
         missing=missing,
@@ -177,15 +177,20 @@ def _by_torques(
 
 
 def _unexplained(
-    best: Candidate | None, torques: TorqueVerdicts | None, elastic: Mapping[str, Robot], comparison: ModelComparison
-) -> float:
-    """Share of the squared error that stays unexplained with the best candidate, in the measure that judged it."""
+    best: Candidate | None,
+    torques: TorqueVerdicts | None,
+    elastic: Mapping[str, Robot],
+    comparison: ModelComparison,
+    recording: Recording,
+) -> tuple[float, float]:
+    """Share of the squared error that stays with the best candidate, in the measure that judged it; and the floor."""
+    floor = believed_floor(comparison, recording)
     if torques is not None and (best is None or best.label not in elastic):
-        return torques.unexplained
-    if best is None:
-        return unexplained(comparison)
-    after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
-    return unexplained_share(after, comparison.judged_floor)
+        return torques.unexplained, floor
+    after = comparison.judged_error
+    if best is not None:
+        after = best.heldout_error if np.isfinite(best.heldout_error) else best.validation_error
+    return unexplained_share(after, floor), floor
 
 
 def _to_look_at_first(base: BaseModel) -> list[str]:
@@ -221,18 +226,7 @@ def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorq
 def _elsewhere(base: BaseModel, holdout: Recording | None, torques: TorqueVerdicts | None) -> list[float]:
     """Unexplained shares of the further training recordings, where no recording was held out; at least one number."""
     others = base.recordings[1:] if holdout is None and torques is None else ()
-    return [0.0, *(unexplained(compare_model("base", base.robot, recording)) for recording in others)]
-
-
-def unexplained(comparison: ModelComparison) -> float:
-    """Share of a comparison's squared error that its floor does not explain."""
-    return unexplained_share(comparison.judged_error, comparison.judged_floor)
-
-
-def unexplained_share(error: float, floor: float) -> float:
-    """(error^2 - floor^2) / error^2, at least 0; a floor well above the error says nothing, the sensor's own does."""
-    floor = SENSOR_FLOOR if floor > DOUBTFUL * error else floor
-    return float(max(1.0 - (floor / error) ** 2, 0.0)) if error != 0.0 else 0.0
+    return [0.0, *(unexplained(compare_model("base", base.robot, recording), recording) for recording in others)]
 
 
 def _by_predictions(

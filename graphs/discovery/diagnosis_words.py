@@ -57,9 +57,15 @@ def _verdict(d: Diagnosis) -> str:
             f"The model is adequate: its error {d.judged_by} is {d.error:.3g} sigma, noise and state uncertainty alone "
             f"leave {d.floor:.3g}, and no effect of the catalogue would lower that."
         )
+    part = part_in_words(d.unexplained_share)
+    if d.missing_torque_percent is not None:
+        return (
+            "Nothing in the catalogue explains what is missing: smooth laws of position and speed would explain "
+            f"{part} of the squared missing torque."
+        )
     return (
-        f"Nothing in the catalogue explains what is missing: {part_in_words(d.unexplained_share)} of the squared error "
-        f"({d.error:.3g} sigma against a floor of {d.floor:.3g}) stays unexplained."
+        f"Nothing in the catalogue explains what is missing: {part} of the squared error ({d.error:.3g} sigma against "
+        f"a floor of {d.floor:.3g}) stays unexplained."
     )
 
 

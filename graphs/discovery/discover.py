@@ -13,12 +13,13 @@ from itertools import pairwise
 from typing import Any
 
 from jointscope.graphs.calibration.failures_with_notices import names_notices
-from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS, unexplained
+from jointscope.graphs.discovery.diagnose import ADEQUATE, LEADERS
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.diagnosis_words import did_not_hold, what_came_in, why_it_stopped
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep, with_lasting_floors
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.unexplained import unexplained
 from jointscope.graphs.discovery.verdicts import MATTERS, SURE
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context

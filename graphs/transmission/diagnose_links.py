@@ -10,9 +10,10 @@ from dataclasses import replace
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.comparison.comparison_result import SENSOR_NOISE, ModelComparison
 from jointscope.graphs.comparison.failure_analysis import FailureAnalysis
-from jointscope.graphs.discovery.diagnose import ADEQUATE, unexplained_share
+from jointscope.graphs.discovery.diagnose import ADEQUATE
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.diagnosis_words import paragraphs_of
+from jointscope.graphs.discovery.unexplained import unexplained_share
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.transmission.compare_links import compare_links_model
