@@ -33,6 +33,7 @@ from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
+from jointscope.graphs.problem.step_errors import step_errors
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
@@ -56,6 +57,7 @@ from jointscope.robots.recordings.screening import screen
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
+TOLD_OF_WHITE = ("timing", "masses", "lacking", "step_errors")  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
@@ -165,7 +167,8 @@ def _calibrated(
             lasting = stage.with_memory(solved)
             if lasting is not solved:
                 other = summarize(robot, lasting, tuple(history.records), notices, hold)
-                result = replace(other, timing=result.timing, masses=result.masses, lacking=result.lacking)
+                told_of = {name: getattr(result, name) for name in TOLD_OF_WHITE}
+                result = replace(other, **told_of)
         regressed = regressed_values(result.robot, recordings)
         said = (*result.findings, *on_their_word(result.robot, regressed))
         result = replace(result, regressed=regressed, findings=said)
@@ -182,7 +185,11 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):
         lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
-    return replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
+    estimate = solved.solution.estimate
+    of_bags = zip(solved.problems, estimate.states, estimate.calibrations, strict=False)
+    missed = np.max([step_errors(problem, x, own) for problem, x, own in of_bags], axis=0)
+    found = replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
+    return replace(found, step_errors=tuple(missed.tolist()))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_b
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
+from jointscope.tools.verdicts.short_steps import short_steps
 from jointscope.tools.verdicts.torque_constants import suspicious_constants
 from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
@@ -31,6 +33,7 @@ UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open af
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
+TOGETHER = 2  # doubtful signs of the residuals that make an answer worthless
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
 
@@ -72,11 +75,12 @@ class Judgement:
 def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
     plausible, timing, missing = plausible_torques(result), same_time(result), missing_effects(result)
-    held = values_from_data(result)
+    held, steps = values_from_data(result), short_steps(result)
+    signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
-        _noise_as_stated(result),
-        _white(result),
-        *([] if result.robot.free_links else [_even(result)]),
+        *signs,
+        *_agreeing(signs),
+        Check(steps[0], "Steps short enough", steps[1]),
         _determined(result),
         Check(held[0], "Values from data, not from priors", held[1]),
         _honest_sigmas(result),
@@ -89,6 +93,22 @@ def judge(result: CalibrationResult) -> Judgement:
     worst = max((LEVELS.index(c.level) for c in checks), default=0)
     level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
     return Judgement(level, ANSWERS[level], checks)
+
+
+def _agreeing(signs: Sequence[Check]) -> list[Check]:
+    """A check that fails where several signs say that the model lacks something; none where at most one does.
+
+    Each alone may be a sensor that is noisier than stated, or random torques that a sigma includes. Together they are
+    neither: what is missing has a shape in time that no sigma holds, and values take it for themselves.
+    """
+    doubtful = [sign.name for sign in signs if sign.level == "warn"]
+    if len(doubtful) < TOGETHER:
+        return []
+    text = (
+        f"Doubtful are both {' and '.join(f'“{name}”' for name in doubtful)}: what is missing is no noise, and the "
+        "sigmas do not hold it. `jointscope diagnose` says what it may be."
+    )
+    return [Check("bad", "No two signs that something is missing", text)]
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:

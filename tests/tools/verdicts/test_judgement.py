@@ -110,7 +110,7 @@ def test_every_check_is_there_for_machines_with_its_reason(good):
     judgement = judge(with_chi2(good, 4.0))
     content = judgement.to_json()
     assert content["verdict"] == {"level": "bad", "text": judgement.headline}
-    assert len(content["checks"]) == len(judgement.checks) == 11
+    assert len(content["checks"]) == len(judgement.checks) == 12
     (noise,) = (check for check in content["checks"] if check["name"] == NOISE)
     assert noise["verdict"] == "bad" and noise["why"].startswith(f"{CHANNEL} has χ² per sample 4")
 
@@ -185,3 +185,34 @@ def test_where_one_step_is_too_long_no_number_is_said(good):
         (check,) = (c for c in judge(dataclasses.replace(good, timing=late)).checks if c.name.endswith("same time"))
         assert check.level == "bad" and said in check.text
         assert (f"{301 * value:.3g}" in check.text) is False
+
+
+def uneven(result, share=0.5):
+    """The same with a stretch in which the dynamics leave a part of the velocity open."""
+    bag = result.bags[0]
+    process = bag.process.copy()
+    process[: len(process) // 8] *= 1.0 + share
+    return dataclasses.replace(result, bags=(dataclasses.replace(bag, process=process),))
+
+
+def test_two_doubtful_signs_together_are_no_reservation(good):
+    name = "No two signs that something is missing"
+    dynamics = "Dynamics hold throughout"
+    # as much as makes the dynamics doubtful, not bad
+    lone = next(
+        found
+        for share in (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+        if level(judge(found := uneven(good, share)), dynamics) == "warn"
+    )
+    assert judge(lone).level == "warn"
+    assert judge(with_chi2(good, 1.6)).level == "warn"
+    both = judge(with_chi2(lone, 1.6))
+    assert both.level == "bad"
+    assert level(both, name) == "bad"
+    assert all(check.name != name for check in judge(lone).checks)
+
+
+@pytest.mark.parametrize(("missed", "expected"), [((), "info"), ((0.2, 0.7), "good"), ((0.2, 1.9), "bad")])
+def test_steps_in_which_friction_stops_a_light_joint_are_told(good, missed, expected):
+    judged = judge(dataclasses.replace(good, step_errors=missed))
+    assert level(judged, "Steps short enough") == expected
