@@ -3,14 +3,14 @@
 
 A value passes if it is inside its limits with two standard deviations to spare, and fails if it is outside; in between
 nobody can tell (the decision rule of ISO 14253-1). What the result lacks is not evaluated, nor is anything of a
-calibration that has not converged.
+calibration that has not converged, and nothing passes of one whose own verdict is "No".
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Any
@@ -74,7 +74,10 @@ def check_limits(limits: Sequence[Limit], content: Mapping[str, Any]) -> tuple[C
         limits: of `read_limits`.
         content: of the JSON of `calibrate`, or of one model of `compare`.
     """
-    return tuple(checked for limit in limits for checked in _check(limit, content))
+    checked = tuple(checked for limit in limits for checked in _check(limit, content))
+    if content.get("verdict", {}).get("level") != "bad":
+        return checked
+    return tuple(_not_relied_on(line) if line.outcome == PASS else line for line in checked)
 
 
 def check_models(limits: Sequence[Limit], models: Mapping[str, Mapping[str, Any]]) -> AcceptedBy:
@@ -97,6 +100,11 @@ def exit_code(checked: Sequence[Checked]) -> int:
     """0 if everything passed, FAILED if anything failed, else UNDECIDED."""
     outcomes = {line.outcome for line in checked}
     return FAILED if FAIL in outcomes else UNDECIDED if OPEN in outcomes else 0
+
+
+def _not_relied_on(line: Checked) -> Checked:
+    """What would pass, of a result that says itself that it must not be relied on."""
+    return replace(line, outcome=OPEN, found=f"{line.found}; but the verdict above is “No”")
 
 
 def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:

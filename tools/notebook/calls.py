@@ -45,6 +45,7 @@ from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
 from jointscope.tools.simulator.simulation import simulate as simulate_motion
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.rest_runs import weighted_rests
+from jointscope.tools.verdicts.judgement import judge
 
 
 def read(bag: str | Path, robot: AnyRobot, *, leave_out: Sequence[tuple[float, float]] = ()) -> Recording:
@@ -97,7 +98,8 @@ def calibrate(
         all_sets = [*sets, *weighted_rests(model, [Path(path) for path in rests], progress or _quiet)]
         options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
         found = calibrate_motion(model, read_ones, **options)
-    return Calibrated.of(found, acceptance=check_models(limits, {model.name: found.to_json()} if limits else {}))
+    content = {model.name: found.to_json() | judge(found).to_json()} if limits else {}
+    return Calibrated.of(found, acceptance=check_models(limits, content))
 
 
 def compare(

@@ -178,3 +178,13 @@ def test_a_file_that_cannot_be_read_is_called_a_limits_file(tmp_path, name, cont
     with pytest.raises(RobotError, match=words) as raised:
         read_limits(tmp_path / name)
     assert "robot file" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("level", "expected"), [("good", PASS), ("warn", PASS), ("bad", OPEN)])
+def test_nothing_passes_of_a_result_that_says_no(tmp_path, level, expected):
+    content = {**CONTENT, "verdict": {"level": level, "text": ""}}
+    for line in ("parameter: joint1.stiffness, between: [187, 193]", "channel: joint1.motor_position, rmse: 2.0e-4"):
+        assert outcome(tmp_path, line, content)[0] == expected
+    assert outcome(tmp_path, "parameter: joint1.stiffness, between: [191, 193]", content)[0] == FAIL
+    checked = check_limits(limits_of(tmp_path, "channel: joint1.motor_position, rmse: 2.0e-4, because: b"), content)
+    assert exit_code(checked) == (UNDECIDED if level == "bad" else 0)
