@@ -127,6 +127,13 @@ def _choices(robot: Robot) -> dict[str, str]:
         found["no Coriolis torques"] = "the model leaves them out, and MuJoCo always has them"
     if robot.choices.friction_velocity == "link":
         found["friction of the link's velocity"] = "it is that of the rotor's velocity in the file"
+    limits = zip(robot.joints, robot.tree.effort_limits, strict=True)
+    bounded = [f"{joint} {effort:g} {robot.unit_at(joint, 'N m')}" for joint, effort in limits if 0.0 < effort < np.inf]
+    if bounded:
+        found["torques beyond the limits of the URDF"] = (
+            f"drives give at most {', '.join(bounded)}; where yours gave more in the recording, raise `effort` in the "
+            "URDF, or actuatorfrcrange in the file"
+        )
     found["shapes"] = "bodies have no meshes; attach those of your URDF"
     return found
 

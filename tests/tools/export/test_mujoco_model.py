@@ -142,3 +142,8 @@ def test_a_flat_body_is_still_one_after_rounding_to_six_digits():
     np.testing.assert_allclose(np.sort(found), np.sort(plate), rtol=2 * SIX_DIGITS)
     sound = text.format(0.3, 0.2, 0.15)
     assert _possible(sound) == sound
+
+
+def test_limits_of_the_urdf_that_bound_the_drives_are_said(tmp_path):
+    said = mujoco_model(arm_with(tmp_path)).lacks["torques beyond the limits of the URDF"]
+    assert "shoulder 80 N m, elbow 40 N m" in said and "actuatorfrcrange" in said
