@@ -174,8 +174,8 @@ class CalibrationResult:
         lacking: effects of the catalogue that the recordings ask for, surest first.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states.
-        step_errors: what the steps of the motion miss, by velocity row, beside the smallest random torque that stands
-            for it, see `graphs.problem.step_errors`; empty where it was not asked.
+        step_errors: what the steps of the motion miss, by velocity row, as a share of the random torques, see
+            `graphs.problem.step_errors`; empty where it was not asked.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 

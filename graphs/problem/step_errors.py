@@ -20,15 +20,18 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 
 Array = NDArray[np.float64]
 
+RISEN = 3.0  # times the smallest random torque, from which something has asked for more
+
 
 def step_errors(problem: BagProblem, x: Array, calibration: Calibration) -> Array:
-    """What each velocity row misses, as a random torque, beside the smallest one that stands for it, shape (k,).
+    """What each velocity row misses, as a share of the random torques that were found, shape (k,).
 
-    The root mean square over the steps in which the equation binds. Zero for the Euler and midpoint rules, which a
-    robot file asks for as they are.
+    The root mean square over the steps in which the equation binds. Zero where random torques are next to the smallest
+    one, which stands for what steps miss: there it has done no harm. Zero for the Euler and midpoint rules, too, which
+    a robot file asks for as they are.
 
     Args:
-        problem: one recording.
+        problem: one recording, with the noise that was found.
         x: states at its ticks, shape (m + 1, d).
         calibration: values and biases of its recording.
     """
@@ -46,7 +49,8 @@ def step_errors(problem: BagProblem, x: Array, calibration: Calibration) -> Arra
     second_v, second_q = half.defects(middle, x1, values)
     missed_v = first_v + second_v - d_v
     missed_q = first_q + second_q + 0.5 * steps.h[:, None] * first_v[:, : d_q.shape[1]] - d_q
-    density = steps.combine(missed_v, missed_q)[:, :k] / np.sqrt(steps.h)[:, None]
+    rows = (steps.combine(missed_v, missed_q) / steps.sigmas)[:, :k]
     if steps.free is not None:
-        density = np.where(steps.free > 0.0, 0.0, density)
-    return np.asarray(np.sqrt(np.mean(density**2, axis=0)) / steps.noise.smallest)
+        rows = np.where(steps.free > 0.0, 0.0, rows)
+    noise = np.concatenate([steps.noise.link_velocity, steps.noise.motor_velocity])
+    return np.where(noise > RISEN * steps.noise.smallest, np.sqrt(np.mean(rows**2, axis=0)), 0.0)

@@ -19,7 +19,7 @@ def pose(share=0.02, over_noise=1.2, by_realisations=True):
     return PoseFit("P1", np.array([0.004]), noise, (Answered(1.0, 20.0, 0.0, 0.02), band), by_realisations)
 
 
-def judged(the_pose=None, poses=None, realisations=None, heldout=1.01, silent=(), sharp=0.01):
+def judged(the_pose=None, poses=None, realisations=None, heldout=1.01, silent=(), sharp=0.01, settled=True):
     """The checks by name, of a calibration that is good but for what is given."""
     fine = Agreement(20.0, 22)
     found = Explained(
@@ -32,7 +32,9 @@ def judged(the_pose=None, poses=None, realisations=None, heldout=1.01, silent=()
     names = ("joint1.friction_sharpness",)
     problem = SimpleNamespace(pose=SimpleNamespace(path="P1", matrix=SimpleNamespace(each=(0, 1))))
     told = names if sharp < 0.1 else ()
-    result = SimpleNamespace(explained=found, silent=silent, names=names, told=told, problems=(problem,))
+    result = SimpleNamespace(
+        explained=found, silent=silent, names=names, told=told, problems=(problem,), settled=settled, stages=4
+    )
     verdict = judge_frequency(result)
     return verdict, {check.name: check for check in verdict.checks}
 
@@ -88,3 +90,9 @@ def test_a_drive_that_is_not_told_is_a_reservation_and_a_damper_is_not():
 def test_friction_that_may_stick_is_a_reservation():
     verdict, checks = judged(sharp=0.4)
     assert verdict.level == "warn" and "turns over faster" in checks["Friction that is known"].text
+
+
+def test_iterations_that_do_not_come_to_rest_are_a_no():
+    verdict, checks = judged(settled=False)
+    assert verdict.level == "bad"
+    assert [name for name, check in checks.items() if check.level == "bad"] == ["Values that came to rest"]

@@ -212,7 +212,7 @@ def test_two_doubtful_signs_together_are_no_reservation(good):
     assert all(check.name != name for check in judge(lone).checks)
 
 
-@pytest.mark.parametrize(("missed", "expected"), [((), "info"), ((0.2, 0.7), "good"), ((0.2, 1.9), "bad")])
+@pytest.mark.parametrize(("missed", "expected"), [((), "info"), ((0.0, 0.02), "good"), ((0.02, 0.15), "bad")])
 def test_steps_in_which_friction_stops_a_light_joint_are_told(good, missed, expected):
     judged = judge(dataclasses.replace(good, step_errors=missed))
     assert level(judged, "Steps short enough") == expected

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted, duration
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
+from jointscope.tools.bags.tidying.stale_levels import stale_levels
 
 Flags = NDArray[np.bool_]
 
@@ -38,12 +39,16 @@ def without_late_copies(name: str, samples: TimedSamples) -> tuple[TimedSamples,
         samples: in the order of their stamps.
     """
     copies, later = _found(samples.stamps, samples.values)
+    how = f"{duration(float(np.median(later[copies])))} later" if np.any(copies) else ""
+    if not how:
+        copies, usual = stale_levels(samples.stamps, samples.values)
+        how = f"up to {duration(usual)} after it has sent another"
     count = int(np.count_nonzero(copies))
     if not count:
         return samples, []
     text = (
-        f"{name}: left out {counted(count, 'message')} of a second node that repeats those of the driver "
-        f"{duration(float(np.median(later[copies])))} later; stop it: `ros2 topic info -v` names it"
+        f"{name}: left out {counted(count, 'message')} of a second node that repeats those of the driver {how}; stop "
+        "it: `ros2 topic info -v` names it"
     )
     return samples.take(~copies), [Notice(name, "foreign", count, text)]
 
