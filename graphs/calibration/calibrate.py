@@ -167,8 +167,7 @@ def _calibrated(
             lasting = stage.with_memory(solved)
             if lasting is not solved:
                 other = summarize(robot, lasting, tuple(history.records), notices, hold)
-                told_of = {name: getattr(result, name) for name in TOLD_OF_WHITE}
-                result = replace(other, **told_of)
+                result = replace(other, **{name: getattr(result, name) for name in TOLD_OF_WHITE})
         regressed = regressed_values(result.robot, recordings)
         said = (*result.findings, *on_their_word(result.robot, regressed))
         result = replace(result, regressed=regressed, findings=said)
@@ -185,11 +184,9 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):
         lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
-    estimate = solved.solution.estimate
-    of_bags = zip(solved.problems, estimate.states, estimate.calibrations, strict=False)
-    missed = np.max([step_errors(problem, x, own) for problem, x, own in of_bags], axis=0)
-    found = replace(result, timing=drive_timing(test), masses=wrong_masses(test), lacking=lacking)
-    return replace(found, step_errors=tuple(missed.tolist()))
+    missed = np.max([step_errors(*motion) for motion in zip(*solved.of_motions, strict=True)], axis=0)
+    timing, masses = drive_timing(test), wrong_masses(test)
+    return replace(result, timing=timing, masses=masses, lacking=lacking, step_errors=tuple(missed.tolist()))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -102,9 +102,7 @@ def _moving(
     standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, lines])
     true, columns = measured_torques(arm.joints, pose.torques, pose.w, values)
     shift = (moving.torques + beside)[:, lines] - standing - (true - pose.torques)
-    for name, column in _of_effects(before, values, k, effects).items():
-        columns[name] = column
-    return np.asarray(shift), moving.x, columns
+    return np.asarray(shift), moving.x, columns | _of_effects(before, values, k, effects)
 
 
 def _of_effects(

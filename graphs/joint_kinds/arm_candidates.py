@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
-from jointscope.graphs.frequency.linear_responses import STIFFNESSES, LinearResponses, ResponseColumns
+from jointscope.graphs.frequency.linear_responses import STIFFNESSES, ResponseColumns
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, with_look_alikes
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
@@ -86,10 +86,8 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
             extra, looks = _with_responses(judge, columns, hypothesis, extra, looks)
         extras.append(extra)
         found.append(judge.candidate(hypothesis, extra, looks))
-    kinds = {part.kind: _spaces(part, linear, extras) for part in parts}
-    alone = {kind: _alike(spaces) for kind, spaces in kinds.items()} if len(parts) > 1 else {}
-    both = _alike(_together(parts, linear, extras) if len(parts) > 1 else kinds[parts[0].kind])
-    found = with_look_alikes(found, alone, both)
+    alone = {part.kind: _alike(_spaces([part], linear, extras)) for part in parts} if len(parts) > 1 else {}
+    found = with_look_alikes(found, alone, _alike(_spaces(parts, linear, extras)))
     return sorted(found, key=lambda c: -c.evidence)
 
 
@@ -113,23 +111,14 @@ def _needs_poses(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
     return FREQUENCY in hypothesis.kind.unseen or bool(hypothesis.kind.orders) or not moves
 
 
-def _spaces(part: LinearKind, linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:
-    """What is left of the columns of each effect in a kind when all else may explain them."""
+def _spaces(parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:
+    """What is left of the columns of each effect in some kinds when all else may explain them."""
     root = np.linalg.cholesky(linear.tied).T
-    assert isinstance(part, (LinearPoses, LinearResponses))
-    basis = np.linalg.qr(np.vstack([part.J, root]))[0]
-    return [_left(basis, np.vstack([e[part.kind], np.zeros((len(root), e[part.kind].shape[1]))]))
-            if part.kind in e else np.zeros((len(basis), 0)) for e in extras]  # fmt: skip
-
-
-def _together(parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:
-    root = np.linalg.cholesky(linear.tied).T
-    rows = [part for part in parts if isinstance(part, (LinearPoses, LinearResponses))]
-    basis = np.linalg.qr(np.vstack([*(part.J for part in rows), root]))[0]
+    basis = np.linalg.qr(np.vstack([*(part.J for part in parts), root]))[0]
     found = []
     for extra in extras:
-        k = next(iter(extra.values())).shape[1]
-        wide = [extra.get(part.kind, np.zeros((len(part.r), k))) for part in rows]
+        k = next((extra[part.kind].shape[1] for part in parts if part.kind in extra), 0)
+        wide = [extra.get(part.kind, np.zeros((len(part.r), k))) for part in parts]
         found.append(_left(basis, np.vstack([*wide, np.zeros((len(root), k))])))
     return found
 

@@ -25,6 +25,7 @@ class LinearKind(Protocol):
 
     Attributes:
         kind: its name.
+        r, J: whitened residuals, shape (rows,), and columns of all values, shape (rows, p).
         folds: number of its folds.
         counted: number of measured values of separate causes.
     """
@@ -32,6 +33,14 @@ class LinearKind(Protocol):
     @property
     def kind(self) -> str:
         """Its name."""
+
+    @property
+    def r(self) -> Array:
+        """Whitened residuals, shape (rows,)."""
+
+    @property
+    def J(self) -> Array:
+        """Whitened columns of all values, shape (rows, p)."""
 
     @property
     def folds(self) -> int:

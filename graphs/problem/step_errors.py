@@ -36,7 +36,9 @@ def step_errors(problem: BagProblem, x: Array, calibration: Calibration) -> Arra
         calibration: values and biases of its recording.
     """
     whole, k = problem.dynamics, len(problem.robot.layout.velocities)
-    if not isinstance(whole, SimpsonDynamics):
+    noise = np.concatenate([whole.steps.noise.link_velocity, whole.steps.noise.motor_velocity])
+    risen = noise > RISEN * whole.steps.noise.smallest
+    if not isinstance(whole, SimpsonDynamics) or not np.any(risen):
         return np.zeros(k)
     steps, values = whole.steps, calibration.values
     x0, x1, u = x[:-1], x[1:], whole.command(values)
@@ -52,5 +54,4 @@ def step_errors(problem: BagProblem, x: Array, calibration: Calibration) -> Arra
     rows = (steps.combine(missed_v, missed_q) / steps.sigmas)[:, :k]
     if steps.free is not None:
         rows = np.where(steps.free > 0.0, 0.0, rows)
-    noise = np.concatenate([steps.noise.link_velocity, steps.noise.motor_velocity])
-    return np.where(noise > RISEN * steps.noise.smallest, np.sqrt(np.mean(rows**2, axis=0)), 0.0)
+    return np.where(risen, np.sqrt(np.mean(rows**2, axis=0)), 0.0)

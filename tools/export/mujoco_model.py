@@ -127,8 +127,7 @@ def _choices(robot: Robot) -> dict[str, str]:
         found["no Coriolis torques"] = "the model leaves them out, and MuJoCo always has them"
     if robot.choices.friction_velocity == "link":
         found["friction of the link's velocity"] = "it is that of the rotor's velocity in the file"
-    limits = zip(robot.joints, robot.tree.effort_limits, strict=True)
-    bounded = [f"{joint} {effort:g} {robot.unit_at(joint, 'N m')}" for joint, effort in limits if 0.0 < effort < np.inf]
+    bounded = [f"{joint} {effort:g} {robot.unit_at(joint, 'N m')}" for joint, effort in _bounded(robot).items()]
     if bounded:
         found["torques beyond the limits of the URDF"] = (
             f"drives give at most {', '.join(bounded)}; where yours gave more in the recording, raise `effort` in the "
@@ -140,13 +139,19 @@ def _choices(robot: Robot) -> dict[str, str]:
 
 def _limit(spec: Any, robot: Robot) -> None:
     """Ranges of the joints and torques of the drives, where the URDF has them."""
-    for joint, limits, effort in zip(robot.joints, robot.tree.limits, robot.tree.effort_limits, strict=True):
+    for joint, effort in _bounded(robot).items():
+        rotor = spec.joint(rotor_joint(robot, joint))
+        rotor.actfrcrange, rotor.actfrclimited = [-effort, effort], True
+    for joint, limits in zip(robot.joints, robot.tree.limits, strict=True):
         if np.all(np.isfinite(limits)):
             hinge = spec.joint(joint)
             hinge.range, hinge.limited = limits, True
-        if 0.0 < effort < np.inf:
-            rotor = spec.joint(rotor_joint(robot, joint))
-            rotor.actfrcrange, rotor.actfrclimited = [-effort, effort], True
+
+
+def _bounded(robot: Robot) -> dict[str, float]:
+    """Largest torque of each drive that the URDF limits [N m] or [N]."""
+    limits = zip(robot.joints, robot.tree.effort_limits, strict=True)
+    return {joint: float(effort) for joint, effort in limits if 0.0 < effort < np.inf}
 
 
 def _read(spec: Any, robot: Robot) -> None:

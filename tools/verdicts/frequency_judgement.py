@@ -13,7 +13,7 @@ from jointscope.graphs.frequency.explained import Answered, PoseFit
 from jointscope.robots.geometry.error_parameters import STIFFNESS
 from jointscope.tools.presentation.frequency_sentences import identifiable_sentence, one_realisation, sticking
 from jointscope.tools.presentation.numbers import percent, significant
-from jointscope.tools.verdicts.judgement import ANSWERS, LEVELS, Check, Judgement
+from jointscope.tools.verdicts.judgement import Check, Judgement
 
 AS_NOISE = 3.0  # power of what is left over that of the noise: up to here friction adds little
 ANSWERS_BACK = (
@@ -28,9 +28,7 @@ SHOWN = 3
 def judge_frequency(result: FrequencyCalibration) -> Judgement:
     """Applies all checks."""
     checks = tuple(make(result) for make in (_settled, _answer, _noise, _heldout, _agree, _told, _friction))
-    worst = max(LEVELS.index(check.level) for check in checks)
-    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
-    return Judgement(level, ANSWERS[level], checks)
+    return Judgement.of(checks)
 
 
 def _settled(result: FrequencyCalibration) -> Check:

@@ -54,6 +54,13 @@ class Judgement:
     headline: str
     checks: tuple[Check, ...]
 
+    @staticmethod
+    def of(checks: Sequence[Check]) -> Judgement:
+        """The verdict that follows from some checks: the worst of them."""
+        worst = max((LEVELS.index(check.level) for check in checks), default=0)
+        level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
+        return Judgement(level, ANSWERS[level], tuple(checks))
+
     @property
     def doubts(self) -> tuple[Check, ...]:
         """The checks that speak against the result."""
@@ -90,9 +97,7 @@ def judge(result: CalibrationResult) -> Judgement:
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
         Check(missing[0], "Values that no missing effect would change", missing[1]),
     )
-    worst = max((LEVELS.index(c.level) for c in checks), default=0)
-    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
-    return Judgement(level, ANSWERS[level], checks)
+    return Judgement.of(checks)
 
 
 def _agreeing(signs: Sequence[Check]) -> list[Check]:

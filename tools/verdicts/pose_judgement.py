@@ -10,7 +10,7 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.verdicts.judgement import ANSWERS, LEVELS, Check, Judgement
+from jointscope.tools.verdicts.judgement import Check, Judgement
 
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
@@ -25,9 +25,7 @@ def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
     makers = (_enough, _repeatability, _still, _within, _backlash, _worth)
     checks = tuple(make(result) for make in makers)
-    worst = max(LEVELS.index(check.level) for check in checks)
-    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
-    return Judgement(level, ANSWERS[level], checks)
+    return Judgement.of(checks)
 
 
 def _enough(result: PoseCalibration) -> Check:

@@ -45,9 +45,8 @@ def judge_replay(result: ReplayResult) -> Judgement:
     """Applies all checks; how fast this machine is says nothing about the estimate itself."""
     estimate = (_consistent(result), _samples(result), _lost(result), _agreement(result))
     speed = _in_time(result)
-    worst = max(LEVELS.index(check.level) for check in estimate)
-    level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
-    answer = ANSWERS[level]
+    found = Judgement.of(estimate)
+    level, answer = found.level, found.headline
     if speed.level == "warn":
         level, answer = max(level, "warn", key=LEVELS.index), f"{answer} {TOO_SLOW}"
     return Judgement(level, answer, (*estimate[:3], speed, estimate[3]))

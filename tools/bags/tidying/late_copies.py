@@ -15,14 +15,11 @@ from numpy.typing import NDArray
 from jointscope.robots.recordings.recording import Notice
 from jointscope.tools.bags.clocks.durations import counted, duration
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
-from jointscope.tools.bags.tidying.stale_levels import stale_levels
+from jointscope.tools.bags.tidying.stale_levels import ALIKE, LATEST, SPREAD, stale_levels
 
 Flags = NDArray[np.bool_]
 
 FEWEST, SHARE = 5, 0.02  # copies, and share of the messages that they make
-LATEST = 1.0  # [s] after the message that is repeated
-ALIKE = 0.9  # share of the copies that come about as late as is usual
-SPREAD = 0.15  # of how late is usual; a signal that turns round repeats itself earlier and later, too
 LONGEST_RUN = 3.0  # copies between two messages of the driver, in the mean
 TYPICAL = 0.9  # quantile of how far messages lie off the line between their neighbours
 OFF = 3.0  # times that far off are copies

@@ -8,7 +8,7 @@ for about as long. A command that trembles between two steps of its digits comes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 Flags = NDArray[np.bool_]
 
 FEWEST = 5  # changes of level
-ALIKE = 0.9  # share of the changes that are followed by the old level, for as long as is usual
-LATEST = 1.0  # [s] after a change, at which the old level may still come
+ALIKE = 0.9  # share of all repetitions, or of all changes, that come, or are followed by one, about as late as is usual
+LATEST = 1.0  # [s] after the driver, at which a second node may still repeat it
+SPREAD = 0.15  # of how late is usual; a signal that turns round repeats itself earlier and later, too
 HELD = 2.0  # times as long as old levels come, a level lasts at least
 IN_A_ROW = 3  # messages of an old level by which the driver itself has returned to it
 
@@ -29,7 +30,7 @@ class _Level:
     value: int
     began: float
     ended: float = np.inf
-    stale: list[int] | None = None
+    stale: list[int] = field(default_factory=list)
 
 
 def stale_levels(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> tuple[Flags, float]:
@@ -44,11 +45,10 @@ def stale_levels(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> tupl
     none = np.zeros(len(values), bool), 0.0
     if len(values) < FEWEST or not values.shape[1]:
         return none
-    _, which = np.unique(values, axis=0, return_inverse=True)
-    which = which.ravel()
-    returns = (which[2:] == which[:-2]) & (which[2:] != which[1:-1])
-    if np.count_nonzero(returns) < FEWEST:
+    returns = np.all(values[2:] == values[:-2], axis=1) & np.any(values[2:] != values[1:-1], axis=1)
+    if np.count_nonzero(returns) < FEWEST:  # before anything is sorted: nearly all streams end here
         return none
+    which = np.unique(values, axis=0, return_inverse=True)[1].ravel()
     at = (stamps - stamps[0]) / 1e9
     usual = _lateness(at, _levels(at, which, LATEST))
     if usual is None:
@@ -58,7 +58,7 @@ def stale_levels(stamps: NDArray[np.int64], values: NDArray[np.float64]) -> tupl
         return none
     stale = np.zeros(len(values), bool)
     for level in levels:
-        stale[level.stale or []] = True
+        stale[level.stale] = True
     return stale, usual
 
 
@@ -73,7 +73,7 @@ def _levels(at: NDArray[np.float64], which: NDArray[np.intp], latest: float) -> 
         old = recent.get(value)
         row = row + 1 if value == which[i - 1] else 1
         if old is not None and at[i] - old.ended < latest and row < IN_A_ROW:
-            old.stale = [*(old.stale or []), i]
+            old.stale.append(i)
             continue
         begun = i
         if old is not None and old.stale and row >= IN_A_ROW:  # it was the driver that came back
@@ -92,11 +92,10 @@ def _lateness(at: NDArray[np.float64], levels: list[_Level]) -> float | None:
     told = [level for level in left if level.stale]
     if len(left) < FEWEST or len(told) < ALIKE * len(left):
         return None
-    after = np.array([at[level.stale[-1]] - level.ended for level in told if level.stale])
-    count = np.array([len(level.stale) for level in told if level.stale])
+    after = np.array([at[level.stale[-1]] - level.ended for level in told])
     usual = float(np.median(after))
-    spacing = usual / max(float(np.median(count)), 1.0)
-    alike = np.abs(after - usual) < max(spacing, 0.15 * usual)
     if np.median([level.ended - level.began for level in left]) < HELD * usual:
         return None
+    spacing = usual / float(np.median([len(level.stale) for level in told]))
+    alike = np.abs(after - usual) < max(spacing, SPREAD * usual)
     return usual + spacing if np.count_nonzero(alike) >= ALIKE * len(left) else None
