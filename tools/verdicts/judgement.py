@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,11 +55,11 @@ class Judgement:
     checks: tuple[Check, ...]
 
     @staticmethod
-    def of(checks: Sequence[Check]) -> Judgement:
-        """The verdict that follows from some checks: the worst of them."""
+    def of(checks: Sequence[Check], answers: Mapping[str, str] = ANSWERS) -> Judgement:
+        """The verdict that follows from some checks, the worst of them, with its headline from `answers`."""
         worst = max((LEVELS.index(check.level) for check in checks), default=0)
         level = LEVELS[worst] if worst >= LEVELS.index("warn") else "good"
-        return Judgement(level, ANSWERS[level], tuple(checks))
+        return Judgement(level, answers[level], tuple(checks))
 
     @property
     def doubts(self) -> tuple[Check, ...]:

@@ -45,7 +45,7 @@ def judge_replay(result: ReplayResult) -> Judgement:
     """Applies all checks; how fast this machine is says nothing about the estimate itself."""
     estimate = (_consistent(result), _samples(result), _lost(result), _agreement(result))
     speed = _in_time(result)
-    found = Judgement.of(estimate)
+    found = Judgement.of(estimate, ANSWERS)
     level, answer = found.level, found.headline
     if speed.level == "warn":
         level, answer = max(level, "warn", key=LEVELS.index), f"{answer} {TOO_SLOW}"
