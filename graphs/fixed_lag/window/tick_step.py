@@ -8,7 +8,8 @@ With f = dx/dt the three rules of the dynamics factors are, for the whole state,
     euler     r = x1 - x0 - h f0
 
 x1 follows from r = 0 by Newton's method, begun with a linearly implicit step; one iteration does unless friction turns
-over within the step.
+over within the step. Where dry friction changes its sign within a part of a step, the rules miss its torque over up to
+a sixth of it: that step is halved again and again around the change.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ ITERATIONS = 4
 SAME_FRICTION = 1e-3  # share of the Coulomb torque that a straight line may miss before rates are evaluated anew
 SAME_DERIVATIVE = 0.01  # largest change of h df/dx over a step whose middle is not evaluated
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
+SHARP_TURN = 4.0  # change of that argument, with its sign, over a step that is halved
+HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,13 @@ class TickStep:
         """F = dx1/dx0, shape (d, d)."""
         return -self.by_end_inverse @ self.by_start
 
+    def then(self, second: TickStep) -> TickStep:
+        """This step and one from its end as a single step, whose defect is weighed as at the end of the second."""
+        F = second.transition
+        by_torque = second.by_torque + second.by_end @ F @ self.by_end_inverse @ self.by_torque
+        by_start = -second.by_end @ F @ self.transition
+        return TickStep(second.x1, by_start, second.by_end, second.by_end_inverse, by_torque, second.end)
+
 
 def take_step(
     model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None = None
@@ -106,6 +116,29 @@ def take_step(
         h: length of the step [s].
         before: rates near the beginning, if they are known.
     """
+    return _halved(model, rule, x0, torque, h, before, HALVINGS)
+
+
+def _halved(
+    model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None, halvings: int
+) -> TickStep:
+    """One step, or two of half its length where dry friction turns over sharply."""
+    step = _undivided(model, rule, x0, torque, h, before)
+    if halvings == 0 or not _turns_sharply(model, x0, step.x1):
+        return step
+    first = _halved(model, rule, x0, torque, 0.5 * h, before, halvings - 1)
+    return first.then(_halved(model, rule, first.x1, torque, 0.5 * h, first.end, halvings - 1))
+
+
+def _turns_sharply(model: StateRates, x0: Array, x1: Array) -> bool:
+    """Whether a velocity that dry friction acts against changes its sign within a small part of a step."""
+    v0, v1 = x0[model.friction_columns], x1[model.friction_columns]
+    return bool(((v0 * v1 < 0.0) & (np.abs(v1 - v0) * model.sharpness > SHARP_TURN)).any())
+
+
+def _undivided(
+    model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None
+) -> TickStep:
     start = RatesAt.of(model, x0, torque) if before is None else before.near(model, x0, torque)
     eye, columns = _eye(len(x0)), model.friction_columns
     if rule == "euler":
