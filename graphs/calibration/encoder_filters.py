@@ -16,6 +16,7 @@ from scipy.special import chdtrc
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.calibration.whole_stage import WholeStage, anchored
+from jointscope.graphs.noise.unlikelihood import unlikelihood
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
@@ -75,9 +76,10 @@ def _settled(stage: WholeStage, solved: Solved, robot: Robot) -> Solved:
 
 
 def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
-    """Filters of all encoders, where a delay was found and the same noise makes them likelier than none.
+    """Filters of all encoders, where a delay was found and they are likelier than none, each with its own noise.
 
-    A linear step does not tell: it freezes the moments at which joints turn over, and a filter moves them.
+    A linear step does not tell: it freezes the moments at which joints turn over, and a filter moves them. Nor does the
+    cost at the noise of the other model: a long filter frees the states to follow the noise of the readings.
 
     Args:
         stage: solves.
@@ -91,10 +93,13 @@ def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
     (name,) = free_filters(with_one)
     trials = _Trials(stage, solved, with_filters(with_one, {name: float(TRIED[0]) ** 2}, True), name)
     best = trials.best()
-    fall = solved.solution.cost - trials.costs[best]
-    if not trials.is_between(best) or not fall > 0.0:
+    if not trials.is_between(best) or not trials.costs[best] < solved.solution.cost:
         return None
-    calibration = trials.found[best].calibrations[0]
+    filtered = _settled(stage, solved, with_filters(with_one, {name: best}, True))
+    fall = unlikelihood(solved.problems, solved.solution) - unlikelihood(filtered.problems, filtered.solution)
+    if not fall > 0.0:
+        return None
+    calibration = filtered.solution.estimate.calibrations[0]
     values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     return LackingEffect(effect, owner, float(chdtrc(1.0, 2.0 * fall)), fall, values, tried=True)
 

@@ -46,6 +46,11 @@ class Elimination:
         """The factor as LAPACK stores a lower band, shape (2d, m d)."""
         return self.columns.reshape(len(self.w), 2 * self.d).T
 
+    @property
+    def log_determinant(self) -> float:
+        """Logarithm of the determinant of the states' Hessian A."""
+        return 2.0 * float(np.log(self.columns[:, :, 0]).sum())
+
     def states(self, dp: Array) -> Array:
         """Change of all states for a change dp of the shared values, shape (m, d)."""
         return self.solve_transposed(-(self.w + self.W @ dp)[:, None])[:, 0].reshape(len(self.w) // self.d, self.d)

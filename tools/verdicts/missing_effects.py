@@ -36,8 +36,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
 def _next(result: CalibrationResult, effect: LackingEffect) -> str:
     """What to type: an effect that was tried need not be looked for."""
     if effect.tried:
-        file = result.start.path.name
-        return f"Add it: `jointscope add {file} {effect.label} -o OUT.yaml`, then calibrate again"
+        file = result.start.path
+        return f"Add it: `jointscope add {file.name} {effect.label} -o {file.stem}_better.yaml`, then calibrate again"
     return f"Which it is, and whether it predicts better: `{_discover(result)}`"
 
 
