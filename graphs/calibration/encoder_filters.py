@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The filters of encoders: held until the noise is known, then found by the cost of several of them.
+"""The filters of encoders: held until the noise is known, then found by how likely several of them are.
 
 Readings of a filter hang on accelerations. While the process noise is loose these follow every sample, and the longest
 filter, which asks for the least of them, costs least. Where the noise is small, friction that turns over has kinks
-there that no iteration crosses. The cost of solutions with given filters has neither trouble: it is a parabola.
+there that no iteration crosses. And at any noise the lowest cost favours long filters: the states they free follow the
+noise of the readings. The likelihood of given filters, states integrated out, each with the noise that goes with it, has
+none of these troubles: near its peak it is a parabola.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.calibration.whole_stage import WholeStage, anchored
 from jointscope.graphs.noise.unlikelihood import unlikelihood
+from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
@@ -31,6 +34,7 @@ FAR = 4.0  # times the lowest cost, beyond which no longer filter is tried
 SURELY = 5.0  # [sigma] from which a delay is one
 LABEL = "encoder_filter@robot"
 NEAR = 0.03  # relative change of a variance that changes nothing
+NOISE_AGREES = 0.02  # relative difference of noise and residuals, so that likelihoods can be compared
 ROUNDS = 3  # of a filter, and of the noise that is found with it
 
 
@@ -47,32 +51,48 @@ def with_filters(robot: Robot, values: dict[str, float], fixed: bool) -> Robot:
 
 
 def solved_with_filters(stage: WholeStage, held: Solved, names: tuple[str, ...]) -> Solved:
-    """The solution with filters free, from the one with filters held.
+    """The solution with the likeliest filters, from the one with filters held.
+
+    Sigmas are those with filters free; their values stay where they are likeliest, not where the cost is lowest.
 
     Args:
         stage: solves.
         held: where the robot's filters are held at their start.
         names: of their variances.
     """
-    values = {name: held.robot.parameters[name].value for name in names}
+    exact, found = replace(stage, agrees=NOISE_AGREES), held
     for _ in range(ROUNDS):
-        before = dict(values)
+        before = _values(found, names)
         for name in names:
-            values = {**values, name: _Trials(stage, held, with_filters(held.robot, values, True), name).best()}
-        robot = with_filters(held.robot, values, fixed=True)
-        held = _settled(stage, held, robot)
-        if all(abs(values[name] - before[name]) < NEAR * before[name] for name in names):
+            trials = _NoisyTrials(exact, found, found.robot, name)
+            found = trials.solved[trials.best()]
+        if len(names) == 1 or all(abs(v - before[n]) < NEAR * before[n] for n, v in _values(found, names).items()):
             break
-    return _settled(stage, held, with_filters(held.robot, values, fixed=False))
+    robot = with_filters(found.robot, _values(found, names), fixed=False)
+    problems, start = _carried(found, robot)
+    noise = found.problems[0].dynamics.steps.noise
+    here = stage.step("filters of encoders", problems, noise, start, 0)
+    solution = replace(here, converged=True)
+    return Solved.of([p.with_noise(noise) for p in problems], solution, stage.hold, found.sets)
+
+
+def _values(solved: Solved, names: tuple[str, ...]) -> dict[str, float]:
+    """Variances at which filters are held."""
+    return {name: solved.robot.parameters[name].value for name in names}
+
+
+def _carried(solved: Solved, robot: Robot) -> tuple[list[BagProblem], Estimate]:
+    """The recordings on another robot, and the estimate for it."""
+    estimate = solved.solution.estimate
+    calibrations = tuple(c.carried_to(Calibration.of(robot)) for c in estimate.calibrations)
+    problems = anchored([p.of_robot(robot) for p in solved.problems], calibrations)
+    return problems, Estimate(estimate.states, calibrations)
 
 
 def _settled(stage: WholeStage, solved: Solved, robot: Robot) -> Solved:
     """The solution of another robot from here."""
-    estimate = solved.solution.estimate
-    calibrations = tuple(c.carried_to(Calibration.of(robot)) for c in estimate.calibrations)
-    problems = anchored([p.of_robot(robot) for p in solved.problems], calibrations)
-    noise = solved.problems[0].dynamics.steps.noise
-    return stage.settled(problems, noise, Estimate(estimate.states, calibrations))
+    problems, start = _carried(solved, robot)
+    return stage.settled(problems, solved.problems[0].dynamics.steps.noise, start)
 
 
 def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
@@ -95,7 +115,7 @@ def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
     best = trials.best()
     if not trials.is_between(best) or not trials.costs[best] < solved.solution.cost:
         return None
-    filtered = _settled(stage, solved, with_filters(with_one, {name: best}, True))
+    filtered = _settled(replace(stage, agrees=NOISE_AGREES), solved, with_filters(with_one, {name: best}, True))
     fall = unlikelihood(solved.problems, solved.solution) - unlikelihood(filtered.problems, filtered.solution)
     if not fall > 0.0:
         return None
@@ -119,49 +139,68 @@ class _Trials:
 
     Attributes:
         stage: solves.
-        solved: where to start, and the noise.
+        start: where to start, and the noise.
         robot: the model with all filters held.
         name: of the variance that is tried.
-        costs, found: by variance.
+        costs: what is to be low, by variance.
+        lowest: of the solutions' costs, by variance.
     """
 
     stage: WholeStage
-    solved: Solved
+    start: Solved
     robot: Robot
     name: str
     costs: dict[float, float] = field(default_factory=dict)
-    found: dict[float, Estimate] = field(default_factory=dict)
+    lowest: dict[float, float] = field(default_factory=dict)
 
     def best(self) -> float:
         """The variance at which the cost is lowest."""
-        start = estimate = self.solved.solution.estimate
         for variance in sorted({*(TRIED**2).tolist(), self.robot.parameters[self.name].value}):
-            estimate = self._tried(variance, estimate)
-            if self.costs[variance] > FAR * min(self.costs.values()):
+            self._try(variance)
+            if self.lowest[variance] > FAR * min(self.lowest.values()):
                 break
         for _ in range(PARABOLAS):
-            lowest = min(self.costs, key=self.costs.__getitem__)
-            between = _vertex(self.costs, lowest)
-            if between is None or abs(between - lowest) < NEAR * lowest:
+            best = min(self.costs, key=self.costs.__getitem__)
+            between = _vertex(self.costs, best)
+            if between is None or abs(between - best) < NEAR * best:
                 break
-            self._tried(between, self.found.get(lowest, start))
+            self._try(between)
         return min(self.costs, key=self.costs.__getitem__)
 
     def is_between(self, variance: float) -> bool:
         """Whether larger and smaller ones were tried and cost more."""
         return min(self.costs) < variance < max(self.costs)
 
-    def _tried(self, variance: float, estimate: Estimate) -> Estimate:
-        robot = with_filters(self.robot, {self.name: variance}, fixed=True)
-        problems = anchored([p.of_robot(robot) for p in self.solved.problems], estimate.calibrations)
-        noise = self.solved.problems[0].dynamics.steps.noise
+    def _try(self, variance: float) -> None:
         try:
-            solution = self.stage.step("filters of encoders", problems, noise, estimate, ITERATIONS)
+            self.costs[variance], self.lowest[variance] = self._cost(variance)
         except SolveError:
-            self.costs[variance] = float("inf")
-            return estimate
-        self.costs[variance], self.found[variance] = solution.cost, solution.estimate
-        return solution.estimate
+            self.costs[variance] = self.lowest[variance] = float("inf")
+
+    def _cost(self, variance: float) -> tuple[float, float]:
+        """What is to be low, and the lowest cost of a solution."""
+        problems, start = _carried(self.start, with_filters(self.robot, {self.name: variance}, fixed=True))
+        noise = self.start.problems[0].dynamics.steps.noise
+        cost = self.stage.step("filters of encoders", problems, noise, start, ITERATIONS).cost
+        return cost, cost
+
+
+@dataclass
+class _NoisyTrials(_Trials):
+    """As `_Trials`, but how unlikely the readings are, each with the noise that goes with it.
+
+    Attributes:
+        solved: by variance.
+    """
+
+    solved: dict[float, Solved] = field(default_factory=dict)
+
+    def _cost(self, variance: float) -> tuple[float, float]:
+        near = min(self.solved, key=lambda v: abs(np.log(v / variance)), default=None)
+        start = self.start if near is None else self.solved[near]
+        robot = with_filters(self.robot, {self.name: variance}, fixed=True)
+        solved = self.solved[variance] = _settled(self.stage, start, robot)
+        return unlikelihood(solved.problems, solved.solution), solved.solution.cost
 
 
 def _vertex(costs: dict[float, float], lowest: float) -> float | None:

@@ -78,6 +78,7 @@ class WholeStage:
         solver: minimises the cost of all samples.
         sets: recordings of other kinds, which share the values of the motions from here on.
         stated: sigmas of encoders before any was found anew, by sensor, shape (n,) each; those at hand where empty.
+        agrees: relative difference of noise and residuals that asks for no further pass.
     """
 
     hold: tuple[str, ...]
@@ -87,6 +88,7 @@ class WholeStage:
     solver: Solver = solve
     sets: Sequence[SetProblem] = ()
     stated: Mapping[str, Array] = field(default_factory=dict)
+    agrees: float = NOISE_AGREES
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -154,7 +156,7 @@ class WholeStage:
             # states that a large process noise lets follow the samples leave less of their noise than there is
             follow = bool(np.any(change < -NOISE_AGREES))
             other = _with_sigmas(problems, solved, self.stated) if self.sigmas and not follow else None
-            if other is None and np.all(np.abs(change) < NOISE_AGREES):
+            if other is None and np.all(np.abs(change) < self.agrees):
                 break
             noise = updates.update(noise, solved.evidence.factors) if noise.estimate else noise
             problems, estimate = other or problems, solution.estimate

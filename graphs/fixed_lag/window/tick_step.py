@@ -136,9 +136,7 @@ def _turns_sharply(model: StateRates, x0: Array, x1: Array) -> bool:
     return bool(((v0 * v1 < 0.0) & (np.abs(v1 - v0) * model.sharpness > SHARP_TURN)).any())
 
 
-def _undivided(
-    model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None
-) -> TickStep:
+def _undivided(model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None) -> TickStep:
     start = RatesAt.of(model, x0, torque) if before is None else before.near(model, x0, torque)
     eye, columns = _eye(len(x0)), model.friction_columns
     if rule == "euler":

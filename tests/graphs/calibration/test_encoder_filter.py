@@ -68,10 +68,10 @@ def test_a_filter_is_named_beside_the_delay_that_hides_it_and_makes_the_values_r
     assert all(abs(share) < 0.01 or abs(sigmas) < 3.5 for share, sigmas in deviations(mended))
     assert judge(mended).level in ("good", "warn")
     before, after = (np.max(np.abs([share for share, _ in deviations(r)])) for r in (wrong, mended))
-    assert after < 0.5 * before
-    # smaller than the weights' own, (1 - a) a^k, which have tails: joints turn over faster than two moments can say
+    assert after < 0.15 * before
+    # that of the weights, (1 - a) a^k; a little smaller, as they have tails and joints turn over within them
     variance = mended.found["robot.encoder_filter.variance"].value * RATE**2
-    assert 0.5 < variance / (KEPT / (1.0 - KEPT) ** 2) < 1.1
+    assert 0.85 < variance / (KEPT / (1.0 - KEPT) ** 2) < 1.05
 
 
 def test_a_delay_alone_asks_for_no_filter(robot, streams):
@@ -82,3 +82,26 @@ def test_a_delay_alone_asks_for_no_filter(robot, streams):
     assert result.found["robot.command_delay.delay"].value == pytest.approx(6e-3, rel=0.05)
     assert check(result).level == "good"
     assert all(abs(share) < 0.01 or abs(sigmas) < 3.5 for share, sigmas in deviations(result))
+
+
+@pytest.mark.slow
+def test_a_filter_that_was_added_in_vain_harms_no_value(tmp_path):
+    """Long filters free the states to follow the noise of readings: their lowest cost falls, their likelihood does, too.
+
+    With the lowest cost a filter of 14 ms was found here, and an inertia that was 78 % too small.
+    """
+    light = Arm(axes="zy", inertia=(7.2e-3, 1.7e-4), dry=(8e-3, 2e-3), viscous=(7e-3, 2e-3))
+    loaded = load_robot(robot_file(light, tmp_path))
+    encoder = loaded.motor_encoder
+    loaded = loaded.with_sensors({encoder.name: replace(encoder, sigmas=np.full(2, 2e-5))})
+    samples, command = moved(light, seconds=5.0, encoder_rate=1000.0, command_rate=1000.0, noise=2e-5, seed=2)
+    earlier = replace(command, times=command.times - 2e-3)
+    robot = add_effect(add_effect(loaded, "command_delay@robot"), "encoder_filter@robot")
+    result = calibrated(robot, samples, earlier)
+    assert result.found["robot.command_delay.delay"].value == pytest.approx(2e-3, rel=0.1)
+    assert result.found["robot.encoder_filter.variance"].value < 2e-3**2
+    truth = {"inertia": light.inertia, "coulomb_torque": light.dry, "motor_viscous.coefficient": light.viscous}
+    for law, values in truth.items():
+        for i, true in enumerate(values):
+            value = result.found[f"j{i}.{law}"]
+            assert abs(value.value / true - 1.0) < 0.01 or abs(value.value - true) < 3.5 * value.sigma, (law, i, value)
