@@ -9,7 +9,7 @@ With f = dx/dt the three rules of the dynamics factors are, for the whole state,
 
 x1 follows from r = 0 by Newton's method, begun with a linearly implicit step; one iteration does unless friction turns
 over within the step. Where dry friction changes its sign within a part of a step, the rules miss its torque over up to
-a sixth of it: that step is halved again and again around the change.
+a sixth of it: a step of the first rule is halved again and again around the change.
 """
 
 from __future__ import annotations
@@ -116,14 +116,14 @@ def take_step(
         h: length of the step [s].
         before: rates near the beginning, if they are known.
     """
-    return _halved(model, rule, x0, torque, h, before, HALVINGS)
+    return _halved(model, rule, x0, torque, h, before, HALVINGS if rule == "simpson" else 0)
 
 
 def _halved(
     model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None, halvings: int
 ) -> TickStep:
     """One step, or two of half its length where dry friction turns over sharply."""
-    step = _undivided(model, rule, x0, torque, h, before)
+    step = undivided_step(model, rule, x0, torque, h, before)
     if halvings == 0 or not _turns_sharply(model, x0, step.x1):
         return step
     first = _halved(model, rule, x0, torque, 0.5 * h, before, halvings - 1)
@@ -136,7 +136,10 @@ def _turns_sharply(model: StateRates, x0: Array, x1: Array) -> bool:
     return bool(((v0 * v1 < 0.0) & (np.abs(v1 - v0) * model.sharpness > SHARP_TURN)).any())
 
 
-def _undivided(model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None) -> TickStep:
+def undivided_step(
+    model: StateRates, rule: str, x0: Array, torque: Array, h: float, before: RatesAt | None = None
+) -> TickStep:
+    """The step that leaves the dynamics factor of its rule no defect; arguments as of `take_step`."""
     start = RatesAt.of(model, x0, torque) if before is None else before.near(model, x0, torque)
     eye, columns = _eye(len(x0)), model.friction_columns
     if rule == "euler":

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from robots_to_compare import READY, ROBOTS, states
+from scipy.integrate import solve_ivp
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.euler_dynamics import EulerDynamics
@@ -15,7 +16,7 @@ from jointscope.factors.midpoint_dynamics import MidpointDynamics
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
 from jointscope.graphs.fixed_lag.window.step_noise import StepNoise
-from jointscope.graphs.fixed_lag.window.tick_step import RatesAt, take_step
+from jointscope.graphs.fixed_lag.window.tick_step import RatesAt, take_step, undivided_step
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.state_rates import StateRates
 
@@ -49,7 +50,7 @@ def factor_of(robot, rule, x0, u, h=H):
 def taken(robot, rule):
     model, x0 = StateRates(robot), states(robot, COUNT)
     u = np.random.default_rng(4).uniform(-0.5, 0.5, (COUNT, robot.n))
-    return model, x0, u, [take_step(model, rule, x0[k], model.command_torque(u[k]), H) for k in range(COUNT)]
+    return model, x0, u, [undivided_step(model, rule, x0[k], model.command_torque(u[k]), H) for k in range(COUNT)]
 
 
 def test_the_end_of_a_step_leaves_the_factor_no_defect(robot, rule):
@@ -83,16 +84,38 @@ def test_transition_and_torque_response_agree_with_differences(robot, rule):
         for j in range(len(moved)):
             dx = np.zeros(len(moved))
             dx[j] = exact
-            ends = [take_step(model, rule, x0[k] + s * dx, torque, H).x1 for s in (1.0, -1.0)]
+            ends = [undivided_step(model, rule, x0[k] + s * dx, torque, H).x1 for s in (1.0, -1.0)]
             moved[:, j] = (ends[0] - ends[1]) / (2.0 * exact)
         np.testing.assert_allclose(step.transition, moved, atol=2e-2 * np.abs(moved - np.eye(len(moved))).max())
         response = step.by_end_inverse @ step.by_torque
         for j in range(robot.n):
             dt = np.zeros(robot.n)
             dt[j] = 1e-3
-            ends = [take_step(model, rule, x0[k], torque + s * dt, H).x1 for s in (1.0, -1.0)]
+            ends = [undivided_step(model, rule, x0[k], torque + s * dt, H).x1 for s in (1.0, -1.0)]
             change = (ends[0] - ends[1]) / 2e-3
             np.testing.assert_allclose(response[:, j], change, atol=3e-2 * np.abs(change).max())
+
+
+def test_a_step_in_which_dry_friction_turns_over_ends_where_many_short_ones_do():
+    """Steps of 5 ms in which one motor comes to rest, or turns over; the rule alone misses a sixth of the friction."""
+    sharp = replace(READY, choices=replace(READY.choices, friction_sharpness=1000.0))
+    model, h, velocities = StateRates(sharp), 5e-3, READY.layout.velocities
+    torque = model.command_torque(np.array([0.4, -0.3, 0.5]))
+    errors = []
+    for share in np.linspace(0.1, 0.9, 9):
+        x0 = np.zeros(12)
+        x0[READY.layout.motor_v] = x0[READY.layout.joint_v] = 0.5, 1e-9, -0.5
+        x0[READY.layout.motor_v[1]] = -share * h * model.rates(x0, torque)[READY.layout.motor_v[1]]
+        exact = solve_ivp(lambda _, x: model.rates(x, torque), (0.0, h), x0, "Radau", rtol=1e-9, atol=1e-12).y[:, -1]
+        ways = take_step(model, "simpson", x0, torque, h), undivided_step(model, "simpson", x0, torque, h)
+        errors.append([np.abs(step.x1 - exact)[velocities].max() for step in ways])
+        halved = ways[0]
+        small = 1e-7 * np.eye(12)
+        ends = [[take_step(model, "simpson", x0 + s * dx, torque, h).x1 for dx in small] for s in (1.0, -1.0)]
+        moved = ((np.array(ends[0]) - np.array(ends[1])) / 2e-7).T
+        np.testing.assert_allclose(halved.transition, moved, atol=0.05 * np.abs(moved).max())
+    found, alone = np.max(errors, axis=0)
+    assert found < 0.15 * alone, (found, alone)
 
 
 def test_rates_kept_from_the_last_step_change_the_end_less_than_noise():
