@@ -72,11 +72,17 @@ class BagProblem:
     owner: int | None = None
 
     @staticmethod
-    def of(robot: Robot, recording: Recording) -> BagProblem:
-        """Builds the factors of a recording; its robot is in the posture of the recording."""
+    def of(robot: Robot, recording: Recording, between: Array | None = None) -> BagProblem:
+        """Builds the factors of a recording; its robot is in the posture of the recording.
+
+        Args:
+            robot: the model.
+            recording: the data.
+            between: times at which steps are divided that would be too long [s].
+        """
         robot.need_link_dynamics()
         robot = robot.in_posture(recording.posture)
-        timeline = Timeline.of(recording, robot.command_held)
+        timeline = Timeline.of(recording, robot.command_held, between)
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints)
         index = np.arange(len(timeline.h))

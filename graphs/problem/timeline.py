@@ -41,12 +41,13 @@ class Timeline:
         return np.diff(self.ticks)
 
     @staticmethod
-    def of(recording: Recording, held: bool = True) -> Timeline:
+    def of(recording: Recording, held: bool = True, between: Array | None = None) -> Timeline:
         """Ticks from the first command to the last sample of any sensor.
 
         Args:
             recording: with its drive signal.
             held: whether each value of it acts until the next one; otherwise it is linear between samples.
+            between: times at which steps are divided further [s].
 
         Raises:
             RecordingError: commands and sensors do not overlap in time.
@@ -71,11 +72,13 @@ class Timeline:
                 f"{recording.path}: {recording.sample_count} samples in {end - times[0]:.0f} s are too few to follow a "
                 f"motion; expected several in a second: cut out the part in which the robot was recorded, {CUT}"
             )
-        if np.all(parts == 1):
-            return Timeline(edges, u if held else _means(command, edges))
         fraction = np.concatenate([np.arange(p) / p for p in parts])
         ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
-        return Timeline(ticks, np.repeat(u, parts, axis=0) if held else _means(command, ticks))
+        if between is not None:
+            ticks = np.union1d(ticks, between)
+        # a tick that divides a step may be a rounding error away from its beginning, never beyond its end
+        step = np.clip(np.searchsorted(edges, ticks[:-1] + 0.5 * np.diff(ticks)) - 1, 0, len(u) - 1)
+        return Timeline(ticks, u[step] if held else _means(command, ticks))
 
     def locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
         """Step that holds each time, and the fraction of the step that has passed, shape (k,) each."""

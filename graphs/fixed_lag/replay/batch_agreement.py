@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.interpolated import interpolate
 from jointscope.graphs.comparison.compare import smooth
+from jointscope.graphs.comparison.short_reversals import with_short_reversals
 from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.model.robot import Robot
@@ -130,7 +131,7 @@ def _finite(recording: Recording) -> Recording:
 @in_solver_context
 def _smoothed(robot: Robot, recording: Recording) -> tuple[Array, Array]:
     """Times, shape (k,), and states, shape (k, d), of the batch smoother."""
-    problem, states, _ = smooth(robot, recording)
+    problem, states, _ = with_short_reversals(*smooth(robot, recording))
     return problem.timeline.ticks, states
 
 

@@ -30,7 +30,8 @@ LONGEST_WAIT = 0.5  # [s] between two samples that belong together; after half o
 STILL = 4.0  # [sigma] spread of the encoders at rest
 REST_VELOCITY = 0.01  # [rad/s] uncertainty at rest; friction holds a motor while the link may still swing a little
 LINK_VELOCITY = 1.0  # [rad/s] of a link against its motor, in motion
-ACCELERATION = 100.0  # [rad/s^2] that a straight line may hide
+ACCELERATION = 100.0  # [rad/s^2] at the most, where the samples do not tell
+SURELY = 3.0  # [sigma] by which the acceleration may be larger than the one that they tell
 
 
 @dataclass(frozen=True)
@@ -107,22 +108,22 @@ def first_state(
     own, sigma = layout.robot, robot.motor_encoder.sigmas
     t = np.array([s.time for s in samples])
     q = np.array([s.q for s in samples])
-    now, span = float(t[-1]), float(max(t[-1] - t[0], 1e-4))
+    now = float(t[-1])
     seen = np.isfinite(q)
     rests = bool(np.all(np.nanmax(q, axis=0) - np.nanmin(q, axis=0) < STILL * sigma))
-    ways = [np.polyfit(t[has] - now, column[has], 1)[0] for column, has in zip(q.T, seen.T, strict=True)]
-    v = np.zeros(robot.n) if rests else np.array(ways)
+    ways = [_velocity(t[has] - now, column[has], s) for column, has, s in zip(q.T, seen.T, sigma, strict=True)]
+    v = np.zeros(robot.n) if rests else np.array([way for way, _ in ways])
     last = len(t) - 1 - np.argmax(seen[::-1], axis=0)
     since = now - t[last]  # [s] of joints that other messages tell of
     newest = q[last, np.arange(robot.n)] + v * since
-    v_sigma = REST_VELOCITY if rests else np.hypot(4.0 * float(np.max(sigma)) / span, 0.5 * ACCELERATION * span)
+    v_sigma = np.full(robot.n, REST_VELOCITY) if rests else np.array([doubt for _, doubt in ways])
     mean, variance = np.zeros(layout.size), np.zeros(layout.size)
     mean[own.motor_q], mean[own.motor_v] = newest, v
     mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, newest), joint_angles(robot, v)
-    variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, v_sigma**2
+    variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, np.max(v_sigma) ** 2
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
-    variance[own.motor_q] = sigma**2 + (v_sigma * since) ** 2
+    variance[own.motor_q], variance[own.motor_v] = sigma**2 + (v_sigma * since) ** 2, v_sigma**2
     variance[own.memory] = memory_spreads(robot) ** 2
     if walking is not None:
         mean[layout.walking] = walking.mean[layout.walking]
@@ -135,3 +136,24 @@ def first_state(
     mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
     variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
     return now, NewestState(mean, np.diag(variance))
+
+
+def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:
+    """Velocity at time zero from samples before it, and its standard deviation [rad/s].
+
+    A wide one does harm: where a joint turns over, the slope of its dry friction holds within a few mrad/s only.
+
+    Args:
+        t, q: times [s] and positions [rad], shape (k,).
+        sigma: of a sample [rad].
+    """
+    span = float(max(t[-1] - t[0], 1e-4))
+    way = float(np.polyfit(t, q, 1)[0])
+    if len(t) < FEWEST:
+        return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
+    powers = np.vander(t / span, 3, increasing=True)
+    (_, slope, bend), spread = np.linalg.lstsq(powers, q)[0], sigma * np.sqrt(np.linalg.inv(powers.T @ powers).diagonal())
+    bent = 2.0 * (abs(bend) + SURELY * spread[2]) / span**2
+    if bent > ACCELERATION:
+        return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
+    return float(slope / span), float(np.hypot(spread[1] / span, 0.5 * bent * span))

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from jointscope.graphs.comparison.short_reversals import HALVINGS, SHARP_TURN
 from jointscope.robots.dynamics.state_rates import StateRates
 
 Array = NDArray[np.float64]
@@ -30,8 +31,6 @@ ITERATIONS = 4
 SAME_FRICTION = 1e-3  # share of the Coulomb torque that a straight line may miss before rates are evaluated anew
 SAME_DERIVATIVE = 0.01  # largest change of h df/dx over a step whose middle is not evaluated
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
-SHARP_TURN = 4.0  # change of that argument, with its sign, over a step that is halved
-HALVINGS = 5
 
 
 @dataclass(frozen=True)
