@@ -22,7 +22,7 @@ def add_leave_out_option(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="seconds of a recording in which somebody pushed the robot, for example 8.0:8.4, or run.mcap:8.0:8.4 "
         "where there are several; counted from the first stamp that the robot uses, as in all reports. The equations "
-        "of motion are not asked to hold there, and no model is judged there; may be repeated",
+        "of motion are not applied there, and no model is judged there; may be repeated",
     )
 
 

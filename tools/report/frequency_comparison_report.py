@@ -43,9 +43,9 @@ def frequency_comparison_report(
 
 
 ERRORS = (
-    "Root mean square over lines and poses: size of the model's entry over the measured one, what the spread of the "
-    "measured one alone would make of it (floor), and the distance in its sigmas (floor: 1). The model's matrix takes "
-    "dry friction for viscous friction, as a sine sees it."
+    "Root mean square over lines and poses: size of the model's entry over the measured one, the floor that the "
+    "covariance of the measured one alone would give, and the distance in its sigmas (floor: 1). The model's matrix "
+    "has viscous friction in place of dry friction, as a sine sees it."
 )
 LEFT = (
     "What the torque balance leaves of each motor's torque, with dry friction as it is, and its power over that of the "

@@ -55,7 +55,7 @@ def steps_section(found: ArmDiscovery) -> Section:
     """The waterfall: what each effect that was added is worth."""
     head, rows = step_table(found)
     rows = [[escape(cell) for cell in row] for row in rows]
-    lead = f"It ended because {found.stop_reason}."
+    lead = f"The search ended because {found.stop_reason}."
     return Section("steps", "What was missing", table(head, rows, range(2, len(head))), lead)
 
 

@@ -10,7 +10,7 @@ from jointscope.tools.simulator.effects import simulated_effects
 HEADINGS = {
     "catalogue": "effects that the catalogue knows, by owner",
     "outside": "effects outside the catalogue: a diagnosis should say that something is left",
-    "mistake": "no physics, but mistakes in the bag",
+    "mistake": "not physics, but mistakes in the bag",
 }
 EXAMPLES = {
     "joint": "joint1",

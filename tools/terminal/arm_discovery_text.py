@@ -96,7 +96,7 @@ def arm_discovery_text(found: ArmDiscovery) -> str:
         said += told_apart(step.added)
     parts = [
         text_table(head, rows, "<<" + ">" * (len(head) - 2)),
-        f"It ended because {found.stop_reason}.",
+        f"The search ended because {found.stop_reason}.",
         *said,
         ranking_text(last.candidates, recordings_said(found), found.kinds),
         *unseen_sentences(last.candidates, found.kinds if len(found.kinds) > 1 else ()),

@@ -51,7 +51,7 @@ def ranking_text(result: Diagnosis) -> str:
     if len(result.candidates) > SHOWN:
         lines.append(f"  and {len(result.candidates) - SHOWN} more in the report")
     lines.append(
-        f"  base model: {significant(result.validation_error)} on the validation blocks, which it was fitted to, too; "
+        f"  base model: {significant(result.validation_error)} on the validation blocks, to which it was also fitted; "
         f"largest score of meaningless regressors {significant(result.placebo_score)} per degree of freedom"
     )
     return "\n".join(lines)

@@ -38,11 +38,9 @@ def response_text(found: MeasuredResponse) -> str:
     if d is None:
         lines += [
             "",
-            "Without whole periods noise and distortions cannot be told apart; resonances narrower than the lines",
+            "Without whole periods noise and distortions cannot be told apart; resonances narrower than the window of "
+            "the local fit come out too flat, with larger sigmas. Record two periods or more (docs/frequency.md).",
         ]
-        lines[-1] += (
-            " about each come out too flat, with larger sigmas. Record two periods or more (docs/frequency.md)."
-        )
     elif not len(d.even.frequencies) + len(d.odd.frequencies):
         lines += ["", "All lines were excited, so even and odd distortions cannot be told apart."]
     return "\n".join(lines)
@@ -124,11 +122,11 @@ def frequency_errors_text(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> 
     first = next(iter(by_label.values()))
     count = sum(len(one.pose.lines) for one in first)
     lines = [
-        f"{len(first)} poses, {count} lines: size of the model's matrix over the measured one, what the spread of the "
-        "measured one alone would make of it, and the distance in its sigmas (root mean squares)",
+        f"{len(first)} poses, {count} lines: size of the model's matrix over the measured one, the floor that the "
+        "covariance of the measured one alone would give, and the distance in its sigmas (root mean squares)",
         text_table(ERROR_HEAD, error_rows(by_label), "<<<>>>"),
         "",
-        "What the torque balance, which knows dry friction, leaves, and its power over that of the noise",
+        "What the torque balance, which includes dry friction, leaves, and the power of that over the noise's",
         text_table(BALANCE_HEAD, balance_rows(by_label), "<<<>>"),
     ]
     worst = [

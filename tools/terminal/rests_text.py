@@ -27,7 +27,7 @@ def rest_calibration_text(result: RestCalibration) -> str:
         f"{result.iterations} iterations",
         "",
         verdict(result),
-        f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads say, "
+        f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads put them, "
         f"{significant(result.before.error, 3)} before; 1 is expected",
     ]
     lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.rests.notices]
@@ -43,7 +43,7 @@ def rest_calibration_text(result: RestCalibration) -> str:
 def rest_errors_text(by_label: Mapping[str, RestErrors], robots: Mapping[str, Robot], count: int) -> str:
     """Errors of some models, by label."""
     robot = next(iter(robots.values()))
-    return f"{count} rests, links measured against where motors and loads say\n{_errors(by_label, robot)}"
+    return f"{count} rests, links measured against where motors and loads put them\n{_errors(by_label, robot)}"
 
 
 def rests_beside_motion(result: CalibrationResult) -> str:
@@ -54,7 +54,7 @@ def rests_beside_motion(result: CalibrationResult) -> str:
     errors, count = rest_errors(problems), sum(len(problem.rests) for problem in problems)
     return (
         f"{count} rests in the same estimate: links rest {significant(errors.error, 2)} sigma (rms) from where motors "
-        f"and loads say.\n{_errors({result.robot.name: errors}, result.robot)}"
+        f"and loads put them.\n{_errors({result.robot.name: errors}, result.robot)}"
     )
 
 

@@ -23,7 +23,7 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="*", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument(
-        "--holdout", metavar="BAG", type=Path, help="a recording that is scored and reported, but never chooses"
+        "--holdout", metavar="BAG", type=Path, help="a recording that is scored, but never influences the choice"
     )
     parser.add_argument(
         "--holdout-share",

@@ -43,7 +43,7 @@ class DemoStory:
         """Runs all steps and returns what they found, for JSON."""
         say(f"1. A recording. MuJoCo drives a Doggy with {', '.join(self.effects)}; the model does not know that.")
         truth = self._simulate("train", "calibration", self.seconds)
-        say("\n2. Another motion of the same robot, held out: it is scored, but never chooses.")
+        say("\n2. Another motion of the same robot, held out: it is scored, but never influences the choice.")
         self._simulate("test", "moves", TEST_SECONDS)
         say("\n3. What does the model lack? Calibrate, diagnose, add, and again, until nothing helps.")
         discovery = self._discover()

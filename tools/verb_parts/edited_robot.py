@@ -30,7 +30,7 @@ def add_edit_arguments(parser: argparse.ArgumentParser) -> None:
     out = "robot file to write; may be ROBOT itself"
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help=out)
     add_effects_option(parser)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
 
 
 def edit_robot(args: argparse.Namespace, edit: Edit) -> tuple[Robot, EditedRobot]:

@@ -42,7 +42,7 @@ def add_holdout_frequency_option(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="BAG",
-        help="recordings of the arm shaken that are scored once per step and never choose",
+        help="recordings of the arm shaken that are scored once per step, but never influence the choice",
     )
 
 

@@ -39,7 +39,7 @@ def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="TABLE-or-BAG",
-        help="poses that are scored once per step and never choose",
+        help="poses that are scored once per step, but never influence the choice",
     )
 
 

@@ -28,8 +28,8 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
         "--friction",
         choices=["dry", "smooth"],
         default="dry",
-        help="of the motors; dry: they stick, which the model rounds off, so that more is missing than the effects "
-        "that are named; smooth: rounded off as in the model; default dry",
+        help="friction of the motors; dry: motors stick, which the model rounds off, so that more than the named "
+        "effects is missing; smooth: rounded off as in the model; default dry",
     )
     sensors = parser.add_argument_group("sensors and disturbances")
     sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")

@@ -17,7 +17,7 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         type=_count,
         default=0,
-        help="processes that fit candidates side by side, one a core by default; the result does not depend on it",
+        help="processes that fit candidates in parallel; default: one per core; the result does not depend on it",
     )
 
 

@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "add",
         help="adds physical effects to a robot file; calibration then finds their sizes",
-        description="Writes a robot file with one or more physical effects more; comments of the file survive.",
+        description="Adds one or more physical effects to a robot file; comments of the file survive.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope calibrate`: batch calibration; OUT.yaml is a robot file again, with sigmas and provenance."""
+"""`jointscope calibrate`: calibrates a robot from recordings; OUT.yaml is a robot file with sigmas and provenance."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--incremental",
         action="store_true",
-        help="stretch after stretch by iSAM2, saying what is known after each; ends where the batch ends",
+        help="solve stretch after stretch with iSAM2 and print what is known after each; the end is that of the batch",
     )
     add_poses_option(parser)
     add_rests_option(parser)

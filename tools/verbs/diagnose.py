@@ -19,7 +19,7 @@ EXAMPLE = """example:
   jointscope diagnose tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv
 
 The robot is calibrated first. Effects are chosen by blocks of the training recordings that were left out; the held-out
-recording never chooses. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
+recording only reports. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
 
 
 def add_parser(subparsers: Any) -> None:

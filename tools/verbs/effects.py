@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="F.md",
         help=f"write the catalogue as a page of markdown; drawings of laws and of signatures go to {PICTURES}",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 

@@ -30,7 +30,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write a URDF")
     parser.add_argument("--mjcf", type=Path, metavar="F.xml", help="write a MuJoCo model")
     add_effects_option(parser)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 

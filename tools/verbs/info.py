@@ -15,7 +15,7 @@ EXAMPLE = """example:
   jointscope info calibration.mcap
   jointscope info calibration.mcap --robot doggy --json info.json
 
-The exit code is 0 also where the robot cannot use the bag; what is said, and `usable` in the JSON, tell."""
+The exit code is 0 even if the robot cannot use the bag; see the text, or `usable` in the JSON."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -30,7 +30,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("--robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     add_effects_option(parser)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 

@@ -21,7 +21,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "remove",
         help="takes physical effects out of a robot file, with all their parameters",
-        description="Writes a robot file with one or more physical effects less; comments of the file survive.",
+        description="Removes one or more physical effects from a robot file; comments of the file survive.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

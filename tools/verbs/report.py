@@ -26,5 +26,5 @@ def add_parser(subparsers: Any) -> None:
     )
     compare.add_models_and_bag(parser)
     parser.add_argument("-o", "--output", dest="report", metavar="F.html", type=Path, required=True, help="the report")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=compare.run, rrd=None, figures=None)

@@ -50,8 +50,8 @@ def add_parser(subparsers: Any) -> None:
         help="motion: a bag; poses: a table (.csv) of an arm at rest with a tracker; frequency: a folder of bags of an "
         "arm that is shaken; default: what the robot has",
     )
-    parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, of shaken ones 2")
-    parser.add_argument("--session", default="poses", metavar="NAME", help="another name: other poses of the same arm")
+    parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, or 2 if shaken")
+    parser.add_argument("--session", default="poses", metavar="NAME", help="another name gives other poses of the arm")
     add_shaking_options(parser)
     parser.add_argument(
         "--motion",
@@ -63,7 +63,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")
     add_simulation_options(parser)
     add_effects_option(parser)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what the screen says as JSON")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.set_defaults(run=run)
 
 

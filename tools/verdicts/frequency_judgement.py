@@ -56,7 +56,7 @@ def _answer(result: FrequencyCalibration) -> Check:
         if there
     )
     if not found:
-        return Check("good", name, f"What the torque balance leaves is another {way}: friction and noise.")
+        return Check("good", name, f"What the torque balance leaves differs {way}: friction and noise.")
     bad = [band for _, band in found if band.share > ANSWERS_BACK[1]]
     worst = sorted(found, key=lambda each: -each[1].share)[:SHOWN]
     said = "; ".join(
@@ -65,7 +65,7 @@ def _answer(result: FrequencyCalibration) -> Check:
     return Check(
         "bad" if bad else "warn",
         name,
-        f"What the torque balance leaves comes again {way}, so the model lacks a response ({said}): a joint or bearing "
+        f"What the torque balance leaves recurs {way}, so the model lacks a response ({said}): a joint or bearing "
         "that gives way and is not in the robot file, a delay of the torques, a wrong inertia.",
     )
 
@@ -100,7 +100,7 @@ def _range(ratios: Sequence[float]) -> str:
 def _heldout(result: FrequencyCalibration) -> Check:
     name, found = "A realisation that others predict", result.explained
     if not found.heldout:
-        return Check("info", name, "Not to be asked with one realisation of the phases; record another one.")
+        return Check("info", name, "One realisation of the phases cannot tell; record another one.")
     ratios = {number: error / found.fitted[number] for number, error in found.heldout.items()}
     worst = max(ratios, key=lambda number: ratios[number])
     level = "good" if ratios[worst] <= WORSE[0] else "warn" if ratios[worst] <= WORSE[1] else "bad"
@@ -126,7 +126,7 @@ def _agree(result: FrequencyCalibration) -> Check:
     return Check(
         "bad",
         name,
-        f"Not the values of the others has {said}: an effect that is missing, another load, or a changed arm.",
+        f"In disagreement with the others: {said}. An effect is missing, the load was another, or the arm changed.",
     )
 
 

@@ -110,8 +110,8 @@ def _agreeing(signs: Sequence[Check]) -> list[Check]:
     if len(doubtful) < TOGETHER:
         return []
     text = (
-        f"Doubtful are both {' and '.join(f'“{name}”' for name in doubtful)}: what is missing is no noise, and the "
-        "sigmas do not hold it. `jointscope diagnose` says what it may be."
+        f"{' and '.join(f'“{name}”' for name in doubtful)} are doubtful at once: what is missing is not noise, and "
+        "the sigmas do not include it. `jointscope diagnose` says what it may be."
     )
     return [Check("bad", "No two signs that something is missing", text)]
 

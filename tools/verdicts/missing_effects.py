@@ -16,7 +16,7 @@ MOST_ALIKE = 2
 def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     """A level of `judgement.LEVELS` and a sentence."""
     if result.robot.free_links:
-        return "info", "Without masses nothing tells."
+        return "info", "Without masses this cannot be checked."
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
     within = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found, sigmas=0.0))]

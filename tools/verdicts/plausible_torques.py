@@ -36,14 +36,14 @@ def plausible_torques(result: CalibrationResult) -> tuple[str, str]:
         grams = f"; in grams they would be 1000 times too large{_by_thousand(constants)}"
         return "bad", (
             f"link {heavy.link} of {robot.tree.urdf.name} has {significant(heavy.mass)} kg, and what moves weighs at "
-            f"least {heavy.density:,.0f} kg/m3 (steel 7,900): its masses cannot be right{grams}. Mend <mass> and "
+            f"least {heavy.density:,.0f} kg/m3 (steel 7,900): its masses cannot be right{grams}. Correct <mass> and "
             f"<inertia> there, then {_again(result)}."
         )
     strong = max(constants, key=lambda p: p.value, default=None)
     if strong is not None and strong.value > STRONGEST and strong.unit == "N m/A":
         return "bad", (
             f"{strong.name} is {significant(strong.value)} N m/A, more than any drive makes: masses of "
-            f"{robot.tree.urdf.name} in grams, or commands in another unit? Mend it, then {_again(result)}."
+            f"{robot.tree.urdf.name} in grams, or commands in another unit? Correct it, then {_again(result)}."
         )
     return _torques(result) or _load(result, constants) or _scale(result, constants) or ("good", _nothing(constants))
 
@@ -61,7 +61,7 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
     return "bad", (
         f"{', '.join(masses)} and the torque constants are told by the same weights: a load at another place than the "
         f"link's makes all of them wrong by one factor. Give the constants of the drives, `fixed: true` beside each "
-        f"{CONSTANT} in {result.start.path.name}, then calibrate again; or mend the masses of "
+        f"{CONSTANT} in {result.start.path.name}, then calibrate again; or correct the masses of "
         f"{result.robot.tree.urdf.name}."
     )
 
@@ -93,7 +93,8 @@ def _another_place(result: CalibrationResult, joint: str) -> str:
     return (
         f"The recording asks for weight at another place behind {joint}, as a load would that "
         f"{result.robot.tree.urdf.name} lacks, or a base that is not level. If that may be: `jointscope add {file} "
-        f"gravity_direction@robot -o {file}`, then calibrate again; else mend the masses and their places in the URDF."
+        f"gravity_direction@robot -o {file}`, then calibrate again; otherwise correct the "
+        "masses and their places in the URDF."
     )
 
 
@@ -114,7 +115,7 @@ def _torques(result: CalibrationResult) -> tuple[str, str] | None:
     text = (
         f"The command is in N m, but with the masses of {robot.tree.urdf.name} one moves as "
         f"{', '.join(f'{significant(v.value)} ({j})' for j, v in off.items())} N m would: masses or torques are wrong "
-        f"by that factor{alike}. Does it carry a load that the URDF lacks, or is it another robot's? Mend "
+        f"by that factor{alike}. Does it carry a load that the URDF lacks, or is it another robot's? Correct "
         f"the masses, then {_again(result)}.{unit}"
     )
     return ("bad" if _factor(off[worst]) > 1.0 + MASSES[1] else "warn"), text

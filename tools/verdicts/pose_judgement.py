@@ -37,7 +37,7 @@ def _enough(result: PoseCalibration) -> Check:
     text = f"{measured - contacts} measured coordinates tell {values} values"
     if level != "good":
         more = int(np.ceil((REDUNDANT[0] * values - measured + contacts) / 3))
-        text += f"; {more} more poses would make the values trustworthy, till then priors decide a part of them"
+        text += f"; {more} more poses would make the values trustworthy; until then priors decide part of them"
         weak = sorted(result.told, key=lambda n: -_kept(result, n))[:SHOWN]
         text += f", most of all {', '.join(weak)}"
     return Check(level, "Enough poses", f"{text}.")
@@ -74,7 +74,7 @@ def _still(result: PoseCalibration) -> Check:
             )
     if found:
         return Check("bad", name, f"{found}.")
-    return Check("good", name, "No step in what is left over the session.")
+    return Check("good", name, "The residuals show no step over the session.")
 
 
 def _geometric(result: PoseCalibration) -> set[str]:
@@ -86,7 +86,7 @@ def _repeatability(result: PoseCalibration) -> Check:
     level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
     assert result.robot.poses is not None
     micro = 1e6 * float(np.median(result.robot.poses.joint_sigmas))
-    text = f"What is left is as transmissions that repeat to {significant(micro, 2)} urad would leave it"
+    text = f"The residuals are those of transmissions that repeat to {significant(micro, 2)} urad"
     if level != "good":
         text += (
             f", {significant(factor, 2)} times what the robot file says: joints that had not settled, another "

@@ -15,7 +15,7 @@ from jointscope.tools.verdicts.judgement import LEVELS, Check, Judgement
 NIS = (1.25, 2.0)  # per degree of freedom: fine up to the first, bad beyond the second
 SMALL_NIS = (0.8, 0.4)  # below the first the sigmas are larger than they need be; a quantized encoder at rest is there
 ANSWERS = {
-    "good": "Yes: the estimate keeps what its sigmas promise.",
+    "good": "Yes: the estimate is as accurate as its sigmas say.",
     "warn": "With reservations: the sigmas do not hold everywhere.",
     "bad": "No: model and measurements contradict each other.",
 }
@@ -25,7 +25,7 @@ KINDS = {
     "stuck": "stuck",
     "duplicate": "repeated",
     "not_finite": "not finite",
-    "incomplete": "before those of all joints had come",
+    "incomplete": "before those of all joints had arrived",
     "outlier": "outliers",
     "saturated": "saturated",
 }
@@ -115,9 +115,9 @@ def _samples(result: ReplayResult) -> Check:
     name = "Samples used"
     received = sum(result.status.received.values()) or 1
     late = sum(result.status.late.values())
-    told = f"{late} came out of order and were put where they were taken. " if late else ""
+    told = f"{late} came out of order and were put at their stamps. " if late else ""
     if not result.dropped:
-        return Check("good", name, f"{told}All {received} messages went in.")
+        return Check("good", name, f"{told}All {received} messages were used.")
     share = result.dropped / received
     level = "info" if share < 0.01 else "warn"
     return Check(

@@ -15,17 +15,17 @@ MISSED = 0.1  # of the random torques; light joints of which inertias were 3 % a
 def short_steps(result: CalibrationResult) -> tuple[str, str]:
     """Level and sentence."""
     if not result.step_errors:
-        return "info", "Not asked here."
+        return "info", "Not checked here."
     layout = result.robot.layout
     i = int(np.argmax(result.step_errors))
     joint = [*layout.links, *layout.motors][i]
     if result.step_errors[i] < MISSED:
-        return "good", "Between two states the motion is what the integration says."
+        return "good", "Between two states the motion is as the integration has it."
     step = 1e3 * float(np.median(np.diff(result.bags[0].ticks)))
     return (
         "bad",
-        f"What steps of {significant(step, 2)} ms miss is {significant(100 * result.step_errors[i], 2)} % of the "
-        f"random torques: friction stops joints as light as {joint} within a small part of one, so that inertias of "
-        f"light joints are not those above. Where the real friction turns over more slowly, say how "
-        f"({joint}.{SHARPNESS}); else such an inertia is better taken from a drawing (`fixed: true`).",
+        f"Steps of {significant(step, 2)} ms miss {significant(100 * result.step_errors[i], 2)} % of the random "
+        f"torques: friction stops joints as light as {joint} within a small part of a step, so the inertias of light "
+        f"joints are biased. If the real friction reverses more slowly, say so ({joint}.{SHARPNESS}); otherwise take "
+        "such an inertia from a drawing (`fixed: true`).",
     )

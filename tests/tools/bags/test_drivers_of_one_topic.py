@@ -57,7 +57,7 @@ def test_the_door_opens_and_the_values_are_right(arm, halves, tmp_path, capsys):
     assert "Yes, this calibration is good" in capsys.readouterr().out
     assert main(["replay", str(found), str(halves)]) == 0
     out = capsys.readouterr().out
-    assert f"All {_instants(rows) + len(arm[2].times)} messages went in" in out
+    assert f"All {_instants(rows) + len(arm[2].times)} messages were used" in out
     assert "ok Agrees with the batch smoother" in out
 
 
@@ -150,7 +150,7 @@ def test_nodes_may_speak_just_behind_each_other_begin_late_and_end_early(fast, t
     assert main(["replay", str(found), str(bag), "--json", str(told)]) == 0
     out = capsys.readouterr().out
     if nodes == "half is commanded late":
-        assert "before those of all joints had come" in out
+        assert "before those of all joints had arrived" in out
     assert ("nothing of elbow.command since" in out) == (nodes == "half is no longer commanded")
     if nodes != "half is no longer commanded":
         assert json.loads(told.read_text())["nis_mean"] < 1.5

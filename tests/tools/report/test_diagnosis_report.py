@@ -49,7 +49,7 @@ def test_the_ranking_shows_sizes_with_sigmas_units_verdicts_and_reasons(page):
         "Its sign is not physical.",
         "12.9 held out",
         "ΔBIC −420000",
-        "numerics, no physics",
+        "numerics, not physics",
         "untestable",
         "a score of 14.0 per degree of freedom",
     ):

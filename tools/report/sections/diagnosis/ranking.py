@@ -76,7 +76,7 @@ def _row(rank: int, c: Candidate) -> list[str]:
 def badge(c: Candidate) -> str:
     """The verdict as a coloured tag."""
     level = VERDICT_LEVELS.get(c.verdict, "info") if c.verdict != "absent" else ""
-    numerics = '<br><small class="quiet">numerics, no physics</small>' if c.numerics else ""
+    numerics = '<br><small class="quiet">numerics, not physics</small>' if c.numerics else ""
     return f'<span class="badge {level}">{escape(c.verdict)}</span>{numerics}'
 
 

@@ -25,7 +25,8 @@ def waterfall(result: Discovery) -> Section:
     lead = (
         f"Error {result.judged_by}, root mean square over all channels, in sensor sigmas. Training: on the "
         "recordings that every step was calibrated with, nothing left out. The held-out recording is scored once per "
-        "step and never chooses. Mark: the floor, what noise and the uncertainty of the state alone would give."
+        "step and never influences the choice. Mark: the floor, what noise and the uncertainty of the state alone "
+        "would give."
     )
     keys = [Key("training recordings", TRAINING, "thick")]
     keys += [Key("held-out recording", HELD_OUT, "thick")] if result.held_out else []
