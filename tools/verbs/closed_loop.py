@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope closed-loop`: ball hitting in the simulator, tracking errors with and without the estimator."""
+"""`jointscope closed-loop`: runs controllers in the simulator, with and without the estimator."""
 
 from __future__ import annotations
 

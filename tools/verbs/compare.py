@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope compare`: measured against predicted, per channel and horizon; several models side by side."""
+"""`jointscope compare`: predicts a recording with one or more models; errors per channel and horizon."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ from jointscope.tools.writing.whole_file import check_outputs, write_json
 EXAMPLE = """example:
   jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
 
-The last argument is the bag; all before it are robots. Use a recording that was not used for calibration. With poses:
+The last argument is the bag; all before it are robots. Use a recording that was not used for calibration.
+With poses or frequency responses:
   jointscope compare arm.yaml --poses other_poses.csv
   jointscope compare tx90l arm.yaml --frequency frequency_P2 --report matrix.html"""
 

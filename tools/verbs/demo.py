@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope demo`: the whole story on a simulated Doggy with a soft bearing, from bag to report."""
+"""`jointscope demo`: tells the whole story on a simulated Doggy with a soft bearing, from bag to report."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope export`: a calibrated robot for other programs, as URDF and as MuJoCo model."""
+"""`jointscope export`: writes a calibrated robot as URDF and as MuJoCo model for other programs."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope frequency`: frequency response matrix of any system, with noise and total covariance."""
+"""`jointscope frequency`: estimates the frequency response matrix of any system, with its covariances."""
 
 from __future__ import annotations
 

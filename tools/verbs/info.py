@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope info`: what is in a bag, and whether a robot can use it."""
+"""`jointscope info`: shows what is in a bag, and whether a robot can use it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope replay`: the fixed-lag estimator over a recording, message by message as in the control loop."""
+"""`jointscope replay`: runs the fixed-lag estimator over a recording, message by message as in the control loop."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope report`: how well models predict a recording, as one page for the browser."""
+"""`jointscope report`: writes a page for the browser that shows how well models predict a recording."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`jointscope simulate`: a recording from MuJoCo as a bag, and the truth beside it."""
+"""`jointscope simulate`: simulates a robot with MuJoCo, and writes a bag and the truth beside it."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def written(tmp_path_factory):
 
 
 def test_the_verb_is_listed_with_a_hyphen():
-    assert verbs()["closed-loop"] == "ball hitting in the simulator, tracking errors with and without the estimator"
+    assert verbs()["closed-loop"] == "runs controllers in the simulator, with and without the estimator"
 
 
 def test_the_screen_shows_every_controller_with_every_source(written):
