@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of the BioRob beside what is measured, on recordings that another program simulated.
 
-Usage: python benchmarks/bench_biorob.py [clean | nothing | deadzone | idler | hall ...]; the recordings lie in
-../shared/data/biorob.
+Usage: python benchmarks/bench_biorob.py [rests | together | arms | clean | nothing | deadzone | idler | hall ...]; the
+recordings lie in ../shared/data/biorob, those of `arms` are simulated.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from biorob_arms import coverage
+from biorob_rests import rests_alone, together
 from section_runs import run_sections
 from tables import Section, Table
 
@@ -33,7 +35,7 @@ FAULTS = {  # folder: what its README says is wrong, as candidates are labelled
     "hall": "encoder_eccentricity@joint3.link",
 }
 IDLER = ", over: {joint3: 0.0120}"  # what a description without the idler lacks
-SECTIONS = ("clean", "nothing", *FAULTS)
+SECTIONS = ("rests", "together", "arms", "clean", "nothing", *FAULTS)
 
 
 def main() -> None:
@@ -47,6 +49,10 @@ def main() -> None:
 
 def _section(name: str) -> Section:
     """One section by its name."""
+    if name in ("rests", "together"):
+        return (rests_alone if name == "rests" else together)(DATA)
+    if name == "arms":
+        return coverage()
     robot = load_robot("biorob")
     if name == "clean":
         return _clean(robot)

@@ -33,7 +33,7 @@ from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, not_below, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
-from jointscope.graphs.problem.step_errors import step_errors
+from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
@@ -57,7 +57,7 @@ from jointscope.robots.recordings.screening import screen
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
-TOLD_OF_WHITE = ("timing", "masses", "lacking", "step_errors")  # what torques that last would hide
+TOLD_OF_WHITE = ("timing", "masses", "lacking", "inertia_shifts")  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
@@ -184,9 +184,11 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):
         lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
-    missed = np.max([step_errors(*motion) for motion in zip(*solved.of_motions, strict=True)], axis=0)
+    shifts: dict[str, float] = {}
+    for motion in zip(*solved.of_motions, strict=True):
+        shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
-    return replace(result, timing=timing, masses=masses, lacking=lacking, step_errors=tuple(missed.tolist()))
+    return replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

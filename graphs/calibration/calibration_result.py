@@ -174,8 +174,8 @@ class CalibrationResult:
         lacking: effects of the catalogue that the recordings ask for, surest first.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states.
-        step_errors: what the steps of the motion miss, by velocity row, as a share of the random torques, see
-            `graphs.problem.step_errors`; empty where it was not asked.
+        inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
+            `graphs.problem.step_errors`; None where it was not asked.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -203,7 +203,7 @@ class CalibrationResult:
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()
-    step_errors: tuple[float, ...] = ()
+    inertia_shifts: Mapping[str, float] | None = None
 
     @property
     def found(self) -> dict[str, Value]:

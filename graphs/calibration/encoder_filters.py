@@ -4,8 +4,8 @@
 Readings of a filter hang on accelerations. While the process noise is loose these follow every sample, and the longest
 filter, which asks for the least of them, costs least. Where the noise is small, friction that turns over has kinks
 there that no iteration crosses. And at any noise the lowest cost favours long filters: the states they free follow the
-noise of the readings. The likelihood of given filters, states integrated out, each with the noise that goes with it, has
-none of these troubles: near its peak it is a parabola.
+noise of the readings. The likelihood of given filters, states integrated out, each with the noise that goes with it,
+has none of these troubles: near its peak it is a parabola.
 """
 
 from __future__ import annotations

@@ -144,7 +144,8 @@ def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:
     A wide one does harm: where a joint turns over, the slope of its dry friction holds within a few mrad/s only.
 
     Args:
-        t, q: times [s] and positions [rad], shape (k,).
+        t: times [s], shape (k,).
+        q: positions [rad], shape (k,).
         sigma: of a sample [rad].
     """
     span = float(max(t[-1] - t[0], 1e-4))
@@ -152,7 +153,10 @@ def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:
     if len(t) < FEWEST:
         return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
     powers = np.vander(t / span, 3, increasing=True)
-    (_, slope, bend), spread = np.linalg.lstsq(powers, q)[0], sigma * np.sqrt(np.linalg.inv(powers.T @ powers).diagonal())
+    (_, slope, bend), spread = (
+        np.linalg.lstsq(powers, q)[0],
+        sigma * np.sqrt(np.linalg.inv(powers.T @ powers).diagonal()),
+    )
     bent = 2.0 * (abs(bend) + SURELY * spread[2]) / span**2
     if bent > ACCELERATION:
         return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from jointscope.graphs.comparison.short_reversals import HALVINGS, SHARP_TURN
+from jointscope.graphs.problem.reversals import HALVINGS, SHARP_TURN
 from jointscope.robots.dynamics.state_rates import StateRates
 
 Array = NDArray[np.float64]

@@ -86,7 +86,7 @@ def test_a_delay_alone_asks_for_no_filter(robot, streams):
 
 @pytest.mark.slow
 def test_a_filter_that_was_added_in_vain_harms_no_value(tmp_path):
-    """Long filters free the states to follow the noise of readings: their lowest cost falls, their likelihood does, too.
+    """Long filters free the states to follow the noise of readings: their lowest cost falls, but their likelihood, too.
 
     With the lowest cost a filter of 14 ms was found here, and an inertia that was 78 % too small.
     """

@@ -212,7 +212,10 @@ def test_two_doubtful_signs_together_are_no_reservation(good):
     assert all(check.name != name for check in judge(lone).checks)
 
 
-@pytest.mark.parametrize(("missed", "expected"), [((), "info"), ((0.0, 0.02), "good"), ((0.02, 0.15), "bad")])
-def test_steps_in_which_friction_stops_a_light_joint_are_told(good, missed, expected):
-    judged = judge(dataclasses.replace(good, step_errors=missed))
+@pytest.mark.parametrize(
+    ("shifts", "expected"),
+    [(None, "info"), ({}, "good"), ({"joint1.inertia": 0.005}, "good"), ({"a.inertia": -0.02}, "bad")],
+)
+def test_steps_in_which_friction_stops_a_light_joint_are_told(good, shifts, expected):
+    judged = judge(dataclasses.replace(good, inertia_shifts=shifts))
     assert level(judged, "Steps short enough") == expected
