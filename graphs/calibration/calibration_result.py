@@ -176,6 +176,7 @@ class CalibrationResult:
         sets: recordings of other kinds with their states.
         step_errors: what the steps of the motion miss, by velocity row, as a share of the random torques, see
             `graphs.problem.step_errors`; empty where it was not asked.
+        saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -204,6 +205,7 @@ class CalibrationResult:
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()
     step_errors: tuple[float, ...] = ()
+    saturated: str = ""
 
     @property
     def found(self) -> dict[str, Value]:

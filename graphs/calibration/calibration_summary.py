@@ -31,6 +31,7 @@ from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StatePosterior, posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.starts.saturated_drives import SATURATION
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
@@ -145,7 +146,8 @@ def summarize(
         converged=not solution.flat,
         unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
     )
-    return replace(result, findings=findings(result, notices))
+    saturated = next((notice.text for notice in notices if notice.kind == SATURATION), "")
+    return replace(result, saturated=saturated, findings=findings(result, notices))
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:

@@ -91,7 +91,9 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
         of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]
         found.append(WindowedSums(width, products[counts > 0], counts[counts > 0], of_noise))
     if not found:
-        return [WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(signals.shape[1])]
+        return [
+            WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(signals.shape[1])
+        ]
     return found
 
 

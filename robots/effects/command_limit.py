@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 SHARES = (0.2, 0.35, 0.5, 0.7, 0.9)  # of the full command, at which a diagnosis looks for a limit
 OVER_FRICTION = 20.0  # times the dry friction is a full command where nothing else says what that is
-EXAMPLE = 0.4  # of a full duty cycle
+EXAMPLE = 0.15  # of a full duty cycle
 
 
 def law(edges: Array, commands: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
-    """u - lost (u - clip(u, -limit, limit)); all of the excess is lost for 1."""
+    """U - lost (u - clip(u, -limit, limit)); all of the excess is lost for 1."""
     excess = commands - np.clip(commands, -p["limit"], p["limit"])
     by_limit = p["lost"] * np.sign(excess)
     return commands - p["lost"] * excess, {"lost": -excess, "limit": by_limit}

@@ -19,7 +19,7 @@ class CommandLimit(SimulatedEffect):
 
     id = "command_limit"
     acts_on = ("joint",)
-    defaults: ClassVar[Mapping[str, float]] = {"lost": 1.0, "limit": 0.4}  # [1], unit of the command
+    defaults: ClassVar[Mapping[str, float]] = {"lost": 1.0, "limit": 0.15}  # [1], unit of the command
     never_negative = ("lost",)
     above_zero = ("limit",)
 
