@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
 Array = NDArray[np.float64]
-SHARES = (0.2, 0.35, 0.5, 0.7, 0.9)  # of the full command, at which a diagnosis looks for a limit
+SHARES = (0.15, 0.25, 0.4, 0.6, 0.85)  # of the full command, at which a diagnosis looks for a limit
 OVER_FRICTION = 20.0  # times the dry friction is a full command where nothing else says what that is
 EXAMPLE = 0.15  # of a full duty cycle
 

@@ -143,4 +143,4 @@ def test_the_limit_is_looked_for_around_a_full_command():
         robot = replace(DOGGY, command=replace(DOGGY.command, unit=unit))
         lost, limit = effect.parameters_of(robot, "joint1")
         assert (lost.unit, limit.unit) == ("1", "1" if unit == "duty" else unit)
-        assert limit.start == pytest.approx(0.9 * full) and limit.grid[2] == pytest.approx(0.5 * full)
+        assert limit.start == pytest.approx(0.9 * full) and limit.grid[2] == pytest.approx(0.4 * full)

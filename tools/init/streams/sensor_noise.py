@@ -26,6 +26,10 @@ WINDOW, STRETCHES = (20, 100), 12  # samples of one stretch, least and most; how
 QUIET = 0.25  # share of the stretches that are quieter than the one that counts
 ORDERS = (2, 4, 6, 8, 10, 12)
 ALIKE = 1.15  # ratio up to which two orders show the same noise
+AGREEING = 3  # orders that show the same where it is noise
+MOVES = 0.5  # of the rms speed, from which a joint moves
+NEAR = 9  # samples over which a speed is a mean
+FEWEST_STRETCHES = 4  # of motion
 REPEATS = 0.35  # share of samples that repeat the one before, from which a driver is faster than its device
 ROUNDING = 1.3  # times a step over sqrt(12) that differences may show of rounding alone
 FINEST = 1e-6  # of the range; no sensor is known to be better
@@ -124,6 +128,43 @@ def _roughness(times: Array, values: Array, weights: Mapping[int, Array]) -> flo
     found = [_from_order(values, order, weight) for order, weight in weights.items()]
     alive = [sigma for sigma in found if sigma > 0.0]
     return next((sigma for sigma in alive if sigma < ALIKE * min(alive)), 0.0)
+
+
+def noise_in_motion(times: Array, values: Array) -> float:
+    """Standard deviation of white noise while a joint moves, 0 where what is seen is no noise.
+
+    Stamps that jitter make noise of motion, none at rest. Of a motion that is too fast for the rate higher differences
+    leave less and less, of noise all leave the same.
+
+    Args:
+        times: strictly increasing, shape (n,) [s].
+        values: finite positions, shape (n,).
+    """
+    weights = {order: _weights(times, order) for order in ORDERS if len(times) > 2 * order}
+    speed = np.abs(_around(np.gradient(values, times))) if len(values) > 1 else np.zeros(len(values))
+    found = [
+        _in_motion(values, speed > MOVES * float(np.sqrt(np.mean(speed**2))), weight) for weight in weights.values()
+    ]
+    alive = [sigma for sigma in found if sigma > 0.0]
+    alike = [sigma for sigma in alive if sigma < ALIKE * min(alive)]
+    return float(np.median(alike)) if len(alike) >= AGREEING else 0.0
+
+
+def _around(values: Array) -> Array:
+    """Means over some neighbours, shape (n,)."""
+    return np.convolve(values, np.full(NEAR, 1.0 / NEAR), mode="same")
+
+
+def _in_motion(values: Array, moves: NDArray[np.bool_], weight: Array) -> float:
+    """Noise by differences of one order, a middle one of the stretches in which all samples are of a motion."""
+    order = weight.shape[1] - 1
+    around = np.stack([values[i : i + len(weight)] for i in range(order + 1)], axis=1)
+    inside = np.lib.stride_tricks.sliding_window_view(moves, order + 1).all(axis=1)
+    rest = np.sum(weight * (around - around[:, :1]), axis=1)[inside] ** 2
+    count = len(rest) // WINDOW[0]
+    if count < FEWEST_STRETCHES:
+        return 0.0
+    return float(np.sqrt(np.median(rest[: count * WINDOW[0]].reshape(count, -1).mean(axis=1))))
 
 
 def _from_order(values: Array, order: int, weight: Array) -> float:
