@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.special import comb, gammaincinv
 
@@ -26,10 +27,11 @@ WINDOW, STRETCHES = (20, 100), 12  # samples of one stretch, least and most; how
 QUIET = 0.25  # share of the stretches that are quieter than the one that counts
 ORDERS = (2, 4, 6, 8, 10, 12)
 ALIKE = 1.15  # ratio up to which two orders show the same noise
+NEARLY_ALIKE = 1.35  # the same where it changes with the speed
 AGREEING = 3  # orders that show the same where it is noise
 MOVES = 0.5  # of the rms speed, from which a joint moves
 NEAR = 9  # samples over which a speed is a mean
-FEWEST_STRETCHES = 4  # of motion
+FEWEST_IN_MOTION = 80  # moments
 REPEATS = 0.35  # share of samples that repeat the one before, from which a driver is faster than its device
 ROUNDING = 1.3  # times a step over sqrt(12) that differences may show of rounding alone
 FINEST = 1e-6  # of the range; no sensor is known to be better
@@ -140,31 +142,21 @@ def noise_in_motion(times: Array, values: Array) -> float:
         times: strictly increasing, shape (n,) [s].
         values: finite positions, shape (n,).
     """
-    weights = {order: _weights(times, order) for order in ORDERS if len(times) > 2 * order}
-    speed = np.abs(_around(np.gradient(values, times))) if len(values) > 1 else np.zeros(len(values))
-    found = [
-        _in_motion(values, speed > MOVES * float(np.sqrt(np.mean(speed**2))), weight) for weight in weights.values()
-    ]
-    alive = [sigma for sigma in found if sigma > 0.0]
-    alike = [sigma for sigma in alive if sigma < ALIKE * min(alive)]
-    return float(np.median(alike)) if len(alike) >= AGREEING else 0.0
-
-
-def _around(values: Array) -> Array:
-    """Means over some neighbours, shape (n,)."""
-    return np.convolve(values, np.full(NEAR, 1.0 / NEAR), mode="same")
-
-
-def _in_motion(values: Array, moves: NDArray[np.bool_], weight: Array) -> float:
-    """Noise by differences of one order, a middle one of the stretches in which all samples are of a motion."""
-    order = weight.shape[1] - 1
-    around = np.stack([values[i : i + len(weight)] for i in range(order + 1)], axis=1)
-    inside = np.lib.stride_tricks.sliding_window_view(moves, order + 1).all(axis=1)
-    rest = np.sum(weight * (around - around[:, :1]), axis=1)[inside] ** 2
-    count = len(rest) // WINDOW[0]
-    if count < FEWEST_STRETCHES:
+    if len(times) < 2 * ORDERS[-1]:
         return 0.0
-    return float(np.sqrt(np.median(rest[: count * WINDOW[0]].reshape(count, -1).mean(axis=1))))
+    speed = np.abs(np.convolve(np.gradient(values, times), np.full(NEAR, 1.0 / NEAR), mode="same"))
+    moves = speed > MOVES * float(np.sqrt(np.mean(speed**2)))
+    inside = np.flatnonzero(sliding_window_view(moves, ORDERS[-1] + 1).all(axis=1))
+    if len(inside) < FEWEST_IN_MOTION:
+        return 0.0
+    found = []
+    for order in ORDERS:
+        rows = inside + (ORDERS[-1] - order) // 2  # the same moments by all orders
+        weight = _weights(times, order)[rows]
+        around = values[rows[:, None] + np.arange(order + 1)]
+        found.append(float(np.sqrt(np.mean(np.sum(weight * (around - around[:, :1]), axis=1) ** 2))))
+    alike = [sigma for sigma in found if 0.0 < sigma < NEARLY_ALIKE * min(found)]
+    return float(np.median(alike)) if len(alike) >= AGREEING else 0.0
 
 
 def _from_order(values: Array, order: int, weight: Array) -> float:
