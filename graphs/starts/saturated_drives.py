@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
 
 from jointscope.graphs.starts.command_limits import CommandLimit, command_limits
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.robot_file import robot_argument
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
@@ -67,7 +66,7 @@ def _sentence(robot: Robot, told: dict[str, CommandLimit]) -> str:
         for joint, limit in told.items()
     )
     effects = " ".join(shlex.quote(f"{LIMIT}@{joint}") for joint in told)
-    output = shlex.quote(str(Path(f"{robot.path.stem}_limited.yaml")))
+    output = edited_argument(robot, "limited")
     return (
         f"command: drives saturate; whatever is commanded, the motion shows of {listed}: values would be wrong; "
         f"`jointscope add {robot_argument(robot)} {effects} -o {output}` models it and finds the levels, or record the "
