@@ -40,6 +40,7 @@ EXPLAINED = 0.7  # of the torque that may be missing where that is believed
 TOLD = 2.0  # [sigma] above zero from which a value is one
 PLAIN = "motor_viscous"  # the effect that the regression knows
 LIMIT = "command_limit"  # and the one that its commands have passed
+WITHIN = 0.6  # of the largest command, from where a calibration looks for a limit that the regression does not show
 NEARLY = 3.0  # times the missing torque with which a file of a joint with further effects keeps the word
 
 
@@ -55,10 +56,10 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
     """
     robot = problems[0].robot
     rigid = [joint for joint in robot.joints if joint not in robot.layout.motors]
-    if not rigid:
-        return calibration
     recordings = [problem.recording for problem in problems]
     levels = _limit_starts(robot, recordings)
+    if not rigid:
+        return _with_values(calibration, levels)
     at_levels = {name: replace(robot.parameter(name), value=level) for name, level in levels.items()}
     robot = replace(robot, parameters={**robot.parameters, **at_levels})
     equations = equations_of(robot, recordings)
@@ -110,7 +111,13 @@ def _limit_starts(robot: Robot, recordings: Sequence[Recording]) -> dict[str, fl
         robot.tree, driven_joints(without, recordings), robot.motor_encoder.sigmas, held=robot.command_held
     )
     table = dict(zip(robot.joints, found, strict=True))
-    return {f"{joint}.{LIMIT}.limit": limit.level for joint in free if (limit := table[joint]) is not None}
+    starts = {f"{joint}.{LIMIT}.limit": limit.level for joint in free if (limit := table[joint]) is not None}
+    for joint in free:
+        name, j = f"{joint}.{LIMIT}.limit", robot.joints.index(joint)
+        sizes = np.abs(np.concatenate([recording.command.values[:, j] for recording in recordings]))
+        if name not in starts and robot.parameter(name).value > WITHIN * float(sizes.max()):
+            starts[name] = WITHIN * float(sizes.max())  # beyond all commands nothing pulls at it
+    return starts
 
 
 def _joint_starts(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:

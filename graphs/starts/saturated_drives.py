@@ -61,7 +61,9 @@ def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Noti
 
 def _sentence(robot: Robot, told: dict[str, CommandLimit]) -> str:
     listed = ", ".join(
-        f"{joint} no more than about {limit.level:.4g}{_unit(robot, joint)} ({100.0 * limit.share:.2g} % of its "
+        f"{joint} less than was commanded (how much less its spring hides)"
+        if joint in robot.layout.motors
+        else f"{joint} no more than {limit.level:.4g}{_unit(robot, joint)} ({100.0 * limit.share:.2g} % of its "
         "commands are beyond)"
         for joint, limit in told.items()
     )

@@ -61,7 +61,7 @@ EFFECT = CommandLimit(
     id="command_limit",
     law=law,
     parameters=(
-        EffectParameter("lost", "1", start=1.0, prior_sigma=10.0, sign="+"),
+        EffectParameter("lost", "1", start=1.0, prior_sigma=0.3, sign="+", logarithmic=True),
         EffectParameter("limit", "1", start=0.9, prior_sigma=2.7, sign="+", logarithmic=True, grid=SHARES),
     ),
     example={"lost": 1.0, "limit": EXAMPLE},

@@ -201,6 +201,7 @@ def _drives(
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     # what motors report beside their positions is what they gave
     limits = [None] * tree.n if measured else command_limits(tree, [Driven(encoder, command)], sigmas)
+    limits = [None if joint in elastic else limit for joint, limit in zip(tree.joints, limits, strict=True)]
     command = limited(command, limits)
     told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     held = not measured if told is None else told

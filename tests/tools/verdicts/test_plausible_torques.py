@@ -181,7 +181,7 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
         (
             8.0,
             0.05,
-            "weight at another place behind elbow.*`jointscope add \\S*/own.yaml gravity_direction@robot -o \\S*/own.yaml`",
+            "weight at another place behind elbow.*`jointscope add \\S*/own.yaml gravity_direction@robot -o \\S*yaml`",
         ),
     ],
 )
