@@ -16,15 +16,15 @@ from tables import Section, Table
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
+from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.robots.recordings.screening import screen
 from jointscope.tools.simulator import simulate
 
 # kinds of notices that say that something is wrong with a recording
-ODD = ("duplicate", "out_of_order", "gap", "clipping", "dropped", "unit", "axes")
+ODD = ("duplicate", "out_of_order", "gap", "clipping", "dropped", "unit", "axes", SATURATION)
 SECONDS = {"calibration": 20.0, "moves": 8.0}
 SEEDS = (1, 2, 3)
 
@@ -60,7 +60,7 @@ def run(quick: bool) -> Section:
 
 def accusations(robot: Robot, recording: Recording) -> list[str]:
     """What the screening and the reader say against a recording."""
-    notices = [*screen(recording, robot), *recording.notices]
+    notices = [*screen_all(recording, robot), *recording.notices]
     return [notice.text for notice in notices if notice.kind in ODD]
 
 

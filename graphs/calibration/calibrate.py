@@ -45,6 +45,7 @@ from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
+from jointscope.graphs.starts.saturated_drives import screen_all
 from jointscope.graphs.starts.second_opinion import on_their_word, regressed_values
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
@@ -52,7 +53,6 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import TOLD_WITH_RESULTS, Notice, Recording
 from jointscope.robots.recordings.resting_joints import must_move
-from jointscope.robots.recordings.screening import screen
 
 Array = NDArray[np.float64]
 
@@ -209,7 +209,7 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
                 "or its samples count twice"
             )
     notices = [notice for recording in recordings for notice in recording.notices if notice.kind in TOLD_WITH_RESULTS]
-    notices += [notice for recording in recordings for notice in screen(recording, robot)]
+    notices += [notice for recording in recordings for notice in screen_all(recording, robot)]
     if every_joint:
         must_move(robot, recordings)
     return notices

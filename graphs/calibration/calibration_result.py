@@ -176,6 +176,7 @@ class CalibrationResult:
         sets: recordings of other kinds with their states.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
+        saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -204,6 +205,7 @@ class CalibrationResult:
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array], ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
+    saturated: str = ""
 
     @property
     def found(self) -> dict[str, Value]:

@@ -18,10 +18,10 @@ from jointscope.graphs.calibration.calibration_result import (
     IterationRecord,
     ParameterEstimate,
 )
-from jointscope.graphs.calibration.derived_results import derived_results
 from jointscope.graphs.calibration.encoder_noise import EncoderFit, estimated_sigmas
 from jointscope.graphs.calibration.external_torque import external_torques_of
 from jointscope.graphs.calibration.findings import findings
+from jointscope.graphs.calibration.found_values import HELD_BY_PRIOR, derived_results, dynamic_parameters
 from jointscope.graphs.calibration.identifiability import weak_directions
 from jointscope.graphs.calibration.residual_collection import BagResiduals, collect, series_of
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence
@@ -31,15 +31,13 @@ from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StatePosterior, posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.starts.saturated_drives import SATURATION
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
 
 Array = NDArray[np.float64]
-
-HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
-NEAR_ZERO = 0.5  # relative sigma from which a small positive value is called compatible with zero
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,8 @@ def summarize(
         converged=not solution.flat,
         unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
     )
-    return replace(result, findings=findings(result, notices))
+    saturated = next((notice.text for notice in notices if notice.kind == SATURATION), "")
+    return replace(result, saturated=saturated, findings=findings(result, notices))
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
@@ -232,26 +231,6 @@ def parameter_table(
             row = (value, sigma, biased.units[j], before_bias, before_bias, biased.bias_prior_sigma, None, note)
             found.append(ParameterEstimate(f"{biased.name}.bias.{axis}", *row))
     return tuple(found)
-
-
-def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
-    """The free parameters with notes.
-
-    Args:
-        robot: before the calibration.
-        calibration: the values that were found.
-        sigmas: of the shared values, the parameters' coordinates first.
-    """
-    found, slopes = [], calibration.value_by_coordinate
-    for i, name in enumerate(calibration.names):
-        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
-        note = ""
-        if p.positive and sigma > NEAR_ZERO * value and value < 0.1 * p.prior:
-            note = "at its bound: compatible with zero"
-        elif sigmas[i] > HELD_BY_PRIOR * p.coordinate_sigma:
-            note = "held by its prior"
-        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
-    return found
 
 
 def calibrated_robot(

@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
+from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.robot_file import robot_argument
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
-from jointscope.robots.recordings.screening import screen
 
-SUSPICIOUS = ("gap", "unit", "axes")  # kinds of notices that may explain a failure
+SUSPICIOUS = ("gap", "unit", "axes", SATURATION)  # kinds of notices that may explain a failure
 MOST = 3
 
 P = ParamSpec("P")
@@ -36,10 +36,10 @@ def next_commands(message: str, robot: Robot, recordings: Sequence[Recording]) -
     name, bag = robot_argument(robot), shlex.quote(recordings[0].path)
     text = f"{message}; `jointscope info {bag} --robot {name}` says whether they fit each other"
     if robot.effects:
-        last = shlex.quote(robot.effects[-1].label)
-        return f"{text}, `jointscope remove {name} {last} -o OUT.yaml` takes out the effect that was added last"
-    urdf = shlex.quote(str(robot.tree.urdf))
-    return f"{text}, `jointscope init {urdf} {bag} -o OUT.yaml` finds start values"
+        last, output = shlex.quote(robot.effects[-1].label), edited_argument(robot, "without")
+        return f"{text}, `jointscope remove {name} {last} -o {output}` takes out the effect that was added last"
+    urdf, output = shlex.quote(str(robot.tree.urdf)), edited_argument(robot, "anew")
+    return f"{text}, `jointscope init {urdf} {bag} -o {output}` finds start values"
 
 
 def names_notices(
@@ -52,7 +52,7 @@ def names_notices(
         try:
             return function(robot, recordings, *args, **kwargs)
         except SolveError as err:
-            notices = [notice for recording in recordings for notice in screen(recording, robot)]
+            notices = [notice for recording in recordings for notice in screen_all(recording, robot)]
             message = with_notices(str(err), recordings, notices)
             raise SolveError(next_commands(message, robot, recordings)) from err
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
-from jointscope.graphs.calibration.calibration_summary import dynamic_parameters
-from jointscope.graphs.calibration.derived_results import derived_results
+from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve

@@ -26,6 +26,7 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -63,11 +64,12 @@ class DriveTiming:
             return late if self.delay > 0.0 else f"drive signal of {self.joint} seems to act"
         return "drive signal seems to act"
 
-    def cure(self, file: str) -> str:
-        """What to do about it, in words; `file` is the robot file."""
+    def cure(self, robot: Robot) -> str:
+        """What to do about it, in words, with a robot of a file."""
         if self.joint:
             return f"correct its stamps where they are made, or record {self.joint} with the others' clock and filter"
-        return f"`jointscope add {file} {EFFECT}@{OWNER} -o OUT.yaml`, then calibrate again"
+        output = edited_argument(robot, EFFECT)
+        return f"`jointscope add {robot_argument(robot)} {EFFECT}@{OWNER} -o {output}`, then calibrate again"
 
     def moved(self, found: Mapping[str, Value]) -> list[str]:
         """Names of the values that the delay would change by much; none where it may be chance.
@@ -91,7 +93,7 @@ def drive_timing(test: ScoreTest) -> DriveTiming | None:
     robot = test.robot
     if robot.choices.link_dynamics != "model" or _has(robot, TimeShift):
         return None
-    asked = [] if _has(robot, CommandEffect) else [(EFFECT, OWNER)]
+    asked = [] if _has_late_commands(robot) else [(EFFECT, OWNER)]
     if robot.n > 1 and robot.link_encoder is None and not robot.gyros:
         asked += [(ENCODER, joint) for joint in robot.joints]
     if not asked:
@@ -122,6 +124,12 @@ def _timing(test: ScoreTest, step: HypothesisStep) -> DriveTiming | None:
 def _clearness(timing: DriveTiming) -> float:
     """By how many sigmas it differs from none."""
     return abs(timing.delay) / timing.sigma if timing.sigma > 0.0 else 0.0
+
+
+def _has_late_commands(robot: Robot) -> bool:
+    """Whether an effect moves commands in time; what only changes their size leaves the question open."""
+    commands = [here for here in robot.effects if isinstance(here.effect, CommandEffect)]
+    return any(p.unit == "s" for here in commands for p in here.effect.parameters)
 
 
 def _has(robot: Robot, kind: type) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.starts.command_limits import command_limits
 from jointscope.graphs.starts.drive_regression import (
     DRY,
     GAIN,
@@ -26,10 +27,11 @@ from jointscope.graphs.starts.drive_regression import (
     Value,
     drive_equations,
 )
+from jointscope.robots.dynamics.command_path import law_of
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
-from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 
@@ -37,6 +39,8 @@ OPPOSITE = 20.0  # [sigma] from which a drive turns against its command
 EXPLAINED = 0.7  # of the torque that may be missing where that is believed
 TOLD = 2.0  # [sigma] above zero from which a value is one
 PLAIN = "motor_viscous"  # the effect that the regression knows
+LIMIT = "command_limit"  # and the one that its commands have passed
+WITHIN = 0.6  # of the largest command, from where a calibration looks for a limit that the regression does not show
 NEARLY = 3.0  # times the missing torque with which a file of a joint with further effects keeps the word
 
 
@@ -52,16 +56,20 @@ def with_drive_starts(problems: Sequence[BagProblem], calibration: Calibration) 
     """
     robot = problems[0].robot
     rigid = [joint for joint in robot.joints if joint not in robot.layout.motors]
+    recordings = [problem.recording for problem in problems]
+    levels = _limit_starts(robot, recordings)
     if not rigid:
-        return calibration
-    equations = equations_of(robot, [problem.recording for problem in problems])
+        return _with_values(calibration, levels)
+    at_levels = {name: replace(robot.parameter(name), value=level) for name, level in levels.items()}
+    robot = replace(robot, parameters={**robot.parameters, **at_levels})
+    equations = equations_of(robot, recordings)
     found: dict[str, list[Value]] = {}
     for joint, equation in zip(robot.joints, equations, strict=True):
         if joint in rigid:
             _check_sign(joint, equation)
             for name, value in _joint_starts(robot, joint, equation).items():
                 found.setdefault(name, []).append(value)
-    return _with_values(calibration, {name: _mean(values) for name, values in found.items()})
+    return _with_values(calibration, levels | {name: _mean(values) for name, values in found.items()})
 
 
 def equations_of(robot: Robot, recordings: Sequence[Recording], delay: float = 0.0) -> list[DriveEquation]:
@@ -76,8 +84,40 @@ def driven_joints(robot: Robot, recordings: Sequence[Recording], delay: float = 
     for recording in recordings:
         stream, command = recording.streams[encoder.name], recording.command
         positions = replace(stream, values=stream.values - encoder.zero)
-        driven.append(Driven(positions, replace(command, times=command.times + delay), recording.left_out))
+        later = replace(command, times=command.times + delay)
+        driven.append(Driven(positions, limited_by(robot, later), recording.left_out))
     return driven
+
+
+def limited_by(robot: Robot, command: Stream) -> Stream:
+    """What drives give of a command that saturate, as the robot has it."""
+    own = [here for here in robot.effects if here.effect.id == LIMIT]
+    values = command.values.copy() if own else command.values
+    for here in own:
+        j, sizes = robot.joints.index(here.owner), {p.name: here.parameter(p.name) for p in here.effect.parameters}
+        now = {name: robot.parameter(full).value for name, full in sizes.items()}
+        values[:, j] = law_of(here)(command.times, values[:, j], now)[0]
+    return replace(command, values=values)
+
+
+def _limit_starts(robot: Robot, recordings: Sequence[Recording]) -> dict[str, float]:
+    """Levels at which drives saturate that may, by the name of the parameter, where the recordings show them."""
+    asked = [joint for joint in robot.joints if robot.has_effect(LIMIT, joint)]
+    free = [joint for joint in asked if not robot.parameter(f"{joint}.{LIMIT}.limit").fixed]
+    if not free:
+        return {}
+    without = replace(robot, effects=tuple(here for here in robot.effects if here.effect.id != LIMIT))
+    found = command_limits(
+        robot.tree, driven_joints(without, recordings), robot.motor_encoder.sigmas, held=robot.command_held
+    )
+    table = dict(zip(robot.joints, found, strict=True))
+    starts = {f"{joint}.{LIMIT}.limit": limit.level for joint in free if (limit := table[joint]) is not None}
+    for joint in free:
+        name, j = f"{joint}.{LIMIT}.limit", robot.joints.index(joint)
+        sizes = np.abs(np.concatenate([recording.command.values[:, j] for recording in recordings]))
+        if name not in starts and robot.parameter(name).value > WITHIN * float(sizes.max()):
+            starts[name] = WITHIN * float(sizes.max())  # beyond all commands nothing pulls at it
+    return starts
 
 
 def _joint_starts(robot: Robot, joint: str, equation: DriveEquation) -> dict[str, Value]:
@@ -118,7 +158,7 @@ def parts_of(robot: Robot, joint: str) -> dict[str, list[tuple[Parameter, float]
 
 def _has_more(robot: Robot, joint: str) -> bool:
     """Whether effects act on a joint, or on the whole robot, that the regression does not know."""
-    return any(here.owner in (joint, "robot") and here.effect.id != PLAIN for here in robot.effects)
+    return any(here.owner in (joint, "robot") and here.effect.id not in (PLAIN, LIMIT) for here in robot.effects)
 
 
 def _check_sign(joint: str, equation: DriveEquation) -> None:

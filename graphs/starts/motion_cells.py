@@ -59,6 +59,11 @@ class MotionCells:
     known: Flags
     periods: Array
 
+    @property
+    def edges(self) -> Array:
+        """Edges of the cells, shape (m + 1,) [s]."""
+        return np.append(self.times - 0.5 * self.h, self.times[-1] + 0.5 * self.h)
+
 
 def motion_cells(
     encoder: Stream,
@@ -100,7 +105,7 @@ def motion_cells(
     edges: Array = t0 + h * np.arange(max(int((t1 - t0) / h), 0) + 1, dtype=np.float64)
     (q, v), middle = _path(encoder, edges), 0.5 * (edges[1:] + edges[:-1])
     v_smooth, v_sigma = _smooth(v, sigmas, periods, h)
-    means = np.diff(_integral(command, edges, held), axis=0) / h
+    means = mean_commands(command, edges, held)
     slow = np.maximum(UNCLEAR * v_sigma, AT_REST * np.sqrt(np.mean(v_smooth**2, axis=0)))
     resting = np.abs(v_smooth) < slow
     rush = np.sqrt(np.mean(np.gradient(v_smooth, h, axis=0) ** 2, axis=0)) if len(edges) > 2 else np.ones(len(slow))
@@ -114,6 +119,11 @@ def motion_cells(
     known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
     at_middle, a = _path(encoder, middle)[0], np.diff(v, axis=0) / h
     return MotionCells(h, middle, at_middle, np.diff(q, axis=0) / h, v_smooth, a, means, known, periods)
+
+
+def mean_commands(command: Stream, edges: Array, held: bool) -> Array:
+    """Mean of the commands between edges, shape (m, n), for edges of shape (m + 1,) [s]."""
+    return np.asarray(np.diff(_integral(command, edges, held), axis=0) / np.diff(edges)[:, None])
 
 
 def _path(encoder: Stream, times: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from jointscope.graphs.starts.drive_regression import GAIN, VISCOUS, DriveEquation, Value
-from jointscope.graphs.starts.drive_starts import PLAIN, equations_of, parts_of
+from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, equations_of, parts_of
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -28,7 +28,7 @@ def regressed_values(robot: Robot, recordings: Sequence[Recording]) -> dict[str,
         robot: the calibrated robot; a delay of its commands is taken from it.
         recordings: those of the calibration.
     """
-    labels = {here.label for here in robot.effects if here.effect.id != PLAIN}
+    labels = {here.label for here in robot.effects if here.effect.id not in (PLAIN, LIMIT)}
     if robot.layout.motors or robot.choices.link_dynamics != "model" or labels - {DELAY}:
         return {}
     robot = robot.in_posture(recordings[0].posture)

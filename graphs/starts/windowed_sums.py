@@ -80,14 +80,44 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
             inertia, inertia^2 [rad^2].
         width: of the windows [s].
     """
+    found = []
+    rows_of_joints, length = windowed_rows(cells, signals, width)
+    for j, (rows, block, count) in enumerate(rows_of_joints):
+        counts = np.bincount(block, minlength=count).astype(float)
+        products = np.stack([part.T @ part for part in np.split(rows, np.cumsum(counts[:-1]).astype(int))])
+        velocity, acceleration = _noise_gains(float(cells.periods[j]), length)
+        of_noise = np.zeros((5, 5))
+        of_noise[1, 1], of_noise[1, 4], of_noise[4, 4] = acceleration * noise[j]
+        of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]
+        found.append(WindowedSums(width, products[counts > 0], counts[counts > 0], of_noise))
+    if not found:
+        return [
+            WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(signals.shape[1])
+        ]
+    return found
+
+
+def windowed_rows(
+    cells: MotionCells, signals: Array, width: float
+) -> tuple[list[tuple[Array, NDArray[np.intp], int]], float]:
+    """Means of signals under every window.
+
+    Args:
+        cells: motion and commands.
+        signals: of all cells, shape (m, n, k).
+        width: of the windows [s].
+
+    Returns:
+        For each joint the rows, shape (w, k), the block of each, shape (w,), and how many blocks there are; nothing
+        where the recording is shorter than a window. Then the length of a window [s].
+    """
     signals, known, h = _coarser(signals, cells, max(round(width / cells.h) // CELLS, 1))
     m, n = signals.shape[:2]
     length = max(round(width / h), FEWEST_CELLS)
-    window = smooth_window(length)
-    stride = max(length // PER_WINDOW, 1)
     if length > m:
-        return [WindowedSums(width, np.zeros((0, 5, 5)), np.zeros(0), np.zeros((5, 5))) for _ in range(n)]
-    starts = np.arange(0, m - length + 1, stride)
+        return [], length * h
+    window = smooth_window(length)
+    starts = np.arange(0, m - length + 1, max(length // PER_WINDOW, 1))
     unknown = np.vstack([np.zeros((1, n), int), np.cumsum(~known, axis=0)])
     usable = unknown[starts + length] == unknown[starts]
     count = int(np.clip(m * h / (BLOCK * width), 2, BLOCKS))
@@ -95,14 +125,8 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
     found = []
     for j in range(n):
         good = sliding_window_view(signals[:, j], length, axis=0)[starts[usable[:, j]]] @ (window / length)
-        counts = np.bincount(block[usable[:, j]], minlength=count).astype(float)
-        products = np.stack([part.T @ part for part in np.split(good, np.cumsum(counts[:-1]).astype(int))])
-        velocity, acceleration = _noise_gains(float(cells.periods[j]), length * h)
-        of_noise = np.zeros((5, 5))
-        of_noise[1, 1], of_noise[1, 4], of_noise[4, 4] = acceleration * noise[j]
-        of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]
-        found.append(WindowedSums(width, products[counts > 0], counts[counts > 0], of_noise))
-    return found
+        found.append((np.asarray(good), block[usable[:, j]], count))
+    return found, length * h
 
 
 def _coarser(signals: Array, cells: MotionCells, count: int) -> tuple[Array, NDArray[np.bool_], float]:

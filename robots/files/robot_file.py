@@ -57,6 +57,18 @@ def robot_argument(robot: Robot) -> str:
     return shlex.quote(stem if ready_robots().get(stem) == robot.path else str(robot.path))
 
 
+def edited_argument(robot: Robot, edit: str) -> str:
+    """What a user types to name a file that an edit makes of a robot's: beside it, of a ready robot where he is.
+
+    Args:
+        robot: as it is.
+        edit: a word for what is done to it, as in "arm_limited.yaml".
+    """
+    here = ready_robots().get(robot.path.stem) == robot.path
+    name = f"{robot.path.stem}_{edit}.yaml"
+    return shlex.quote(name if here else str(robot.path.with_name(name)))
+
+
 def load_robot(name_or_path: str | Path) -> Robot:
     """Reads a robot.
 

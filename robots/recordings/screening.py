@@ -37,9 +37,6 @@ MIN_SAMPLES = 100  # of each sensor
 BEYOND_LIMIT = 1.2  # times the robot's limit: odd
 IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
 FEW_JOINTS = 2  # others that keep their limits are enough to say that it is this joint
-FEWEST_BEYOND = 10  # instants beyond an effort limit
-FOLLOWS = 0.3  # slope of what the motion asks for over what is commanded beyond it; 1 without, 0 with saturation
-OFTEN_LESS = 80.0  # [%] of these instants at which the motion asks for less than the limit
 DUTY_LIMIT = 1.0 + 1e-6
 PERCENT = 100.0
 OVER_VOLTAGE = 1.2  # times the supply
@@ -78,7 +75,6 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     for biased in robot.biased:
         _check_frozen(recording.streams[biased.name])
     notices += _check_limits(motion, robot)
-    notices += _check_efforts(recording, robot, motion)
     notices += _check_motion(recording, robot, every_joint)
     notices += check_targets(recording, robot, motion)
     odd = check_gyros(recording, robot, motion)
@@ -230,62 +226,6 @@ def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
     if si_unit(now) == "rad":
         return f"check {place}; counts of an encoder are `unit: rad` with `scale: [6.2832/COUNTS_PER_TURN, ...]`"
     return f"check {place}"
-
-
-def _check_efforts(recording: Recording, robot: Robot, motion: JointMotion) -> list[Notice]:
-    """Commands beyond the effort limits of the URDF, which the motion does not show: the drives may have saturated.
-
-    Where the motion asked for more than the limit at the same time, or for more the more was commanded, the drive gave
-    it, and the limit is too low. What motors report beside their positions is what they gave.
-    """
-    command = recording.command
-    reported = robot.command.topic == robot.motor_encoder.source.topic
-    if reported or robot.free_links or robot.command.unit != "N m" or robot.transmission is not None:
-        return []
-    limits = robot.tree.effort_limits
-    limits = np.where(limits > 0.0, limits, np.inf)  # zero stands where nobody knew it
-    at = np.clip(np.searchsorted(command.times, motion.times, side="right") - 1, 0, len(command.times) - 1)
-    beyond = np.abs(command.values[at]) > BEYOND_LIMIT * limits
-    if np.count_nonzero(beyond, axis=0).max() < FEWEST_BEYOND:
-        return []
-    asked = np.abs(_torque_of_motion(robot, motion))
-    doubtful = [
-        j
-        for j, rows in enumerate(beyond.T)
-        if np.count_nonzero(rows) >= FEWEST_BEYOND
-        and np.percentile(asked[rows, j], OFTEN_LESS) < limits[j]
-        and _slope(np.abs(command.values[at][rows, j]), asked[rows, j]) < FOLLOWS
-    ]
-    if not doubtful:
-        return []
-    largest = np.nanmax(np.abs(command.values), axis=0)
-    listed = ", ".join(
-        f"{robot.joints[j]} {largest[j]:.4g} {robot.unit_at(robot.joints[j], 'N m')} (allowed {limits[j]:.4g})"
-        for j in doubtful
-    )
-    rows = beyond[:, doubtful].any(axis=1)
-    text = (
-        f"command: beyond the effort that {robot.tree.urdf.name} allows, and the motion shows no more than that: "
-        f"{listed}, first at {motion.times[int(np.argmax(rows))]:.2f} s; the drives may give less than was commanded: "
-        "record the effort that the motors report beside the positions (it then drives the model), or move more gently"
-    )
-    return [Notice("command", "unit", int(np.count_nonzero(rows)), text)]
-
-
-def _torque_of_motion(robot: Robot, motion: JointMotion) -> NDArray[np.float64]:
-    """What the drives gave for a motion, by links, rotors and friction of the robot file, shape (m, n)."""
-    a = np.gradient(motion.v, motion.times, axis=0)
-    viscous = [robot.parameters.get(f"{joint}.motor_viscous.coefficient") for joint in robot.joints]
-    laws = ("inertia", "coulomb_torque")
-    rotor, dry = np.array([[robot.drive_parameter(joint, law).value for joint in robot.joints] for law in laws])
-    drive = rotor * a + dry * np.sign(motion.v) + np.array([p.value if p else 0.0 for p in viscous]) * motion.v
-    return np.asarray(robot.tree.torque(motion.q, motion.v, a) + drive)
-
-
-def _slope(commanded: NDArray[np.float64], asked: NDArray[np.float64]) -> float:
-    """How much more a motion asks for where more is commanded."""
-    spread = commanded - commanded.mean()
-    return float(spread @ asked) / max(float(spread @ spread), 1e-300)
 
 
 def _check_motion(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:

@@ -98,6 +98,7 @@ def moved(
     stop: tuple[int, float, float] | None = None,
     cable: float = 0.0,
     sharp: float = SHARP,
+    most: tuple[float, ...] = (),
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -113,6 +114,7 @@ def moved(
         push: from and to [s], joint, torque [N m] of a hand.
         stop: joint, and from where to where it can move from its middle [rad].
         cable: stiffness of a cable that pulls each joint to its zero [N m/rad].
+        most: torque that each drive gives at the most, whatever is commanded [N m]; empty for all that is asked.
         sharp: how sharply dry friction turns over that does not truly hold a joint [s/rad].
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
@@ -144,7 +146,8 @@ def moved(
             target = middle + run * (size / 2.0 * (np.sin(speeds * t + phases) - np.sin(phases))).sum(axis=0)
             u = data.qfrc_bias + heavy * (150.0 * (target - data.qpos) - 12.0 * data.qvel)
             commands[sent], sent = u, sent + 1
-        data.qfrc_applied[:] = u - dry * np.tanh(sharp * data.qvel)
+        given = np.clip(u, -np.array(most), np.array(most)) if most else u
+        data.qfrc_applied[:] = given - dry * np.tanh(sharp * data.qvel)
         if push is not None and push[0] <= k * STEP < push[1]:
             data.qfrc_applied[push[2]] += push[3]
         mujoco.mj_step(model, data)

@@ -37,7 +37,7 @@ class TopicDescription:
         topic: its name.
         msgtype: type of its messages.
         count: number of messages.
-        rate: messages per second by stamp [1/s].
+        rate: messages per second by stamp, of the fastest node where several publish [1/s].
         jitter: standard deviation of the steps that are no gaps [s].
         gaps: number of steps in which messages are missing.
         missing: estimated number of messages that are missing there.

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from jointscope.graphs.starts.saturated_drives import screen_all
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.resting_joints import must_move
-from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import joined
 from jointscope.tools.bags.bag_description import BagDescription, NeedDescription, TopicDescription
 from jointscope.tools.bags.messages.open_bag import Bag
@@ -86,7 +86,7 @@ def _judge(path: str, robot: Robot, needs: tuple[NeedDescription, ...]) -> tuple
         return str(err), ()
     notices = recording.notices
     try:
-        notices = [*notices, *screen(recording, robot)]
+        notices = [*notices, *screen_all(recording, robot)]
         problem = None
         must_move(robot, [recording])
     except RecordingError as err:

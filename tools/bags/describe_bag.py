@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType, inner_type
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, bag_sha256, open_bag, storage_files
 from jointscope.tools.bags.tidying.not_finite import numbers_only
-from jointscope.tools.bags.tidying.stream_notices import clipping_notices, timing
+from jointscope.tools.bags.tidying.stream_notices import Timing, clipping_notices, timing
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
@@ -120,27 +121,52 @@ def _numeric_topic(name: str, message_type: MessageType, raw: RawTopic) -> Topic
     first = max(columns.values(), key=lambda part: len(part.values) * part.values.shape[1])
     received = first.of(raw.received_ns)
     stamps = received if first.stamps is None else first.stamps
-    samples, unfilled = without_unfilled(name, TimedSamples(stamps, received, np.zeros((len(stamps), 0))))
+    samples, unfilled = without_unfilled(name, TimedSamples(stamps, received, first.values, first.absent))
     moved, _, steps = on_one_clock({name: samples})
     samples, notices = in_time_order(name, moved[name])
-    seen = timing((samples.stamps - samples.stamps[0]) / 1e9)
+    nodes = _nodes(samples, first.names or ())
+    seen = [node for _, node in nodes]
+    longest = max(node.longest_gap for node in seen)
     counts = {notice.kind: notice.count for notice in notices}
     return TopicDescription(
         topic=name,
         msgtype=message_type.name,
         count=len(raw.data),
-        rate=seen.rate,
-        jitter=seen.jitter,
-        gaps=seen.gaps,
-        missing=seen.missing,
-        longest_gap=seen.longest_gap,
+        rate=max(node.rate for node in seen),
+        jitter=max(node.jitter for node in seen),
+        gaps=sum(node.gaps for node in seen),
+        missing=sum(node.missing for node in seen),
+        longest_gap=longest,
         out_of_order=counts.get("out_of_order", 0),
         duplicates=counts.get("duplicate", 0),
         stamped=first.stamps is not None,
         names=first.names or (),
         fields=tuple(_field(field, part) for field, part in columns.items()),
-        remarks=tuple(n.text.removeprefix(f"{name}: ") for n in [*left_out_notices(name, first), *unfilled, *steps]),
+        remarks=(
+            *(n.text.removeprefix(f"{name}: ") for n in [*left_out_notices(name, first), *unfilled, *steps]),
+            *_of_nodes(nodes),
+        ),
     )
+
+
+def _nodes(samples: TimedSamples, names: tuple[str, ...]) -> list[tuple[tuple[str, ...], Timing]]:
+    """Joints whose samples come together, and how regular those are: one node's messages are no gaps of another's."""
+    times = (samples.stamps - samples.stamps[0]) / 1e9
+    if samples.filled is None or not len(names):
+        return [(names, timing(times))]
+    together: dict[bytes, list[int]] = {}
+    for k, absent in enumerate(samples.filled.T):
+        together.setdefault(absent.tobytes(), []).append(k)
+    found = [(tuple(names[k] for k in some), timing(times[~samples.filled[:, some[0]]])) for some in together.values()]
+    return sorted(found, key=lambda node: -node[1].rate)
+
+
+def _of_nodes(nodes: Sequence[tuple[tuple[str, ...], Timing]]) -> list[str]:
+    """A sentence about the rates of several nodes."""
+    if len(nodes) < 2:
+        return []
+    listed = "; ".join(f"{', '.join(names)} at {node.rate:.2f} Hz" for names, node in nodes)
+    return [f"several nodes publish on it: {listed}; rate and jitter are the largest, gaps those of each node"]
 
 
 def _field(field: str, columns: Columns) -> FieldDescription:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.starts.command_limits import command_limits, limited
 from jointscope.graphs.starts.drive_regression import Driven
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
 from jointscope.robots.bodies.rigid_tree import RigidTree
@@ -197,17 +198,23 @@ def _drives(
     if not robot.masses:
         found = find_signs(encoder, command, sigmas, torque, tree.gravity)
         return replace(found, unit=(unit, TYPED)) if unit else found
-    told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
+    # what motors report beside their positions is what they gave
+    limits = [None] * tree.n if measured else command_limits(tree, [Driven(encoder, command)], sigmas)
+    limits = [None if joint in elastic else limit for joint, limit in zip(tree.joints, limits, strict=True)]
+    command = limited(command, limits)
+    told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
     held = not measured if told is None else told
-    return find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
+    found = find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
+    joints = [replace(drive, limit=limit) for drive, limit in zip(found.joints, limits, strict=True)]
+    return replace(found, joints=joints)
 
 
 def _by_torques(robot: MeasuredRobot, encoder: Stream, drive: Drives) -> tuple[SignGuess | None, Exchange | None]:
     """What the torques say of the joints' wiring, where they say otherwise than URDF and names."""
     if drive.gravity_reason and min(joint.explained for joint in drive.joints) > EXPLAINED:
         return None, None  # a base that hangs or stands otherwise explains it
-    command = role_stream(robot.roles.command, robot.roles.joints)
+    command = limited(role_stream(robot.roles.command, robot.roles.joints), [joint.limit for joint in drive.joints])
     return wiring_by_torques(robot.tree, encoder, command, held=drive.held)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
-from jointscope.robots.files.robot_file import robot_argument
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.tools.presentation.candidate_numbers import origin_text, p_text, parameter_texts, share_text
 from jointscope.tools.presentation.model_answer import diagnosis_answer, missing_numerics, of_verdict
 from jointscope.tools.presentation.numbers import percent, significant
@@ -102,4 +102,5 @@ def _next(result: Diagnosis) -> str:
         return ""
     share = missing[0].share
     effect = f" (it explains {percent(share)} of the excess error)" if share > 0.0 else ""
-    return f"Next: jointscope add {robot_argument(result.robot)} {missing[0].label} -o OUT.yaml{effect}"
+    output = edited_argument(result.robot, missing[0].effect)
+    return f"Next: jointscope add {robot_argument(result.robot)} {missing[0].label} -o {output}{effect}"

@@ -7,13 +7,13 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
+from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
-from jointscope.robots.recordings.screening import screen
 from jointscope.tools.terminal.progress import ERASE_LINE
 
-PLAIN_MISTAKES = ("unit", "axes")  # kinds of notices
+PLAIN_MISTAKES = ("unit", "axes", SATURATION)  # kinds of notices
 
 
 def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | None = None) -> None:
@@ -47,7 +47,7 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
 
 def _screened(recording: Recording, robot: Robot) -> list[Notice]:
     try:
-        return screen(recording, robot)
+        return screen_all(recording, robot)
     except RecordingError as err:
         if recording.path in str(err):
             raise

@@ -85,6 +85,7 @@ def judge(result: CalibrationResult) -> Judgement:
     held, steps = values_from_data(result), short_steps(result)
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
+        *_given(result),
         *signs,
         *_agreeing(signs),
         Check(steps[0], "Steps short enough", steps[1]),
@@ -114,6 +115,11 @@ def _agreeing(signs: Sequence[Check]) -> list[Check]:
         "the sigmas do not include it. `jointscope diagnose` says what it may be."
     )
     return [Check("bad", "No two signs that something is missing", text)]
+
+
+def _given(result: CalibrationResult) -> list[Check]:
+    """A check that fails where drives saturate, which the model does not know."""
+    return [Check("bad", "Drives that give what is commanded", result.saturated)] if result.saturated else []
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:

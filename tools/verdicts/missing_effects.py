@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import shlex
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
@@ -36,17 +37,19 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
 def _next(result: CalibrationResult, effect: LackingEffect) -> str:
     """What to type: an effect that was tried need not be looked for."""
     if effect.tried:
-        file = result.start.path
-        return f"Add it: `jointscope add {file.name} {effect.label} -o {file.stem}_better.yaml`, then calibrate again"
+        output = edited_argument(result.start, effect.effect)
+        return (
+            f"Add it: `jointscope add {robot_argument(result.start)} {effect.label} -o {output}`, then calibrate again"
+        )
     return f"Which it is, and whether it predicts better: `{_discover(result)}`"
 
 
 def _discover(result: CalibrationResult) -> str:
     """The command that looks for effects, with a part of one recording, or the last of several, held out."""
-    start, bags = result.start.path, [Path(bag.recording.path).name for bag in result.bags] or ["BAG"]
+    start, bags = result.start, [shlex.quote(bag.recording.path) for bag in result.bags] or ["BAG"]
     *learnt, last = bags
     held = f"{' '.join(learnt)} --holdout {last}" if learnt else f"{last} --holdout-share 0.33"
-    return f"jointscope discover {start.name} {held} -o {start.stem}_better.yaml"
+    return f"jointscope discover {robot_argument(start)} {held} -o {edited_argument(start, 'better')}"
 
 
 def _change(result: CalibrationResult, effect: LackingEffect, name: str) -> str:

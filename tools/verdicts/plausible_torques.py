@@ -9,13 +9,14 @@ with a load that the URDF lacks, leaves a little in the residuals, and `graphs/s
 
 from __future__ import annotations
 
-from pathlib import Path
+import shlex
 
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
+from jointscope.robots.files.robot_file import robot_argument
 from jointscope.tools.presentation.numbers import significant
 
 CONSTANT = "torque_constant"
@@ -89,7 +90,7 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
 
 def _another_place(result: CalibrationResult, joint: str) -> str:
     """First moments that are wrong where the mass may be right: weight in another direction does the same."""
-    file = result.start.path.name
+    file = robot_argument(result.start)
     return (
         f"The recording asks for weight at another place behind {joint}, as a load would that "
         f"{result.robot.tree.urdf.name} lacks, or a base that is not level. If that may be: `jointscope add {file} "
@@ -141,6 +142,6 @@ def _one_factor(values: list[float]) -> str:
 
 def _again(result: CalibrationResult, option: str = "") -> str:
     """The command that begins anew."""
-    bag = Path(result.bags[0].recording.path).name if result.bags else "BAG"
-    robot = result.start.path.name
-    return f"`jointscope init {result.robot.tree.urdf.name} {bag} -o {robot}{option}`"
+    bag = shlex.quote(result.bags[0].recording.path) if result.bags else "BAG"
+    urdf, robot = shlex.quote(str(result.robot.tree.urdf)), robot_argument(result.start)
+    return f"`jointscope init {urdf} {bag} -o {robot}{option}`"

@@ -29,5 +29,5 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
         "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
         f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
         f"with which {would_be(worst.name, worst.value, other, worst.unit)}: "
-        f"{timing.cure(result.start.path.name)}.",
+        f"{timing.cure(result.start)}.",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.robot_file import robot_argument
+from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 VANISHED = 0.1  # of its prior, a size that may be on its way to nothing
@@ -44,5 +44,5 @@ def _vanishing(robot: Robot, solution: Solution) -> str:
         return ""
     return (
         f"sizes of {', '.join(gone)} are below a tenth of their start, so the recording may show no such effect: "
-        f"`jointscope remove {robot_argument(robot)} {' '.join(gone)} -o OUT.yaml`; else "
+        f"`jointscope remove {robot_argument(robot)} {' '.join(gone)} -o {edited_argument(robot, 'without')}`; else "
     )

@@ -63,7 +63,8 @@ def test_a_filter_is_named_beside_the_delay_that_hides_it_and_makes_the_values_r
     assert any(abs(share) > 0.01 and abs(sigmas) > 3.5 for share, sigmas in deviations(wrong)), "the filter must harm"
     assert check(wrong).level == "bad" and judge(wrong).level == "bad"
     assert "The recording asks for encoder_filter@robot" in check(wrong).text
-    assert "`jointscope add arm.yaml encoder_filter@robot -o arm_better.yaml`" in check(wrong).text
+    file = str(robot.path).removesuffix(".yaml")
+    assert f"`jointscope add {file}.yaml encoder_filter@robot -o {file}_encoder_filter.yaml`" in check(wrong).text
     mended = calibrated(add_effect(late, "encoder_filter@robot"), smoothed, command)
     assert all(abs(share) < 0.01 or abs(sigmas) < 3.5 for share, sigmas in deviations(mended))
     assert judge(mended).level in ("good", "warn")

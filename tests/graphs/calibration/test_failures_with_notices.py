@@ -38,7 +38,7 @@ def test_nothing_is_named_twice():
 
 @pytest.mark.parametrize("depth", [1, 2])
 def test_what_fails_inside_is_named_once_with_the_commands_that_look_for_the_reason(monkeypatch, depth, doggy):
-    monkeypatch.setattr(failures_with_notices, "screen", lambda recording, robot: [SWAPPED])
+    monkeypatch.setattr(failures_with_notices, "screen_all", lambda recording, robot: [SWAPPED])
 
     def fails(robot, recordings):
         raise SolveError("it ran away")
@@ -49,19 +49,20 @@ def test_what_fails_inside_is_named_once_with_the_commands_that_look_for_the_rea
         fails(add_effect(doggy, "backlash@joint2"), [recording()])
     assert str(err.value) == (
         "it ran away; imu2: the axes seem swapped; `jointscope info run.mcap --robot doggy` says whether they fit each "
-        "other, `jointscope remove doggy backlash@joint2 -o OUT.yaml` takes out the effect that was added last"
+        "other, `jointscope remove doggy backlash@joint2 -o doggy_without.yaml` takes out the effect that was added "
+        "last"
     )
 
 
 def test_a_robot_without_effects_gets_start_values_from_init(doggy):
     text = next_commands("it ran away", doggy, [recording()])
-    assert text.endswith(f"`jointscope init {doggy.tree.urdf} run.mcap -o OUT.yaml` finds start values")
+    assert text.endswith(f"`jointscope init {doggy.tree.urdf} run.mcap -o doggy_anew.yaml` finds start values")
     assert next_commands("try `jointscope add`", doggy, [recording()]) == "try `jointscope add`"
 
 
 @pytest.mark.parametrize("verb", [diagnose, discover])
 def test_verbs_that_learn_name_what_looked_odd(monkeypatch, verb, doggy):
-    monkeypatch.setattr(failures_with_notices, "screen", lambda recording, robot: [SWAPPED])
+    monkeypatch.setattr(failures_with_notices, "screen_all", lambda recording, robot: [SWAPPED])
     place = {"diagnose": "jointscope.graphs.discovery.diagnose", "discover": "jointscope.graphs.discovery.search_kind"}[
         verb.__name__
     ]
@@ -76,7 +77,7 @@ def test_verbs_that_learn_name_what_looked_odd(monkeypatch, verb, doggy):
 
 def test_the_robot_is_screened_as_it_was_before_its_calibration(monkeypatch):
     """A mounting that was calibrated with swapped axes fits them, and no longer looks odd."""
-    monkeypatch.setattr(diagnose_module, "screen", lambda recording, robot: [SWAPPED] if robot == "before" else [])
+    monkeypatch.setattr(diagnose_module, "screen_all", lambda recording, robot: [SWAPPED] if robot == "before" else [])
     result = SimpleNamespace(start="before", bags=[SimpleNamespace(isolated=())])
     base = SimpleNamespace(recordings=[recording()], robot="after", result=result)
     assert diagnose_module._to_look_at_first(base) == [f"{diagnose_module.LOOK_FIRST}: {SWAPPED.text}."]

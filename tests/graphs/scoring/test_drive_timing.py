@@ -83,7 +83,8 @@ def test_a_current_of_another_time_than_the_positions_is_not_called_good(tmp_pat
     check = same_time(result)
     assert check.level in ("warn", "bad") and judge(result).level != "good"
     assert ("before" if late > 0.0 else "after") in check.text
-    assert "`jointscope add pendulum.yaml command_delay@robot -o OUT.yaml`" in check.text
+    file = tmp_path / "pendulum"
+    assert f"`jointscope add {file}.yaml command_delay@robot -o {file}_command_delay.yaml`" in check.text
 
 
 @pytest.mark.parametrize("late", [-2e-3, 12e-3])

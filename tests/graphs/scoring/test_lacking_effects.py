@@ -56,11 +56,13 @@ def test_cables_that_pull_are_asked_for_and_make_the_values_right(robot):
     wrong = {p.name: p.value for p in result.parameters}
     assert abs(wrong["j0.inertia"] / 0.3 - 1.0) > 0.05, "the cables must do harm"
     assert judge(result).level == "bad" and "parallel_spring@j0" in check(result).text
-    assert "`jointscope discover arm.yaml arm.mcap --holdout-share 0.33 -o arm_better.yaml`" in check(result).text
+    file = str(robot.path).removesuffix(".yaml")
+    asked = f"`jointscope discover {file}.yaml arm.mcap --holdout"
+    assert f"{asked}-share 0.33 -o {file}_better.yaml`" in check(result).text
     (bag,) = result.bags
     other = replace(bag, recording=replace(bag.recording, path="other.mcap"))
     text = check(replace(result, bags=(bag, other))).text
-    assert "`jointscope discover arm.yaml arm.mcap --holdout other.mcap -o arm_better.yaml`" in text
+    assert f"{asked} other.mcap -o {file}_better.yaml`" in text
     for joint in ARM.joints:
         robot = add_effect(robot, f"parallel_spring@{joint}")
     mended = calibrated(robot, streams)

@@ -38,10 +38,11 @@ def test_at_null_the_command_comes_back(effect, equal):
     edges, commands = held_commands(equal)
     acting, by = effect.law(edges, commands, null(effect))
     assert np.array_equal(acting, commands) and acting is not commands
-    ((name, slope),) = by.items()
+    assert set(by) == {p.name for p in effect.parameters}
     h = 1e-9
-    near = (effect.law(edges, commands, {name: h})[0] - commands) / h
-    np.testing.assert_allclose(slope, near, rtol=1e-5, atol=1e-4)
+    for size in (p.name for p in effect.parameters if not p.is_shape):
+        near = (effect.law(edges, commands, null(effect) | {size: h})[0] - commands) / h
+        np.testing.assert_allclose(by[size], near, rtol=1e-5, atol=1e-4)
 
 
 @of(COMMANDS)
@@ -49,12 +50,12 @@ def test_at_null_the_command_comes_back(effect, equal):
 def test_derivatives_of_commands_agree_with_differences(effect, equal):
     edges, commands = held_commands(equal)
     for factor in (0.02, 0.31, 1.0, 7.3):
-        (name,) = effect.example
-        value = factor * 1.0137 * effect.example[name]
-        _, by = effect.law(edges, commands, {name: value})
-        h = 1e-6 * value
-        up, down = (effect.law(edges, commands, {name: value + side})[0] for side in (h, -h))
-        np.testing.assert_allclose(by[name], (up - down) / (2 * h), rtol=1e-5, atol=1e-4)
+        values = {name: factor * 1.0137 * size for name, size in effect.example.items()}
+        _, by = effect.law(edges, commands, values)
+        for name, value in values.items():
+            h = 1e-6 * value
+            up, down = (effect.law(edges, commands, values | {name: value + side})[0] for side in (h, -h))
+            np.testing.assert_allclose(by[name], (up - down) / (2 * h), rtol=1e-5, atol=1e-4)
 
 
 @pytest.mark.parametrize("effect_id", ["command_delay", "motor_lag"])
@@ -125,3 +126,21 @@ def test_the_deadband_is_measured_in_the_unit_of_the_command():
         robot = replace(DOGGY, command=replace(DOGGY.command, unit=unit))
         (width,) = effect.parameters_of(robot, "joint1")
         assert (width.unit, width.start) == ("1" if unit == "duty" else unit, pytest.approx(start))
+
+
+def test_a_drive_that_saturates_gives_no_more_than_its_limit():
+    u = np.array([-0.9, -0.4, 0.0, 0.3, 0.5])
+    acting, by = catalogue()["command_limit"].law(np.arange(6.0), u, {"lost": 1.0, "limit": 0.4})
+    np.testing.assert_allclose(acting, [-0.4, -0.4, 0.0, 0.3, 0.4])
+    np.testing.assert_allclose(by["limit"], [-1, 0, 0, 0, 1])
+    half, _ = catalogue()["command_limit"].law(np.arange(6.0), u, {"lost": 0.5, "limit": 0.4})
+    np.testing.assert_allclose(half, [-0.65, -0.4, 0.0, 0.3, 0.45])
+
+
+def test_the_limit_is_looked_for_around_a_full_command():
+    effect = catalogue()["command_limit"]
+    for unit, full in (("duty", 1.0), ("V", 32.0), ("N m", float(DOGGY.tree.effort_limits[0]) or 40.0)):
+        robot = replace(DOGGY, command=replace(DOGGY.command, unit=unit))
+        lost, limit = effect.parameters_of(robot, "joint1")
+        assert (lost.unit, limit.unit) == ("1", "1" if unit == "duty" else unit)
+        assert limit.start == pytest.approx(0.9 * full) and limit.grid[2] == pytest.approx(0.4 * full)

@@ -10,10 +10,9 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.robots.recordings.joint_motion import JointMotion
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.recordings.resting_joints import joints_without_motion, must_move
-from jointscope.robots.recordings.screening import _check_efforts, _check_limits, screen
+from jointscope.robots.recordings.screening import _check_limits, screen
 from jointscope.tools.bags.read_recording import read_recording
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
@@ -294,42 +293,3 @@ def test_angles_somewhat_beyond_the_limits_are_only_noted(doggy, good):
     for name in ("imu1", "imu2"):
         wide = changed(wide, name, lambda values: 5.0 * values)
     assert any("doggy.urdf allows 3.142 rad" in text for text in texts(wide, doggy))
-
-
-@pytest.mark.parametrize(
-    ("share", "rotor", "most", "topic", "said"),
-    (
-        (1.0, 0.0, 99.0, "/cmd", 0),
-        (0.6, 0.0, 99.0, "/cmd", 0),
-        (0.1, 9.0, 99.0, "/cmd", 0),
-        (0.1, 9.0, 30.0, "/cmd", 1),
-        (1.0, 0.0, 30.0, "/cmd", 1),
-        (1.0, 0.0, 30.0, "/states", 0),
-    ),
-    ids=(
-        "all acted",
-        "a rotor that nobody knows takes its part",
-        "a known rotor takes most",
-        "a known rotor takes most, cut at 30 N m",
-        "cut at 30 N m",
-        "reported by the motors",
-    ),
-)
-def test_commands_beyond_the_effort_limit_are_told_where_the_motion_does_not_follow(share, rotor, most, topic, said):
-    times = np.arange(0.0, 4.0, 0.005)
-    commanded = 60.0 * np.sin(3 * times)[:, None]
-    v = np.cumsum(share * np.clip(commanded, -most, most), axis=0) * 0.005
-    values = {"inertia": rotor, "coulomb_torque": 0.0}
-    tree = SimpleNamespace(effort_limits=np.array([40.0]), torque=lambda q, v, a: a, urdf=Path("arm.urdf"))
-    robot = SimpleNamespace(
-        joints=("elbow",), tree=tree, free_links=False, parameters={},
-        drive_parameter=lambda joint, law: SimpleNamespace(value=values[law]),
-        transmission=None, unit_at=lambda joint, unit: unit,
-        command=SimpleNamespace(topic=topic, unit="N m"),
-        motor_encoder=SimpleNamespace(source=SimpleNamespace(topic="/states")),
-    )  # fmt: skip
-    streams = {"command": Stream("command", times, commanded, ("elbow.command",), "N m")}
-    found = _check_efforts(Recording("", "", 0, streams), robot, JointMotion(times, 0.01, v, v))
-    assert len(found) == said
-    if said:
-        assert "elbow 60 N m (allowed 40), first at " in found[0].text and "record the effort that" in found[0].text

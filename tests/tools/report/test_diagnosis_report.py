@@ -186,7 +186,8 @@ def test_the_screen_shows_ranking_sizes_and_what_to_do():
         "  7  integration_error@robot     absent (numerics)      61.0    1      0.020         —           —         —",
         "  bearing_flexibility@joint1  compliance_x  0.0004020  0.0000061  rad/(N m)  refit",
         "Not testable with these recordings, so neither missing nor absent: gravity_imbalance@joint2",
-        "Next: jointscope add doggy bearing_flexibility@joint1 -o OUT.yaml (it explains 98 % of the excess error)",
+        "Next: jointscope add doggy bearing_flexibility@joint1 -o doggy_bearing_flexibility.yaml (it explains 98 % of "
+        "the excess error)",
     ):
         assert line in text.splitlines(), line
     assert max(map(len, text.splitlines())) < 190

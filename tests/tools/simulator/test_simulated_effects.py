@@ -32,6 +32,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "command_delay": ("joint, robot", "delay"),
     "pwm_deadband": ("joint", "width"),
     "truncated_command": ("joint", "lost"),
+    "command_limit": ("joint", "lost limit"),
     "spring_cubic": ("elastic joint", "stiffness"),
     "spring_curve": ("elastic joint", "quadratic cubic"),
     "backlash": ("elastic joint", "half_gap"),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.starts.command_limits import CommandLimit
 from jointscope.graphs.starts.drive_regression import (
     GAIN,
     INERTIA,
@@ -63,6 +64,7 @@ class DriveValues:
             ratios only.
         sharpness: k in tanh(k v) of dry friction, from which a calibration may look for it [s/rad]; None where the
             encoder does not show how the joint turns over, or the joint is so fast that it does not matter.
+        limit: what the drive gives at the most; None where it gives what was commanded.
     """
 
     start: Mapping[str, float]
@@ -73,6 +75,7 @@ class DriveValues:
     link: float = 1.0
     unknown_scale: bool = False
     sharpness: float | None = None
+    limit: CommandLimit | None = None
 
     @property
     def is_impossible(self) -> bool:

@@ -14,13 +14,13 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.screening import MIN_SAMPLES
+from jointscope.tools.init.streams.joint_topics import DRIVEN
 from jointscope.tools.init.streams.known_fields import IMU
 from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, by_place, named_signal
 from jointscope.tools.init.streams.signals import Signal, complain_of_lengths
 from jointscope.tools.init.streams.standing import Stance, stances
 
 LINK_SIDE = re.compile(r"link|load|output|secondary|arm_side|absolute")
-DRIVEN = re.compile(r"effort|torque|current|duty|pwm|volt")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.special import comb, gammaincinv
 
@@ -26,6 +27,11 @@ WINDOW, STRETCHES = (20, 100), 12  # samples of one stretch, least and most; how
 QUIET = 0.25  # share of the stretches that are quieter than the one that counts
 ORDERS = (2, 4, 6, 8, 10, 12)
 ALIKE = 1.15  # ratio up to which two orders show the same noise
+NEARLY_ALIKE = 1.35  # the same where it changes with the speed
+AGREEING = 3  # orders that show the same where it is noise
+MOVES = 0.5  # of the rms speed, from which a joint moves
+NEAR = 9  # samples over which a speed is a mean
+FEWEST_IN_MOTION = 80  # moments
 REPEATS = 0.35  # share of samples that repeat the one before, from which a driver is faster than its device
 ROUNDING = 1.3  # times a step over sqrt(12) that differences may show of rounding alone
 FINEST = 1e-6  # of the range; no sensor is known to be better
@@ -124,6 +130,33 @@ def _roughness(times: Array, values: Array, weights: Mapping[int, Array]) -> flo
     found = [_from_order(values, order, weight) for order, weight in weights.items()]
     alive = [sigma for sigma in found if sigma > 0.0]
     return next((sigma for sigma in alive if sigma < ALIKE * min(alive)), 0.0)
+
+
+def noise_in_motion(times: Array, values: Array) -> float:
+    """Standard deviation of white noise while a joint moves, 0 where what is seen is no noise.
+
+    Stamps that jitter make noise of motion, none at rest. Of a motion that is too fast for the rate higher differences
+    leave less and less, of noise all leave the same.
+
+    Args:
+        times: strictly increasing, shape (n,) [s].
+        values: finite positions, shape (n,).
+    """
+    if len(times) < 2 * ORDERS[-1]:
+        return 0.0
+    speed = np.abs(np.convolve(np.gradient(values, times), np.full(NEAR, 1.0 / NEAR), mode="same"))
+    moves = speed > MOVES * float(np.sqrt(np.mean(speed**2)))
+    inside = np.flatnonzero(sliding_window_view(moves, ORDERS[-1] + 1).all(axis=1))
+    if len(inside) < FEWEST_IN_MOTION:
+        return 0.0
+    found = []
+    for order in ORDERS:
+        rows = inside + (ORDERS[-1] - order) // 2  # the same moments by all orders
+        weight = _weights(times, order)[rows]
+        around = values[rows[:, None] + np.arange(order + 1)]
+        found.append(float(np.sqrt(np.mean(np.sum(weight * (around - around[:, :1]), axis=1) ** 2))))
+    alike = [sigma for sigma in found if 0.0 < sigma < NEARLY_ALIKE * min(found)]
+    return float(np.median(alike)) if len(alike) >= AGREEING else 0.0
 
 
 def _from_order(values: Array, order: int, weight: Array) -> float:

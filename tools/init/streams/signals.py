@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,19 +17,16 @@ from jointscope.tools.bags.clocks.empty_stamps import empty_stamps
 from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.fitting_messages import read_columns
-from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, WOVEN_TYPE
 from jointscope.tools.bags.messages.message_type import MessageType
 from jointscope.tools.bags.messages.open_bag import Bag, Progress, RawTopic, open_bag
 from jointscope.tools.bags.tidying.long_holes import LongHoles
 from jointscope.tools.bags.tidying.not_finite import filled_in
 from jointscope.tools.bags.tidying.stream_notices import Timing, timing
 from jointscope.tools.bags.tidying.tidy_samples import ordered_samples, plausible_samples
+from jointscope.tools.init.streams.joint_topics import COMMANDED, joint_by_joint
 from jointscope.tools.init.streams.known_fields import KnownField, known_fields
 
 Array = NDArray[np.float64]
-
-COMMANDED = re.compile(r"command|cmd|desired|target|setpoint|reference|goal|(^|\.)output\.|points\.|_d$|_des$")
-"""Words in topics and fields with what a controller wants, in contrast to what is measured."""
 
 MEASURED = ("position", "rate")
 """Quantities that a sensor fills, so that single wild samples in them are none."""
@@ -148,25 +144,6 @@ def complain_of_lengths(signals: Sequence[Signal], words: Sequence[str]) -> None
     for signal in signals:
         if signal.trouble and any(word in signal.field.lower() for word in words):
             raise RecordingError(signal.trouble)
-
-
-def joint_by_joint(bag: Bag, joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Topics that are to be joined, as each is about one joint, and the joints in their order."""
-    groups: dict[tuple[str, ...], dict[str, str]] = {}
-    for topic in bag.topics:
-        kinds = bag.type_names(topic)
-        if kinds != (WOVEN_TYPE,) and not (COMMANDED.search(topic.lower()) and set(kinds) <= set(SINGLE_TYPES)):
-            continue
-        named = [joint for joint in joints if re.search(rf"(?<![^\W_]){re.escape(joint)}(?![^\W_])", topic)]
-        if named:
-            joint = max(named, key=len)
-            groups.setdefault((topic.replace(joint, "*"), *kinds), {})[joint] = topic
-    found = {}
-    for topics in groups.values():
-        order = tuple(joint for joint in joints if joint in topics)
-        if len(order) > 1:
-            found[PLUS.join(topics[joint] for joint in order)] = order
-    return found
 
 
 def _useful_type(bag: Bag, topic: str) -> MessageType | None:

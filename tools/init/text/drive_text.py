@@ -7,16 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from jointscope.graphs.starts.command_limits import CommandLimit
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.model.robot import SHARPNESS
-from jointscope.robots.units import of_slide
+from jointscope.robots.units import of_slide, si_unit
 from jointscope.tools.init.estimates.drive_values import EXPLAINED, DriveValues
 from jointscope.tools.init.robot_guess import SUPPLY, RobotGuess
-from jointscope.tools.init.text.robot_line import GUESS, as_list, line, number
+from jointscope.tools.init.text.robot_line import GUESS, as_list, line, number, plain
 
 RESONANCE, DAMPING_RATIO = 5.0, 0.1  # [Hz], [1] of a link on its spring, where a gyroscope will tell
 VISCOUS_EFFECT = ("N m", "A")  # units of commands whose viscous friction is an effect
 DELAY_EFFECT = "command_delay@robot"
+LIMIT_EFFECT = "command_limit"
 DELAY_PRIOR = 0.01  # [s] filters of currents and cycles of buses take milliseconds
 SURE = 5.0  # [sigma] below zero from which a value is no uncertain one
 ZERO_BY_DEFAULT = ("motor_viscous.coefficient",)  # its prior is about none
@@ -45,10 +47,43 @@ def effect_lines(guess: RobotGuess) -> list[str]:
     viscous = guess.command_unit[0] in VISCOUS_EFFECT
     labels = [f"motor_viscous@{joint}" for joint in guess.roles.joints] if viscous else []
     reasons = ["friction that grows with speed, as drives with gears have it"] if viscous else []
+    for joint, drive in limited_drives(guess):
+        labels.append(f"{LIMIT_EFFECT}@{joint}")
+        reasons.append(limit_text(guess, joint, drive))
     if is_measured(guess):
         labels.append(DELAY_EFFECT)
         reasons.append("time between the measured drive signal and the positions in its message")
     return [line(f"effects: {as_list(labels)}", "; ".join(reasons), False), ""] if labels else []
+
+
+def limited_drives(guess: RobotGuess) -> list[tuple[str, CommandLimit]]:
+    """Joints whose drive gives no more than a limit."""
+    drives = zip(guess.roles.joints, guess.drives, strict=True)
+    return [(joint, drive.limit) for joint, drive in drives if drive.limit is not None]
+
+
+def limit_text(guess: RobotGuess, joint: str, limit: CommandLimit) -> str:
+    """A sentence about such a drive, without commas that end it."""
+    unit = _limit_unit(guess, joint)
+    size = f"{limit.level:.4g}" + f" {unit}" * (unit != "1")
+    return f"{joint} gives no more than {size} ({100.0 * limit.share:.2g} % of its commands are beyond)"
+
+
+def _limit_unit(guess: RobotGuess, joint: str) -> str:
+    unit = si_unit(guess.command_unit[0])
+    return of_slide(unit) if joint in guess.slides else unit
+
+
+def _limit_lines(guess: RobotGuess, joint: str, limit: CommandLimit | None) -> list[str]:
+    """The level beyond which a drive gives no more, and that it then gives nothing more."""
+    if limit is None:
+        return []
+    name, level = f"  {joint}.{LIMIT_EFFECT}", number(limit.level, 5)
+    spread = number(SPREAD * limit.level)
+    return [
+        f"{name}.lost: {{value: 1.0, unit: '1', fixed: true}}",
+        f"{name}.limit: {{value: {level}, unit: {plain(_limit_unit(guess, joint))}, prior_sigma: {spread}}}",
+    ]
 
 
 def is_measured(guess: RobotGuess) -> bool:
@@ -74,6 +109,7 @@ def parameter_lines(guess: RobotGuess) -> list[str]:
                 prior = f"prior: 0.0, prior_sigma: {spread}, positive: false, 'null': 0.0"
             text = f"{joint}.{row.name}: {{value: {number(row.value, 5)}, unit: {unit}, {prior}}}"
             lines.append(line(text, row.comment, indent=2) if row.comment else f"  {text}")
+        lines += _limit_lines(guess, joint, drive.limit)
     return [*lines, *_delay_lines(guess)]
 
 

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Values that a calibration found: the free parameters, what a user must know of each, and what follows from them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.robots.model.derived_values import derived_value
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import Parameter
+
+Array = NDArray[np.float64]
+
+HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
+NEAR_ZERO = 0.5  # relative sigma from which a positive value is called compatible with zero
+FALLEN = 0.1  # of its prior, below which such a value has run into its bound
+SURELY_BELOW = 3.5  # [sigma] below null from which a value of one sign has the other one
+AT_BOUND = "at its bound: compatible with zero"
+NEAR_BOUND = "compatible with zero, its bound"
+WRONG_SIDE = "below zero, where it has no meaning: it stands for something else"
+
+
+def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
+    """The free parameters with notes.
+
+    Args:
+        robot: before the calibration.
+        calibration: the values that were found.
+        sigmas: of the shared values, the parameters' coordinates first.
+    """
+    found, slopes, one_sided = [], calibration.value_by_coordinate, _one_sided(robot)
+    for i, name in enumerate(calibration.names):
+        p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
+        note = _note(p, value, sigma, float(sigmas[i]))
+        if not note and name in one_sided and value < one_sided[name] - SURELY_BELOW * sigma:
+            note = WRONG_SIDE
+        found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
+    return found
+
+
+def _one_sided(robot: Robot) -> dict[str, float]:
+    """Null values of effects' sizes of which only those above null are physical, by the parameter's name."""
+    return {
+        here.parameter(p.name): p.null
+        for here in robot.effects
+        for p in here.effect.parameters_at(robot, here.owner)
+        if p.sign == "+" and not p.is_shape
+    }
+
+
+def _note(p: Parameter, value: float, sigma: float, of_coordinate: float) -> str:
+    """What the prior or the bound at zero has to do with a value."""
+    small = p.positive and sigma > NEAR_ZERO * value
+    if small and value < FALLEN * p.prior:
+        return AT_BOUND
+    if of_coordinate > HELD_BY_PRIOR * p.coordinate_sigma:
+        return "held by its prior"
+    return NEAR_BOUND if small else ""
+
+
+def derived_results(robot: Robot, calibration: Calibration, covariance: Array) -> tuple[ParameterEstimate, ...]:
+    """All derived results of a robot.
+
+    Args:
+        robot: before the calibration.
+        calibration: the values that were found.
+        covariance: of the shared values, whose first ones are the free parameters' coordinates, shape (s, s).
+    """
+    before = {name: p.value for name, p in robot.parameters.items()}
+    now = before | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    count = len(calibration.names)
+    scale = np.asarray(calibration.value_by_coordinate)
+    of_values = covariance[:count, :count] * np.outer(scale, scale)
+    found = []
+    for result in robot.derived:
+        value, slopes = derived_value(robot, result, now)
+        by = np.array([slopes.get(name, 0.0) for name in calibration.names])
+        sigma, start = float(np.sqrt(by @ of_values @ by)), derived_value(robot, result, before)[0]
+        found.append(ParameterEstimate(result.name, value, sigma, result.unit, start, start, 0.0, derived=True))
+    return tuple(found)

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Levels beyond which a drive gives no more than at them, whatever is commanded.
+
+With c = clip(u, -L, L) and the excess e = u - c, a drive of which a part `lost` of the excess does nothing obeys
+
+    k (c + (1 - lost) e) = M a + c + g + b a + d v + mu sign(v)
+
+So c is regressed on the motion and on e: the factor of e is -(1 - lost), which is -1 where the drive gives all and 0
+where it saturates at L. No torque that a model may lack makes the excess vanish just so. L is where the motion leaves
+least of c open. Rotor, friction and constant are found in the same regression, so no value of a robot file is believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.starts.drive_regression import Driven, load_of
+from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands, motion_cells
+from jointscope.graphs.starts.windowed_sums import joint_signals, windowed_rows
+from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.recordings.recording import Stream
+
+Array = NDArray[np.float64]
+
+TRIED = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995)  # quantiles of the commands' size
+BETWEEN = 9  # levels between the neighbours of the best of them, and once more
+WIDTHS = (0.06, 0.12, 0.24)  # [s] of windows; the one that tells most about the excess counts
+REFINED = 12  # steps of a golden section
+GOLDEN = 0.6180339887498949
+BETTER = 2.0  # times less is left open with a limit than without
+OPEN = 0.01  # of the mean square of the command that may be left open where a limit is believed
+LOST, SURE = 0.8, 0.06  # of the excess that must be lost, and its sigma at most
+FEWEST = 8  # commands beyond a limit
+FEWEST_ROWS = 60  # windows in which a joint moves; fewer are explained by anything
+SEVERAL, GOOD_PART = 3, 0.02  # blocks of the recording with such a part of the excess, mean square
+FAR_BETTER = 20.0  # times less must be left open where there are fewer: a push may look alike
+PIECES = 6  # of the windows with excess that are left out one by one
+
+
+@dataclass(frozen=True)
+class CommandLimit:
+    """What one drive gives at the most.
+
+    Attributes:
+        level: in the unit of the command.
+        share: of the commands that are beyond it.
+        lost: part of the excess that does nothing.
+    """
+
+    level: float
+    share: float
+    lost: float
+
+
+def limited(command: Stream, limits: Sequence[CommandLimit | None]) -> Stream:
+    """What the drives gave of a command."""
+    levels = np.array([np.inf if limit is None else limit.level for limit in limits])
+    return replace(command, values=np.clip(command.values, -levels, levels)) if np.isfinite(levels).any() else command
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """One recording under windows of one width: motion of each joint, and what its commands need to follow."""
+
+    cells: MotionCells
+    command: Stream
+    held: bool
+    width: float
+    motion: list[Array]
+    blocks: list[NDArray[np.intp]]
+
+    def of_command(self, joint: int, values: Array) -> Array:
+        """Windowed means of a changed command of a joint, shape (w,)."""
+        own = replace(self.command.channel(joint), values=values[:, None])
+        means = mean_commands(own, self.cells.edges, self.held)
+        alone = replace(self.cells, known=self.cells.known[:, [joint]])
+        return np.asarray(windowed_rows(alone, means[:, :, None], self.width)[0][0][0][:, 0])
+
+
+def command_limits(
+    tree: RigidTree,
+    recordings: Sequence[Driven],
+    sigmas: Array,
+    *,
+    held: bool = True,
+    sharpness: float | Array = 1e4,
+) -> list[CommandLimit | None]:
+    """The limit of each joint's drive; None where none shows.
+
+    Args:
+        tree: rigid bodies with masses.
+        recordings: what drove the joints, and how they moved.
+        sigmas: noise of the encoders, shape (n,) [rad].
+        held: whether a command acts until the next one.
+        sharpness: k in tanh(k v) of dry friction, of all joints or of each, shape (n,) [s/rad].
+    """
+    by_width: dict[float, list[_Windows]] = {width: [] for width in WIDTHS}
+    for encoder, command, left_out in recordings:
+        cells = motion_cells(encoder, command, sigmas, held, left_out)
+        signals = joint_signals(cells, load_of(tree, cells), sharpness)[:, :, 1:]
+        for width in WIDTHS:
+            rows, _ = windowed_rows(cells, signals, width)
+            if rows:
+                parts = [motion for motion, _, _ in rows], [block for _, block, _ in rows]
+                by_width[width].append(_Windows(cells, command, held, width, *parts))
+    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
+
+
+def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | None:
+    """The limit of one drive."""
+    by_width = {w: some for w, some in by_width.items() if sum(len(x.motion[joint]) for x in some) >= FEWEST_ROWS}
+    if not by_width:
+        return None
+    middle = by_width[sorted(by_width)[len(by_width) // 2]]
+    sizes = np.abs(np.concatenate([some.command.channel(joint).values[:, 0] for some in middle]))
+    grid = np.unique(np.quantile(sizes, TRIED))
+    grid = grid[grid > 0.0]
+    if not len(grid):
+        return None
+    level, left = _best_level(middle, joint, np.append(grid, sizes.max()))
+    share, whole = float(np.mean(sizes > level)), _left_open(middle, joint, np.inf)
+    if whole < BETTER * left or left > OPEN or np.count_nonzero(sizes > level) < FEWEST:
+        return None
+    told = [_lost(some, joint, level) for some in by_width.values()]
+    lost, sigma, several = min(told, key=lambda value: value[1])
+    believed = lost > LOST and sigma < SURE and (several or whole > FAR_BETTER * left)
+    return CommandLimit(level, share, lost) if believed else None
+
+
+def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float, float]:
+    """Where the motion leaves least of the command open, between the neighbours of the best of a grid; and how much."""
+    for _ in range(2):
+        found = [_left_open(windows, joint, float(level)) for level in grid]
+        k = int(np.argmin(found))
+        near = grid[max(k - 1, 0) : k + 2]
+        grid = np.geomspace(near[0] if k else 0.5 * grid[0], near[-1], BETWEEN)
+    found = [_left_open(windows, joint, float(level)) for level in grid]
+    k = int(np.argmin(found))
+    low = np.log(grid[k - 1] if k else 0.5 * grid[0])
+    high = np.log(grid[min(k + 1, len(grid) - 1)])
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    values = [_left_open(windows, joint, float(np.exp(x))) for x in inner]
+    for _ in range(REFINED):
+        if values[0] < values[1]:
+            high, inner[1], values[1] = inner[1], inner[0], values[0]
+            inner[0] = high - GOLDEN * (high - low)
+            values[0] = _left_open(windows, joint, float(np.exp(inner[0])))
+        else:
+            low, inner[0], values[0] = inner[0], inner[1], values[1]
+            inner[1] = low + GOLDEN * (high - low)
+            values[1] = _left_open(windows, joint, float(np.exp(inner[1])))
+    best = min([*zip(values, np.exp(inner), strict=True), (found[k], grid[k])])
+    return float(best[1]), float(best[0])
+
+
+def _clipped(some: _Windows, joint: int, level: float) -> Array:
+    return np.clip(some.command.channel(joint).values[:, 0], -level, level)
+
+
+def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
+    """Share of the mean square of the limited command that the motion does not explain."""
+    y = np.concatenate([some.of_command(joint, _clipped(some, joint, level)) for some in windows])
+    X = np.concatenate([some.motion[joint] for some in windows])
+    if len(y) <= X.shape[1] or not y.any():
+        return 1.0
+    X = X / np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    rest = y - X @ np.linalg.lstsq(X, y, rcond=1e-10)[0]
+    return float(rest @ rest / (y @ y))
+
+
+def _lost(windows: list[_Windows], joint: int, level: float) -> tuple[float, float, bool]:
+    """Part of the excess that is lost, its sigma from leaving out pieces of it, and whether it comes several times."""
+    y, e, X, blocks, first = [], [], [], [], 0
+    for some in windows:
+        u, c = some.command.channel(joint).values[:, 0], _clipped(some, joint, level)
+        y.append(some.of_command(joint, c))
+        e.append(some.of_command(joint, u - c))
+        X.append(some.motion[joint])
+        blocks.append(some.blocks[joint] + first)
+        first = int(blocks[-1].max(initial=first)) + 1
+    target, excess = np.concatenate(y), np.concatenate(e)
+    where = np.flatnonzero(excess)
+    if len(where) < PIECES:
+        return 0.0, np.inf, False
+    squares = np.bincount(np.concatenate(blocks), excess**2)
+    columns = np.column_stack([excess, np.concatenate(X)])
+    size = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+
+    def part(without: NDArray[np.intp]) -> float:
+        keep = np.ones(len(target), bool)
+        keep[without] = False
+        return 1.0 + float(np.linalg.lstsq((columns / size)[keep], target[keep], rcond=1e-10)[0][0] / size[0])
+
+    others = np.array([part(piece) for piece in np.array_split(where, PIECES)])
+    several = np.count_nonzero(squares > GOOD_PART * squares.sum()) >= SEVERAL
+    return part(where[:0]), float(np.sqrt((PIECES - 1.0) * np.var(others))), bool(several)

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Values that ran into the bound of their range, or beyond it, are marked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.found_values import AT_BOUND, NEAR_BOUND, WRONG_SIDE, dynamic_parameters
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+
+ROBOT = add_effect(load_robot("doggy"), "motor_viscous@joint1")
+FRICTION, VISCOUS = "joint1.coulomb_torque", "joint1.motor_viscous.coefficient"
+
+
+def note_of(name: str, value: float, sigma: float) -> str:
+    """The note of one parameter with a value and a standard deviation, both in its unit."""
+    robot = replace(ROBOT, parameters={**ROBOT.parameters, name: replace(ROBOT.parameter(name), value=value)})
+    calibration = Calibration.of(robot)
+    sigmas = np.full(len(calibration.names), 1e-4)
+    place = calibration.names.index(name)
+    sigmas[place] = sigma / calibration.value_by_coordinate[place]
+    return next(p.note for p in dynamic_parameters(ROBOT, calibration, sigmas) if p.name == name)
+
+
+@pytest.mark.parametrize(
+    "share, relative, note",
+    [(1.0, 0.01, ""), (0.05, 0.01, ""), (0.05, 0.9, AT_BOUND), (0.3, 0.65, NEAR_BOUND), (1e-6, 50.0, AT_BOUND)],
+)
+def test_a_positive_value_that_may_be_zero_says_so(share, relative, note):
+    prior = ROBOT.parameter(FRICTION).prior
+    assert note_of(FRICTION, share * prior, relative * share * prior) == note
+
+
+@pytest.mark.parametrize("value, sigma, note", [(0.4, 0.01, ""), (-0.01, 0.01, ""), (-0.4, 0.01, WRONG_SIDE)])
+def test_a_friction_that_drives_is_marked(value, sigma, note):
+    assert note_of(VISCOUS, value, sigma) == note
