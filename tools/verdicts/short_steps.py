@@ -23,7 +23,7 @@ def short_steps(result: CalibrationResult) -> tuple[str, str]:
     joint = worst.rsplit(".", 1)[0]
     return (
         "bad",
-        f"What steps of {significant(step, 2)} ms miss looks like {significant(100 * result.inertia_shifts[worst], 2)} "
+        f"What steps of {significant(step, 2)} ms miss looks like {significant(100 * shifts[worst], 2)} "
         f"% of {worst}: friction stops so light a joint within a small part of a step. If the real friction reverses "
         f"more slowly, say so ({joint}.{SHARPNESS}); otherwise take such an inertia from a drawing (`fixed: true`).",
     )
