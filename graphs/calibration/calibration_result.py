@@ -173,7 +173,7 @@ class CalibrationResult:
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         lacking: effects of the catalogue that the recordings ask for, surest first.
         derived: results in other words and units, which follow from the parameters.
-        sets: recordings of other kinds with their states.
+        sets: recordings of other kinds with their states and the blocks that they touch.
         step_errors: what the steps of the motion miss, by velocity row, as a share of the random torques, see
             `graphs.problem.step_errors`; empty where it was not asked.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
@@ -202,7 +202,7 @@ class CalibrationResult:
     lacking: tuple[LackingEffect, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
-    sets: tuple[tuple[SetProblem, Array], ...] = ()
+    sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     step_errors: tuple[float, ...] = ()
 
     @property

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from shaken_arm import TX90L, truth
 
+import jointscope as js
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
 from jointscope.graphs.poses.calibrate_poses import placed
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
+from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.bags.at_poses.read_shaken import read_shaken
@@ -75,3 +78,33 @@ def test_both_kinds_agree_and_the_poses_pay_for_the_responses(joint):
     alone, together = joint.pose_squares
     assert alone < together < 120.0
     assert not joint.poses.left_out
+
+
+def test_the_graph_of_both_kinds_is_printed_on_one_screen(joint):
+    g = js.graph(joint)
+    text = g.describe()
+    assert g.graph.size() < 40
+    assert "rows of poses: dynamics" in text and "rows of frequency: dynamics" in text
+
+
+def test_the_graph_of_both_kinds_has_the_values_and_sigmas_of_the_calibration(joint):
+    g = js.graph(joint)
+    sigmas, values = g.sigmas(g.values), g.parameters(g.optimize())
+    assert set(values) == {n for n, p in joint.robot.parameters.items() if not p.fixed}
+    for name, value in values.items():
+        p = joint.robot.parameters[name]
+        assert abs(value - p.value) < 0.02 * p.sigma, name
+        assert sigmas[name] == pytest.approx(p.sigma, rel=1e-3), name
+
+
+def test_the_graph_of_responses_alone_has_the_sigmas_of_their_calibration():
+    robot = load_robot("tx90l")
+    found = calibrate_frequency(robot, [read_shaken(TX90L / "frequency" / "frequency_P1", robot)])
+    g = js.graph(found)
+    sigmas = g.sigmas(g.values)
+    assert all(sigmas[name] == pytest.approx(found.robot.parameters[name].sigma, rel=1e-2) for name in found.told)
+
+
+def test_a_factor_for_every_sample_is_for_motion(joint):
+    with pytest.raises(SolveError, match="takes recordings of motion only; leave it out"):
+        js.graph(joint, per_sample=True)
