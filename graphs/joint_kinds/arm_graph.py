@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The GTSAM graph of an arm calibrated from poses, frequency responses or both: a factor each, and the priors.
+"""The GTSAM graph of an arm calibrated from poses, frequency responses or both.
 
-    poses (a session) ----+
-    poses (another one) --+-- D -- priors
-    frequency ------------+          all responses, with what is in doubt about them
+A factor for each session of poses, one for all responses with what is in doubt about them, and one for the priors.
 """
 
 from __future__ import annotations
