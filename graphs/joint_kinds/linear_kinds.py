@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -58,9 +57,6 @@ class LinearKind(Protocol):
             out: a fold that is left out.
         """
 
-    def fall(self, extra: Array, step: Array) -> float:
-        """By how much chi2 falls in a step of all columns."""
-
     def left_out(self, extra: Array, step: Array, fold: int) -> float:
         """Squared distances of a fold after a step that it was not fitted to [sigma^2]."""
 
@@ -77,14 +73,17 @@ class LinearKinds:
     parts: Sequence[LinearKind]
     tied: Array
 
-    @cached_property
-    def pull(self) -> Array:
-        """Slope of the cost of what ties them at the calibrated values, which that of the kinds balances, (p,)."""
-        nothing = {part.kind: np.zeros((0, 0)) for part in self.parts}
-        return -np.sum([part.equations(nothing[part.kind])[1] for part in self.parts], axis=0)
+    def pull(self, extra: Mapping[str, Array]) -> Array:
+        """Slope of the cost of what ties them at the calibrated values, which that of the kinds balances, (p,).
 
-    def fitted(self, extra: Mapping[str, Array], sigmas: Array, out: Out | None = None) -> tuple[Array, Array]:
-        """Step of all columns and of extra ones, shape (p + k,), and its covariance.
+        It is the one that leaves them there as long as an effect is held at null.
+        """
+        p = len(self.tied)
+        slopes = [part.equations(extra.get(part.kind, np.zeros((0, 0))))[1][:p] for part in self.parts]
+        return -np.sum(slopes, axis=0)
+
+    def fitted(self, extra: Mapping[str, Array], sigmas: Array, out: Out | None = None) -> tuple[Array, Array, float]:
+        """Step of all columns and of extra ones, shape (p + k,), its covariance, and the fall of chi2, ties included.
 
         Args:
             extra: whitened columns of an effect in each kind, shape (rows, k); a kind that it does nothing in may lack.
@@ -101,9 +100,10 @@ class LinearKinds:
             slope[there] += g
         H[:p, :p] += self.tied
         H[p:, p:] += np.diag(sigmas**-2.0)
-        slope[:p] += self.pull
+        slope[:p] += self.pull(extra)
         covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-        return -covariance @ slope, covariance
+        step = -covariance @ slope
+        return step, covariance, -float(slope @ step)
 
     def of(self, part: LinearKind, extra: Mapping[str, Array], step: Array) -> tuple[Array, Array]:
         """Columns of an effect in a kind, and what of a step it sees."""
