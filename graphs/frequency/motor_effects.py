@@ -85,6 +85,18 @@ def motor_effects(
     return MotorEffects(offsets, torques)
 
 
+def stiffer_drives(
+    arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex | None
+) -> Array | None:
+    """What drives that harden are stiffer by on average, 3 k3 <d^2>, shape (nu,) [N m/rad]; None where none does."""
+    k3 = np.array([values.get(f"{joint}.{CUBIC}", 0.0) for joint in arm.joints])
+    if x is None or not np.any(k3 > 0.0):
+        return None
+    power = np.abs(x[:, :, arm.driven] - pose.motions) ** 2
+    square = np.mean(power[:, 0] + 2.0 * power[:, 1:].sum(axis=1), axis=0)
+    return np.asarray(3.0 * np.maximum(k3, 0.0) * square)
+
+
 def measured_torques(
     joints: tuple[str, ...], tau: Complex, w: Array, values: Mapping[str, float]
 ) -> tuple[Complex, dict[str, Complex]]:
