@@ -14,7 +14,7 @@ from jointscope.graphs.frequency.linear_responses import STIFFNESSES, ResponseCo
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, with_look_alikes
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
-from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information
+from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information, prior_pull
 from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis, hypotheses
@@ -72,9 +72,8 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
     if result.frequency is not None:
         columns = ResponseColumns(robot, result.frequency.problems, effects)
         responses = columns.linear(0 if poses is None else poses.J.shape[1] - len(result.frequency.names))
-    tied = prior_information(robot, result.frequency.names) if poses is None and result.frequency else None
     parts: list[LinearKind] = [part for part in (poses, responses) if part is not None]
-    linear = LinearKinds(parts, poses.tied if poses is not None else np.asarray(tied))
+    linear = LinearKinds(parts, *_ties(result, poses))
     judge = EffectJudge(linear, len(effects))
     extras, found = [], []
     for hypothesis in effects:
@@ -89,6 +88,15 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
     alone = {part.kind: _alike(_spaces([part], linear, extras)) for part in parts} if len(parts) > 1 else {}
     found = with_look_alikes(found, alone, _alike(_spaces(parts, linear, extras)))
     return sorted(found, key=lambda c: -c.evidence)
+
+
+def _ties(result: Calibrated, poses: LinearPoses | None) -> tuple[Array, Array]:
+    """Information and slope of the cost by priors and known distances."""
+    if poses is not None:
+        return poses.tied, poses.pull
+    assert result.frequency is not None
+    robot, names = result.robot, result.frequency.names
+    return prior_information(robot, names), prior_pull(robot, names)
 
 
 def _with_responses(

@@ -68,22 +68,17 @@ class LinearKinds:
     Attributes:
         parts: the kinds.
         tied: information on the columns from priors and known distances, shape (p, p).
+        pull: slope of the cost of these at the calibrated values, shape (p,).
     """
 
     parts: Sequence[LinearKind]
     tied: Array
-
-    def pull(self, extra: Mapping[str, Array]) -> Array:
-        """Slope of the cost of what ties them at the calibrated values, which that of the kinds balances, (p,).
-
-        It is the one that leaves them there as long as an effect is held at null.
-        """
-        p = len(self.tied)
-        slopes = [part.equations(extra.get(part.kind, np.zeros((0, 0))))[1][:p] for part in self.parts]
-        return -np.sum(slopes, axis=0)
+    pull: Array
 
     def fitted(self, extra: Mapping[str, Array], sigmas: Array, out: Out | None = None) -> tuple[Array, Array, float]:
-        """Step of all columns and of extra ones, shape (p + k,), its covariance, and the fall of chi2, ties included.
+        """Step of all columns and of extra ones, shape (p + k,), its covariance, and by how much chi2 falls.
+
+        The fall is that of an effect beyond a step of the others alone, which may be one where stages had not settled.
 
         Args:
             extra: whitened columns of an effect in each kind, shape (rows, k); a kind that it does nothing in may lack.
@@ -100,10 +95,11 @@ class LinearKinds:
             slope[there] += g
         H[:p, :p] += self.tied
         H[p:, p:] += np.diag(sigmas**-2.0)
-        slope[:p] += self.pull(extra)
+        slope[:p] += self.pull
         covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
         step = -covariance @ slope
-        return step, covariance, -float(slope @ step)
+        alone = float(slope[:p] @ np.linalg.solve(H[:p, :p], slope[:p]))
+        return step, covariance, -float(slope @ step) - alone
 
     def of(self, part: LinearKind, extra: Mapping[str, Array], step: Array) -> tuple[Array, Array]:
         """Columns of an effect in a kind, and what of a step it sees."""
