@@ -18,6 +18,7 @@ from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_
 from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis, hypotheses
+from jointscope.robots.geometry.error_parameters import WAVES
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -110,13 +111,14 @@ def _with_responses(
 
 
 def _needs_poses(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
-    """Whether frequency responses alone have nothing to say: no motion, or waves whose number poses tell."""
+    """Whether frequency responses alone have nothing to say: no motion, or waves, of which they see a scale."""
     moves = (
         hypothesis.kind.soft
         or hypothesis.owner in (*shaken, "robot")
         or hypothesis.kind.id in ("link_mass", "inertia_error")
     )
-    return FREQUENCY in hypothesis.kind.unseen or bool(hypothesis.kind.orders) or not moves
+    waves = bool(hypothesis.kind.orders) or hypothesis.kind.parts == WAVES
+    return FREQUENCY in hypothesis.kind.unseen or waves or not moves
 
 
 def _spaces(parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:

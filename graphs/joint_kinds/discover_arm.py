@@ -210,7 +210,8 @@ def _best(
             other = calibrated(begin, sessions, recordings, True, most, passes)
         except SolveError:
             continue  # an effect that takes the place of another one may have no end
-        found.append((_unlikely(other, result), candidate, other))
+        looks = 2.0 * float(np.log(max(len(candidate.hypothesis.kind.orders), 1)))
+        found.append((_unlikely(other, result) + looks, candidate, other))
     if not found:
         return None
     _, candidate, other = min(found, key=lambda each: each[0])

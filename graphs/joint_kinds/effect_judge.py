@@ -52,7 +52,7 @@ class ArmCandidate:
         score: fall of chi2 on all recordings.
         p_value: of that fall by chance, of the best one of as many orders or stiffnesses as were looked at.
         gains: what it is worth, by the kinds in which it does anything.
-        evidence: twice the logarithm of how much likelier left-out recordings become.
+        evidence: twice the logarithm of how much likelier left-out recordings become, the best of some looks as one.
         sizes, sigmas: of its parameters; of stiffnesses their compliances.
         look_alikes: labels of effects that would do the same here.
         verdict: missing, possible, absent or untestable.
@@ -112,6 +112,7 @@ class EffectJudge:
         step, covariance, score = linear.fitted(extra, sigmas)
         p_value = min(looks * float(gammaincc(0.5 * size, max(score, 0.0) / 2.0)), 1.0)
         gains, evidence = self._gains(extra, sigmas)
+        evidence -= 2.0 * float(np.log(looks))
         p = len(linear.tied)
         sizes, own = step[p:], np.sqrt(np.diag(covariance))[p:]
         possible = not kind.soft or (bool(np.all(sizes > -own)) and bool(np.any(sizes > own)))
