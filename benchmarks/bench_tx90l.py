@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE] [--folder DIR]; with `kinds` poses and frequency
+Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE] [--folder DIR] [--table]; with `kinds` poses and frequency
 responses in one graph, with `search` what is found with both, in sections of their own; an interrupted search goes on
 where it stopped. Recordings that another program simulated lie in ../shared/data; arms with effects are simulated by
 MuJoCo.
@@ -69,13 +69,18 @@ def main() -> None:
     parser.add_argument(
         "--folder", type=Path, default=folder, metavar="DIR", help=f"recordings and rows of `search`; {folder}"
     )
+    parser.add_argument("--table", action="store_true", help="of `search`: measure nothing, tell what is there")
     arguments = parser.parse_args()
     print(f"# Poses\n\n{environment()}\n")
     robot = load_robot("tx90l")
     found: dict[str, Any] = {}
     if arguments.part is not None:
         together = arguments.part == "kinds"
-        found |= kinds_rows(robot, DATA, _tell) if together else search_rows(robot, arguments.folder, _tell)
+        found |= (
+            kinds_rows(robot, DATA, _tell)
+            if together
+            else search_rows(robot, arguments.folder, _tell, not arguments.table)
+        )
         title = "in one graph" if together else "together: what is missing"
         write_section("\n".join([f"## Poses and frequency responses {title}", *TOLD]), arguments.part)
         _write(arguments.json, found)

@@ -91,9 +91,7 @@ def motor_effects(
     return MotorEffects(offsets, torques)
 
 
-def stiffer_drives(
-    arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex | None
-) -> Array | None:
+def stiffer_drives(arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex | None) -> Array | None:
     """What drives that harden are stiffer by on average, 3 k3 <d^2>, shape (nu,) [N m/rad]; None where none does."""
     k3 = np.array([values.get(f"{joint}.{CUBIC}", 0.0) for joint in arm.joints])
     if x is None or not np.any(k3 > 0.0):
@@ -131,7 +129,7 @@ def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
 
 
 def _rates(pose: ShakenPose) -> Complex:
-    """j w of all lines, shape (K,) [rad/s]."""
+    """J w of all lines, shape (K,) [rad/s]."""
     return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(pose.motions.shape[1]))
 
 

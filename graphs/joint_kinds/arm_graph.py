@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_graph import CalibrationGraph
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
-from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.solving.estimate import Estimate
@@ -27,8 +26,7 @@ def arm_graph(result: ArmCalibration) -> CalibrationGraph:
         result: of `calibrate_kinds`, `calibrate_poses` or `calibrate_frequency`.
     """
     if isinstance(result, FrequencyCalibration):
-        at = Calibration.of(result.robot).only([DYNAMICS])
-        return _graph([FrequencySummary.of(result.problems, at)], [at])
+        return _graph([result.summary], [Calibration.of(result.robot).only([DYNAMICS])])
     poses = result.poses if isinstance(result, KindsCalibration) else result
     problems: list[SetProblem] = list(poses.problems)
     calibrations = list(poses.calibrations)

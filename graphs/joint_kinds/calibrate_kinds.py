@@ -112,9 +112,8 @@ def calibrate_kinds(
     report("done", 1.0)
     seconds = time.perf_counter() - began
     found = tuple(problem.of_robot(poses.robot) for problem in problems)
-    frequency = FrequencyCalibration(
-        poses.robot, robot, found, poses.names, poses.covariance, iterations, stages, solution.cost, seconds, at.settled
-    )
+    told = poses.names, poses.covariance, iterations, stages, solution.cost, seconds, summary, at.settled
+    frequency = FrequencyCalibration(poses.robot, robot, found, *told)
     return KindsCalibration(poses.robot, poses, frequency, alone, summary, _agreement(alone, summary), seconds)
 
 
