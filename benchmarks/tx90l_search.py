@@ -22,6 +22,7 @@ from kept_rows import keep, known_rows
 
 import jointscope.graphs
 from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery, discover_arm
+from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.bags.at_poses.read_shaken import read_shaken
@@ -144,6 +145,7 @@ def search_rows(robot: Robot, folder: Path, tell: Tell, measure: bool = True) ->
             keep(results, now, known[case.name])
         row = known[case.name]
         added = ", ".join(row["added"]) or "nothing"
+        added = f"refused: {row['refused'].partition(';')[0]}" if "refused" in row else added
         tell(f"| {case.name} | {added} | {_sizes_said(row)} | {row['seconds']:.0f} |")
         rows.append(row)
     named = {case.name for case in CLEAN}
@@ -165,11 +167,15 @@ def search_rows(robot: Robot, folder: Path, tell: Tell, measure: bool = True) ->
 
 
 def row_of(robot: Robot, case: Case, folder: Path) -> dict[str, Any]:
-    """Simulates and searches one arm."""
+    """Simulates and searches one arm; recordings that are refused are no find."""
     poses, recordings = kept(robot, case, folder)
     began = time.perf_counter()
-    found = discover_arm(robot, [poses], recordings=recordings)
-    return judged(case, found) | {"seconds": time.perf_counter() - began}
+    try:
+        row = judged(case, discover_arm(robot, [poses], recordings=recordings))
+    except JointscopeError as err:
+        row = dict.fromkeys(("alike", "first", "held"), False) | {"name": case.name, "effects": list(case.effects)}
+        row |= {"added": [], "look_alikes": [], "sizes": {}, "refused": str(err).partition(": ")[2]}
+    return row | {"seconds": time.perf_counter() - began}
 
 
 def kept(robot: Robot, case: Case, folder: Path) -> tuple[Poses, list[Any]]:
