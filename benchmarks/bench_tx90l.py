@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE]; with `kinds` poses and frequency responses in
-one graph, with `search` what is found with both, in sections of their own. Recordings that another program simulated
-lie in ../shared/data; arms with effects are simulated by MuJoCo.
+Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE] [--folder DIR] [--table]
+
+With `kinds` poses and frequency responses in one graph, with `search` what is found with both, in sections of their
+own; an interrupted search goes on where it stopped. Recordings that another program simulated lie in ../shared/data;
+arms with effects are simulated by MuJoCo.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -17,7 +20,8 @@ from typing import Any
 import numpy as np
 from measured_page import environment, write_section
 from tx90l_frequency import frequency_rows
-from tx90l_kinds import kinds_rows, search_rows
+from tx90l_kinds import kinds_rows
+from tx90l_search import search_rows
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.joint_kinds.discover_arm import discover_arm
@@ -62,13 +66,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
     parser.add_argument("part", nargs="?", choices=["kinds", "search"], help="measure this alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
+    folder = Path(tempfile.gettempdir()) / "jointscope-bench-tx90l"
+    parser.add_argument(
+        "--folder", type=Path, default=folder, metavar="DIR", help=f"recordings and rows of `search`; {folder}"
+    )
+    parser.add_argument("--table", action="store_true", help="of `search`: measure nothing, tell what is there")
     arguments = parser.parse_args()
     print(f"# Poses\n\n{environment()}\n")
     robot = load_robot("tx90l")
     found: dict[str, Any] = {}
     if arguments.part is not None:
         together = arguments.part == "kinds"
-        found |= kinds_rows(robot, DATA, _tell) if together else search_rows(robot, _tell)
+        found |= (
+            kinds_rows(robot, DATA, _tell)
+            if together
+            else search_rows(robot, arguments.folder, _tell, not arguments.table)
+        )
         title = "in one graph" if together else "together: what is missing"
         write_section("\n".join([f"## Poses and frequency responses {title}", *TOLD]), arguments.part)
         _write(arguments.json, found)

@@ -22,6 +22,7 @@ from jointscope.graphs.gtsam_solvers.reference_graph import (
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.set_problem import Problem, motions_only
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -37,12 +38,14 @@ class CalibrationGraph:
         keys: of the shared blocks by name ("dynamics", "imu1.rotation", "imu1.bias", of a second recording
             "imu1.bias (bag 2)"), then of the states by recording and time ("x 12.000 s", "x 0.500 s (bag 2)").
         like: any calibration of the robot; gives names and kinds of the parameters.
+        kinds: of the recordings of the first factors, "motion", "rests", "poses" or "frequency"; the others are priors.
     """
 
     graph: gtsam.NonlinearFactorGraph
     values: gtsam.Values
     keys: Mapping[str, int]
     like: Calibration
+    kinds: tuple[str, ...] = ()
 
     @staticmethod
     def of(result: CalibrationResult, per_sample: bool = False) -> CalibrationGraph:
@@ -52,17 +55,37 @@ class CalibrationGraph:
             result: what `calibrate` returned.
             per_sample: one factor for every sample instead of condensed ones; GTSAM's optimizers then take a time that
                 grows with the square of the samples, as they copy all values for each of their callbacks.
+
+        Raises:
+            SolveError: a factor for every sample, and recordings of other kinds than motion.
         """
         robot = replace(result.robot, noise=result.noise)  # the file's is that of a filter, with standstills
-        problems = [BagProblem.of(robot, bag.recording) for bag in result.bags]
-        estimate = Estimate(tuple(bag.states for bag in result.bags), tuple(bag.calibration for bag in result.bags))
-        if per_sample:
-            graph, values = nonlinear_graph(problems, estimate), initial_values(estimate)
-        else:
-            condensed, values = CondensedGraph.of(problems, estimate)
-            graph = condensed.graph
+        motion = [BagProblem.of(robot, bag.recording) for bag in result.bags]
+        problems: list[Problem] = [*motion, *(other.of_robot(robot) for other, _, _ in result.sets)]
+        estimate = Estimate(
+            tuple(bag.states for bag in result.bags) + tuple(x for _, x, _ in result.sets),
+            tuple(bag.calibration for bag in result.bags) + tuple(known for *_, known in result.sets),
+        )
+        if not per_sample:
+            return CalibrationGraph.of_problems(problems, estimate)
+        motion = motions_only(problems, "a factor for every sample (per_sample)")
+        graph, values = nonlinear_graph(motion, estimate), initial_values(estimate)
         keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
         return CalibrationGraph(graph, values, keys, estimate.calibrations[0])
+
+    @staticmethod
+    def of_problems(problems: Sequence[Problem], estimate: Estimate) -> CalibrationGraph:
+        """The graph of recordings of any kinds, one condensed factor for each that is no motion.
+
+        Args:
+            problems: the recordings.
+            estimate: where their calibration ended.
+        """
+        condensed, values = CondensedGraph.of(problems, estimate)
+        keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
+        names = ["motion" if isinstance(problem, BagProblem) else problem.kind for problem in problems]
+        kinds = [name for name, cuts in zip(names, condensed.stretches, strict=True) for _ in cuts]
+        return CalibrationGraph(condensed.graph, values, keys, estimate.calibrations[0], tuple(kinds))
 
     def coordinate(self, parameter: str) -> int:
         """Place of a parameter in the block "dynamics", which holds positive ones as logarithms.
@@ -148,7 +171,8 @@ class CalibrationGraph:
         for i in range(self.graph.size()):
             factor = self.graph.at(i)
             touched = [names.get(key, gtsam.DefaultKeyFormatter(key)) for key in factor.keys()]
-            lines.append(f"{i:4d}  {factor.dim()} rows: {', '.join(touched)}")
+            kind = self.kinds[i] if i < len(self.kinds) and len(set(self.kinds)) > 1 else ""
+            lines.append(f"{i:4d}  {factor.dim()} rows{kind and f' of {kind}'}: {', '.join(touched)}")
         return "\n".join(lines)
 
     def _check_keys(self, values: gtsam.Values) -> None:
@@ -171,9 +195,11 @@ def _block_keys(calibrations: Sequence[Calibration], values: gtsam.Values) -> di
     return keys
 
 
-def _state_keys(problems: Sequence[BagProblem], values: gtsam.Values) -> dict[str, int]:
+def _state_keys(problems: Sequence[Problem], values: gtsam.Values) -> dict[str, int]:
     keys = {}
     for bag, problem in enumerate(problems):
+        if not isinstance(problem, BagProblem):
+            continue  # its states are inside its factor
         behind = "" if bag == 0 else f" (bag {bag + 1})"
         for tick, time in enumerate(problem.timeline.ticks.tolist()):
             key = state_key(tick, bag)

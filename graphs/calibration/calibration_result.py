@@ -173,7 +173,7 @@ class CalibrationResult:
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         lacking: effects of the catalogue that the recordings ask for, surest first.
         derived: results in other words and units, which follow from the parameters.
-        sets: recordings of other kinds with their states.
+        sets: recordings of other kinds with their states and the blocks that they touch.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
@@ -203,7 +203,7 @@ class CalibrationResult:
     lacking: tuple[LackingEffect, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
-    sets: tuple[tuple[SetProblem, Array], ...] = ()
+    sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
     saturated: str = ""
 

@@ -116,7 +116,8 @@ def summarize(
     bags = tuple(_bag_fit(solved, i, c, factor) for i, c in enumerate(collected))
     names = shared_names(solution.estimate.calibrations, shared)
     sigmas = np.sqrt(np.diag(covariance))
-    calibration = solution.estimate.calibrations[0]
+    at, motions = solution.estimate, len(solved.problems)
+    calibration = at.calibrations[0]
     parameters = parameter_table(robot, calibration, sigmas, shared)
     weak = () if hold else weak_directions(robot, calibration, shared, covariance)
     correlation = covariance / np.maximum(np.outer(sigmas, sigmas), 1e-300)
@@ -132,7 +133,7 @@ def summarize(
         channels=_channels(solved.robot, bags),
         noise=noise,
         derived=derived_results(robot, calibration, covariance),
-        sets=tuple(zip(solved.sets, solution.estimate.states[len(solved.problems) :], strict=True)),
+        sets=tuple(zip(solved.sets, at.states[motions:], at.calibrations[motions:], strict=True)),
         sigma_inflation=dict(zip(names, map(float, factor), strict=True)),
         iterations=iterations,
         cost=solution.cost,

@@ -50,6 +50,7 @@ class FrequencyCalibration:
         stages: how many there were.
         cost: at the end.
         wall_seconds: of the whole.
+        summary: the responses as one factor.
         settled: whether the stages came to rest; where they did not, the model lacks something that matters.
     """
 
@@ -62,6 +63,7 @@ class FrequencyCalibration:
     stages: int
     cost: float
     wall_seconds: float
+    summary: FrequencySummary
     settled: bool = True
 
     @property
@@ -159,5 +161,6 @@ def calibrate_frequency(
         stages=found_at.stages,
         cost=solution.cost,
         wall_seconds=time.perf_counter() - began,
+        summary=summary,
         settled=found_at.settled,
     )

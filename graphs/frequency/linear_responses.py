@@ -6,7 +6,9 @@ there has its resonance among the lines, where no slope at null tells of it: its
 a whole spring, on a grid of stiffnesses, over its compliance.
 
 Neighbouring lines have causes in common, which the residuals show: slopes of bands make the covariance S of the whole
-slope, and the information that counts is A S^-1 A, as in `FrequencySummary`. Folds are realisations of each pose.
+slope, and the information that counts is A S^-1 A, as in `FrequencySummary`. The residuals are those that the columns
+leave, an effect's own included: an effect that matters would else count as the noise that hides it, and may come out
+with the wrong sign. Folds are realisations of each pose.
 """
 
 from __future__ import annotations
@@ -64,58 +66,45 @@ class LinearResponses:
 
     def equations(self, extra: Array, out: int | None = None) -> tuple[Array, Array]:
         """As `LinearKind` says."""
-        kept = [fold for fold in range(self.folds) if fold != out]
-        A, slopes = self._sums(extra)
-        A, slopes = A[kept].sum(axis=0), slopes[kept].sum(axis=0)
+        if extra.size and self._latest[0] is not extra:
+            self._latest[:] = [extra, np.hstack([self.J, extra]), {}]
+        wide, known = (self._latest[1], self._latest[2]) if extra.size else (self.J, self._plain)
+        if out not in known:
+            known[out] = self._balanced(wide, self.fold_of != out if out is not None else None)
+        found: tuple[Array, Array] = known[out]
+        return found
+
+    def _balanced(self, wide: Array, kept: NDArray[np.bool_] | None) -> tuple[Array, Array]:
+        """Information that counts and slope of the cost, of all rows or of those that are kept."""
+        r, used = (self.r, wide) if kept is None else (self.r[kept], wide[kept])
+        A, slope = used.T @ used, used.T @ r
         unit = np.sqrt(np.maximum(np.diag(A), 1e-300))
         size, V = np.linalg.eigh(A / np.outer(unit, unit))
         told = size > TOLD * size[-1]
         root = V[:, told] / np.sqrt(size[told]) / unit[:, None]  # A^-1/2 on what is told
-        bands = slopes @ root
+        half = V[:, told] * np.sqrt(size[told]) * unit[:, None]
+        slope = root.T @ slope
+        left = self.r - wide @ (root @ slope)  # what all columns together leave: what they ask for is no noise
+        left = left if kept is None else left * kept
+        bands = np.add.reduceat(wide * left[:, None], self._begins, axis=0) @ root
         common, U = np.linalg.eigh(bands.T @ bands)
         inverse = (U / np.maximum(common, 1.0)) @ U.T
-        half = V[:, told] * np.sqrt(size[told]) * unit[:, None]
-        return half @ inverse @ half.T, half @ inverse @ bands.sum(axis=0)
-
-    def _sums(self, extra: Array) -> tuple[Array, Array]:
-        """Information and slopes of bands of each fold, shapes (f, p + k, p + k) and (f, b, p + k)."""
-        if not extra.size:
-            return self._own
-        if self._latest[0] is not extra:
-            p, k = self.J.shape[1], extra.shape[1]
-            A, slopes = (np.pad(each, pad) for each, pad in zip(
-                self._own, (((0, 0), (0, k), (0, k)), ((0, 0), (0, 0), (0, k))), strict=True))  # fmt: skip
-            for fold, rows in enumerate(self._rows):
-                X = extra[rows]
-                A[fold, :p, p:] = self.J[rows].T @ X
-                A[fold, p:, :p], A[fold, p:, p:] = A[fold, :p, p:].T, X.T @ X
-                slopes[fold, :, p:] = self._by_band(X, rows)
-            self._latest[:] = [extra, (A, slopes)]
-        return self._latest[1]
+        return half @ inverse @ half.T, half @ (inverse @ slope)
 
     @cached_property
-    def _rows(self) -> list[NDArray[np.intp]]:
-        return [np.flatnonzero(self.fold_of == fold) for fold in range(self.folds)]
+    def _begins(self) -> NDArray[np.intp]:
+        """First row of each band."""
+        return np.flatnonzero(np.diff(self.band, prepend=-1))
 
     @cached_property
-    def _own(self) -> tuple[Array, Array]:
-        A = np.array([self.J[rows].T @ self.J[rows] for rows in self._rows])
-        return A, np.array([self._by_band(self.J[rows], rows) for rows in self._rows])
+    def _plain(self) -> dict[int | None, tuple[Array, Array]]:
+        """Equations without other columns, by the fold that is left out."""
+        return {}
 
     @cached_property
     def _latest(self) -> list[Any]:
-        """The columns that were asked for last, and their sums: folds ask one after the other."""
-        return [None, None]
-
-    def _by_band(self, columns: Array, rows: NDArray[np.intp]) -> Array:
-        found = np.zeros((int(self.band.max()) + 1, columns.shape[1]))
-        np.add.at(found, self.band[rows], columns * self.r[rows, None])
-        return found
-
-    def fall(self, extra: Array, step: Array) -> float:
-        """As `LinearKind` says; of chi2 with the information that counts."""
-        A, g = self.equations(extra)
-        return float(-step @ (2.0 * g + A @ step))
+        """The columns that were asked for last, all columns, and their equations: folds ask one after the other."""
+        return [None, self.J, {}]
 
     def left_out(self, extra: Array, step: Array, fold: int) -> float:
         """As `LinearKind` says."""

@@ -2,10 +2,11 @@
 """What drives and motors do that is not linear, as the motion that was measured makes them do it.
 
 A wave of a gear and a spring that hardens are an offset u between motor and link, whose torque then is that of the
-spring turned by it; a wave also levers the torque that is passed on. Friction laws are torques p of the motor:
+spring turned by it; a wave also levers the torque that is passed on. One of an encoder (o = 1) moves the rotor, too:
+a scale of the angle of 1 + 1e-4, which is as large as sigmas of drives. Friction laws are torques p of the motor:
 
     u = c cos(o q) + s sin(o q),    -k3 d^3 / k
-    p = pull u'(q),      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
+    p = pull u'(q),      J u'' + f u',      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
 
 with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
 parameter, along the motion of the stage before; measured torques that are late or scaled are linear at every line.
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
+from jointscope.robots.files.frequency_section import VISCOUS
 from jointscope.robots.geometry.error_parameters import (
     CUBIC,
     LOAD_FRICTION,
@@ -28,6 +30,7 @@ from jointscope.robots.geometry.error_parameters import (
     STRIBECK,
     TORQUE_DELAY,
     TORQUE_SHARE,
+    WAVES,
 )
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 
@@ -76,13 +79,26 @@ def motor_effects(
         laws = list(_laws(joint, values))
         if not laws:
             continue
-        motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
+        motion, s = _Motion.of(arm, pose, values, x, i, sharpness[i]), _rates(pose)
+        rotor = s * s * values[f"{joint}.inertia"] + s * values.get(f"{joint}.{VISCOUS}", 0.0)
         for part in laws:
             u, p = motion.does(part, joint, values)
             for found, wave in ((offsets, u), (torques, p)):
                 if wave is not None:
                     found[f"{joint}.{part}"] = i, motion.lines(wave)
+            if part in WAVES:
+                torques[f"{joint}.{part}"] = i, rotor * offsets[f"{joint}.{part}"][1]
     return MotorEffects(offsets, torques)
+
+
+def stiffer_drives(arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex | None) -> Array | None:
+    """What drives that harden are stiffer by on average, 3 k3 <d^2>, shape (nu,) [N m/rad]; None where none does."""
+    k3 = np.array([values.get(f"{joint}.{CUBIC}", 0.0) for joint in arm.joints])
+    if x is None or not np.any(k3 > 0.0):
+        return None
+    power = np.abs(x[:, :, arm.driven] - pose.motions) ** 2
+    square = np.mean(power[:, 0] + 2.0 * power[:, 1:].sum(axis=1), axis=0)
+    return np.asarray(3.0 * np.maximum(k3, 0.0) * square)
 
 
 def measured_torques(
@@ -107,9 +123,14 @@ def measured_torques(
 
 
 def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
-    for part in (*RIPPLE[:2], CUBIC, STRIBECK, LOAD_FRICTION):
+    for part in (*WAVES, *RIPPLE[:2], CUBIC, STRIBECK, LOAD_FRICTION):
         if f"{joint}.{part}" in values:
             yield part
+
+
+def _rates(pose: ShakenPose) -> Complex:
+    """J w of all lines, shape (K,) [rad/s]."""
+    return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(pose.motions.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -131,7 +152,7 @@ class _Motion:
         m, spring = pose.motions[:, :, i], arm.springs[arm.driven[i]]
         K = m.shape[1]
         count = next_fast_len(FINER * K, real=True)
-        s = 2j * np.pi * pose.found.excitation.f0 * np.arange(K)
+        s = _rates(pose)
         d = x[:, :, arm.driven[i]] - m
         kappa = arm.dynamic(np.asarray(s.imag, dtype=np.float64), values)[:, arm.driven[i]]
         q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, s * m, d, -kappa * d))
@@ -142,11 +163,11 @@ class _Motion:
 
     def does(self, part: str, joint: str, values: Mapping[str, float]) -> tuple[Array | None, Array | None]:
         """Offset and torque of unit size."""
-        if part in RIPPLE[:2]:
-            order = values[f"{joint}.{RIPPLE[2]}"]
+        if part in (*WAVES, *RIPPLE[:2]):
+            order = 1.0 if part in WAVES else values[f"{joint}.{RIPPLE[2]}"]
             c, s = np.cos(order * self.q), np.sin(order * self.q)
-            wave, slope = (c, -order * s) if part == RIPPLE[0] else (s, order * c)
-            return wave, self.pull * slope
+            wave, slope = (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
+            return wave, None if part in WAVES else self.pull * slope
         if part == CUBIC:
             return -(self.d**3) / self.stiffness, None
         turn = np.tanh(self.sharpness * self.v)

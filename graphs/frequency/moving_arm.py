@@ -55,6 +55,7 @@ def moving_arm(
     values: Mapping[str, float],
     begin: Complex | None = None,
     offset: Complex | float = 0.0,
+    stiffer: Array | None = None,
 ) -> MovingArm:
     """The arm of a pose under the motion that was measured.
 
@@ -64,6 +65,8 @@ def moving_arm(
         values: of all parameters by name.
         begin: the arm's motion at values nearby, shape (b, K, n) [rad]; None for that of the motors.
         offset: of the drives, shape (b, K, nu) [rad].
+        stiffer: what drives that harden are stiffer by about `begin`, for which their offset was found, shape (nu,)
+            [N m/rad].
     """
     K, f0 = pose.motion.shape[1], pose.found.excitation.f0
     w = np.asarray(2.0 * np.pi * f0 * np.arange(K), dtype=np.float64)
@@ -72,6 +75,10 @@ def moving_arm(
     own, driven = kappa[:, arm.driven], arm.driven
     m = pose.motions
     turned = m + offset
+    if begin is not None and stiffer is not None:  # the same torque there, and its slope
+        turned = begin[:, :, driven] + (turned - begin[:, :, driven]) * own / (own + stiffer)
+        kappa[:, driven] += stiffer
+        own = kappa[:, driven]
     pull = np.zeros((*m.shape[:2], kappa.shape[1]), dtype=complex)
     pull[:, :, driven] = own * turned
     x = np.zeros_like(pull)

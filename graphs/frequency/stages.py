@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
-from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_torques, motor_effects
+from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_torques, motor_effects, stiffer_drives
 from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
@@ -96,7 +96,8 @@ def _moving(
     pose, arm, lines, x = before.pose, before.arm, before.pose.lines, before.stage.x
     shape = pose.motions.shape
     known = None if x is None else motor_effects(arm, pose, values, sharpness, x)
-    moving = moving_arm(arm, pose, values, x, 0.0 if known is None else known.offset(values, shape))
+    offset = 0.0 if known is None else known.offset(values, shape)
+    moving = moving_arm(arm, pose, values, x, offset, stiffer_drives(arm, pose, values, x))
     effects = motor_effects(arm, pose, values, sharpness, moving.x)
     beside = pose.both_signs(effects.torque(values, shape))
     standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, lines])

@@ -14,10 +14,11 @@ from jointscope.graphs.frequency.linear_responses import STIFFNESSES, ResponseCo
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, with_look_alikes
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
-from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information
+from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information, prior_pull
 from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis, hypotheses
+from jointscope.robots.geometry.error_parameters import WAVES
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -72,9 +73,8 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
     if result.frequency is not None:
         columns = ResponseColumns(robot, result.frequency.problems, effects)
         responses = columns.linear(0 if poses is None else poses.J.shape[1] - len(result.frequency.names))
-    tied = prior_information(robot, result.frequency.names) if poses is None and result.frequency else None
     parts: list[LinearKind] = [part for part in (poses, responses) if part is not None]
-    linear = LinearKinds(parts, poses.tied if poses is not None else np.asarray(tied))
+    linear = LinearKinds(parts, *_ties(result, poses))
     judge = EffectJudge(linear, len(effects))
     extras, found = [], []
     for hypothesis in effects:
@@ -91,6 +91,15 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
     return sorted(found, key=lambda c: -c.evidence)
 
 
+def _ties(result: Calibrated, poses: LinearPoses | None) -> tuple[Array, Array]:
+    """Information and slope of the cost by priors and known distances."""
+    if poses is not None:
+        return poses.tied, poses.pull
+    assert result.frequency is not None
+    robot, names = result.robot, result.frequency.names
+    return prior_information(robot, names), prior_pull(robot, names)
+
+
 def _with_responses(
     judge: EffectJudge, columns: ResponseColumns, hypothesis: ArmHypothesis, extra: Mapping[str, Array], looks: int
 ) -> tuple[dict[str, Array], int]:
@@ -102,13 +111,14 @@ def _with_responses(
 
 
 def _needs_poses(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
-    """Whether frequency responses alone have nothing to say: no motion, or waves whose number poses tell."""
+    """Whether frequency responses alone have nothing to say: no motion, or waves, of which they see a scale."""
     moves = (
         hypothesis.kind.soft
         or hypothesis.owner in (*shaken, "robot")
         or hypothesis.kind.id in ("link_mass", "inertia_error")
     )
-    return FREQUENCY in hypothesis.kind.unseen or bool(hypothesis.kind.orders) or not moves
+    waves = bool(hypothesis.kind.orders) or hypothesis.kind.parts == WAVES
+    return FREQUENCY in hypothesis.kind.unseen or waves or not moves
 
 
 def _spaces(parts: Sequence[LinearKind], linear: LinearKinds, extras: Sequence[Mapping[str, Array]]) -> list[Array]:

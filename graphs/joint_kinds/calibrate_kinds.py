@@ -2,7 +2,8 @@
 """Geometry, drives and bearings of an arm from poses and frequency responses in one graph.
 
 First the stages of the responses with the poses in the same graph; then the passes of the poses over outliers and
-repeatability with the responses as the Gaussian factor that holds what is in doubt. Both again where poses change.
+repeatability with the responses as the Gaussian factor that holds what is in doubt. Both again where poses change, from
+the values and the stage that were found.
 """
 
 from __future__ import annotations
@@ -76,6 +77,7 @@ def calibrate_kinds(
     progress: Progress | None = None,
     near: bool = False,
     most: int = MOST_STAGES,
+    passes: int = MOST_PASSES,
 ) -> KindsCalibration:
     """Calibrates an arm from both kinds.
 
@@ -86,6 +88,7 @@ def calibrate_kinds(
         progress: called with a text and the share done.
         near: whether the values of the robot are near the end.
         most: number of stages.
+        passes: of stages and poses in turn, at the most.
 
     Raises:
         JointscopeError: as of both.
@@ -94,10 +97,10 @@ def calibrate_kinds(
     poses = alone = calibrate_poses(robot, sessions, report)
     base = alone.problems[0].robot
     first = [first_stage(base, ShakenPose.of(*recording)) for recording in recordings]
-    iterations = stages = 0
-    for _ in range(MOST_PASSES):
+    problems, iterations, stages = first, 0, 0
+    for i in range(passes):
         before = poses
-        at = settled_stages(first, list(poses.problems), report, near, most)
+        at = settled_stages(problems, list(poses.problems), report, near or i > 0, most)
         problems, solution = at.problems, at.solution
         iterations, stages = iterations + at.iterations, stages + at.stages
         summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])
@@ -105,12 +108,12 @@ def calibrate_kinds(
         moved = abs(np.log(poses.repeatability / before.repeatability))
         if moved < AGREES and poses.left_out == before.left_out:
             break
+        problems = [problem.of_robot(poses.robot) for problem in problems]
     report("done", 1.0)
     seconds = time.perf_counter() - began
     found = tuple(problem.of_robot(poses.robot) for problem in problems)
-    frequency = FrequencyCalibration(
-        poses.robot, robot, found, poses.names, poses.covariance, iterations, stages, solution.cost, seconds, at.settled
-    )
+    told = poses.names, poses.covariance, iterations, stages, solution.cost, seconds, summary, at.settled
+    frequency = FrequencyCalibration(poses.robot, robot, found, *told)
     return KindsCalibration(poses.robot, poses, frequency, alone, summary, _agreement(alone, summary), seconds)
 
 

@@ -19,7 +19,7 @@ from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, frequency_errors
 from jointscope.graphs.frequency.frequency_set import BAND
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candidates
-from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
+from jointscope.graphs.joint_kinds.calibrate_kinds import MOST_PASSES, calibrate_kinds
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, placed, squared_distances
@@ -37,6 +37,7 @@ Shaken = tuple[Signals, Excitation]
 Report = Callable[[str, float], None]
 MOST_STEPS = 8
 STAGES = 8  # of a model that may lack something, which need not come to rest
+RACE = 4  # stages after which leading effects are told apart: the first with the covariance of few lines
 LEADING, NEARLY = 3, 0.3  # effects that are calibrated for real, and their evidence over that of the best one
 
 
@@ -157,7 +158,14 @@ def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Rob
     return sorted(found, key=lambda c: -c.evidence), {c.hypothesis.label: robot for c, robot in screened}
 
 
-def calibrated(robot: Robot, sessions: Sequence[Poses], recordings: Sequence[Shaken], near: bool = False) -> Calibrated:
+def calibrated(
+    robot: Robot,
+    sessions: Sequence[Poses],
+    recordings: Sequence[Shaken],
+    near: bool = False,
+    most: int = STAGES,
+    passes: int = MOST_PASSES,
+) -> Calibrated:
     """Calibrates with what there is, in one graph.
 
     Args:
@@ -165,12 +173,14 @@ def calibrated(robot: Robot, sessions: Sequence[Poses], recordings: Sequence[Sha
         sessions: poses.
         recordings: of the arm shaken.
         near: whether its values are near the end.
+        most: number of stages.
+        passes: of stages and poses in turn.
     """
     if not recordings:
         return Calibrated(calibrate_poses(robot, sessions), None)
     if not sessions:
-        return Calibrated(None, calibrate_frequency(robot, recordings, near=near, most=STAGES))
-    both = calibrate_kinds(robot, recordings, sessions, near=near, most=STAGES)
+        return Calibrated(None, calibrate_frequency(robot, recordings, near=near, most=most))
+    both = calibrate_kinds(robot, recordings, sessions, near=near, most=most, passes=passes)
     return Calibrated(both.poses, both.frequency)
 
 
@@ -191,17 +201,23 @@ def _best(
     """The effect that makes the recordings likeliest, and the model with it; None where none of them does."""
     if not recordings:
         return leading[0], calibrated(_with(result.robot, leading[0]), sessions, ())
-    before, found = _unlikely(result, result), []
+    most, passes = (RACE, 1) if len(leading) > 1 else (STAGES, MOST_PASSES)
+    found = []
     for candidate in leading:
         report(f"calibrating with {candidate.hypothesis.label}", 0.5)
         begin = begins.get(candidate.hypothesis.label) or _with(result.robot, candidate)
         try:
-            other = calibrated(begin, sessions, recordings, near=True)
+            other = calibrated(begin, sessions, recordings, True, most, passes)
         except SolveError:
             continue  # an effect that takes the place of another one may have no end
-        found.append((_unlikely(other, result) - before, candidate, other))
-    best = min(found, key=lambda each: each[0], default=None)
-    return None if best is None or best[0] >= 0.0 else best[1:]
+        looks = 2.0 * float(np.log(max(len(candidate.hypothesis.kind.orders), 1)))
+        found.append((_unlikely(other, result) + looks, candidate, other))
+    if not found:
+        return None
+    _, candidate, other = min(found, key=lambda each: each[0])
+    if most < STAGES:
+        other = calibrated(other.robot, sessions, recordings, near=True)
+    return (candidate, other) if _unlikely(other, result) < _unlikely(result, result) else None
 
 
 def _unlikely(result: Calibrated, base: Calibrated) -> float:

@@ -52,7 +52,7 @@ class ArmCandidate:
         score: fall of chi2 on all recordings.
         p_value: of that fall by chance, of the best one of as many orders or stiffnesses as were looked at.
         gains: what it is worth, by the kinds in which it does anything.
-        evidence: twice the logarithm of how much likelier left-out recordings become.
+        evidence: twice the logarithm of how much likelier left-out recordings become, the best of some looks as one.
         sizes, sigmas: of its parameters; of stiffnesses their compliances.
         look_alikes: labels of effects that would do the same here.
         verdict: missing, possible, absent or untestable.
@@ -96,7 +96,6 @@ class EffectJudge:
 
     def __init__(self, linear: LinearKinds, count: int):
         self._linear, self._count = linear, count
-        self._base, _ = linear.fitted({}, np.zeros(0))
         self._before = self._left_out({}, np.zeros(0), linear.parts)
 
     def candidate(self, hypothesis: ArmHypothesis, extra: Mapping[str, Array], looks: int = 1) -> ArmCandidate:
@@ -110,10 +109,10 @@ class EffectJudge:
         linear, kind = self._linear, hypothesis.kind
         size = len(hypothesis.names)
         sigmas = np.full(size, kind.size)
-        step, covariance = linear.fitted(extra, sigmas)
-        score = sum(self._fall(part, extra, step) for part in linear.parts)
+        step, covariance, score = linear.fitted(extra, sigmas)
         p_value = min(looks * float(gammaincc(0.5 * size, max(score, 0.0) / 2.0)), 1.0)
         gains, evidence = self._gains(extra, sigmas)
+        evidence -= 2.0 * float(np.log(looks))
         p = len(linear.tied)
         sizes, own = step[p:], np.sqrt(np.diag(covariance))[p:]
         possible = not kind.soft or (bool(np.all(sizes > -own)) and bool(np.any(sizes > own)))
@@ -130,12 +129,7 @@ class EffectJudge:
 
     def score(self, hypothesis: ArmHypothesis, extra: Mapping[str, Array]) -> float:
         """Fall of chi2 alone."""
-        step, _ = self._linear.fitted(extra, np.full(len(hypothesis.names), hypothesis.kind.size))
-        return sum(self._fall(part, extra, step) for part in self._linear.parts)
-
-    def _fall(self, part: LinearKind, extra: Mapping[str, Array], step: Array) -> float:
-        none = np.zeros((0, 0))
-        return part.fall(*self._linear.of(part, extra, step)) - part.fall(none, self._base)
+        return self._linear.fitted(extra, np.full(len(hypothesis.names), hypothesis.kind.size))[2]
 
     def _gains(self, extra: Mapping[str, Array], sigmas: Array) -> tuple[dict[str, Gain], float]:
         parts = [part for part in self._linear.parts if part.kind in extra]
@@ -154,7 +148,7 @@ class EffectJudge:
         for part in parts:
             each = []
             for fold in range(part.folds):
-                step, _ = self._linear.fitted(extra, sigmas, (part.kind, fold))
+                step, _, _ = self._linear.fitted(extra, sigmas, (part.kind, fold))
                 each.append(part.left_out(*self._linear.of(part, extra, step), fold))
             found[part.kind] = np.array(each)
         return found

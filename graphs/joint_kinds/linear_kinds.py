@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -58,9 +57,6 @@ class LinearKind(Protocol):
             out: a fold that is left out.
         """
 
-    def fall(self, extra: Array, step: Array) -> float:
-        """By how much chi2 falls in a step of all columns."""
-
     def left_out(self, extra: Array, step: Array, fold: int) -> float:
         """Squared distances of a fold after a step that it was not fitted to [sigma^2]."""
 
@@ -72,19 +68,17 @@ class LinearKinds:
     Attributes:
         parts: the kinds.
         tied: information on the columns from priors and known distances, shape (p, p).
+        pull: slope of the cost of these at the calibrated values, shape (p,).
     """
 
     parts: Sequence[LinearKind]
     tied: Array
+    pull: Array
 
-    @cached_property
-    def pull(self) -> Array:
-        """Slope of the cost of what ties them at the calibrated values, which that of the kinds balances, (p,)."""
-        nothing = {part.kind: np.zeros((0, 0)) for part in self.parts}
-        return -np.sum([part.equations(nothing[part.kind])[1] for part in self.parts], axis=0)
+    def fitted(self, extra: Mapping[str, Array], sigmas: Array, out: Out | None = None) -> tuple[Array, Array, float]:
+        """Step of all columns and of extra ones, shape (p + k,), its covariance, and by how much chi2 falls.
 
-    def fitted(self, extra: Mapping[str, Array], sigmas: Array, out: Out | None = None) -> tuple[Array, Array]:
-        """Step of all columns and of extra ones, shape (p + k,), and its covariance.
+        The fall is that of an effect beyond a step of the others alone, which may be one where stages had not settled.
 
         Args:
             extra: whitened columns of an effect in each kind, shape (rows, k); a kind that it does nothing in may lack.
@@ -103,7 +97,9 @@ class LinearKinds:
         H[p:, p:] += np.diag(sigmas**-2.0)
         slope[:p] += self.pull
         covariance = np.asarray(np.linalg.inv(H), dtype=np.float64)
-        return -covariance @ slope, covariance
+        step = -covariance @ slope
+        alone = float(slope[:p] @ np.linalg.solve(H[:p, :p], slope[:p]))
+        return step, covariance, -float(slope @ step) - alone
 
     def of(self, part: LinearKind, extra: Mapping[str, Array], step: Array) -> tuple[Array, Array]:
         """Columns of an effect in a kind, and what of a step it sees."""

@@ -2,8 +2,9 @@
 """Springs that a model lacks where it is so wrong that no linear step from it tells which.
 
 A joint or bearing that gives way with its resonance among the lines drives all other springs to values that have no
-meaning, and from there its own slope is not the way back. So each spring of a joint that is locked is put in at the
-values with which the calibration began, and a few stages are solved: how much likelier the recordings become tells.
+meaning, and from there its own slope is not the way back; nor is that of a drive that hardens so much that it has
+another stiffness in every pose. So each spring of a joint that is locked, and the hardening of each drive, is put in at
+the values with which the calibration began, and a few stages are solved: how much likelier the recordings become tells.
 """
 
 from __future__ import annotations
@@ -23,9 +24,11 @@ from jointscope.graphs.frequency.stages import first_stage
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, Gain
 from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import FREQUENCY, ArmHypothesis
+from jointscope.robots.geometry.error_parameters import CUBIC, STIFFNESS
 from jointscope.robots.model.robot import Robot
 
 BEGIN = 5e4  # [N m/rad] of a spring that is put in
+HARDENS = 1e-3  # [rad] of deflection at which a drive that hardens begins with twice its stiffness
 ANSWERED, SURE = 0.5, 5.0  # share of what is left in a band that answers the excitation, and its sigmas
 LEAST = 30.0  # of twice the logarithm of the likelihood, a band of lines counted as one
 
@@ -39,28 +42,43 @@ def badly_explained(found: Explained) -> bool:
 def screened_springs(
     result: FrequencyCalibration, candidates: Sequence[ArmCandidate]
 ) -> list[tuple[ArmCandidate, Robot]]:
-    """Springs of locked joints that make the recordings likelier, best first, each with a robot that begins with it.
+    """Springs of locked joints, and drives that harden, that make the recordings likelier, best first.
+
+    Each has a robot that begins with it.
 
     Args:
         result: of the model without them.
         candidates: what is known of all effects.
     """
     robot, poses = result.start, [problem.pose for problem in result.problems]
-    locked = [c for c in candidates if c.hypothesis.kind.soft and c.hypothesis.owner not in _shaken(robot)]
-    if not locked:
+    shaken = () if robot.frequency is None else robot.frequency.joints
+    tried_ones = [c for c in candidates if _is_tried(c.hypothesis, shaken)]
+    if not tried_ones:
         return []
     mixed, _, _ = logarithm_begin([first_stage(robot, pose) for pose in poses], [])
     robot = robot.with_values(dict(zip(mixed.names, mixed.values.tolist(), strict=True)))
     before, _ = _few_stages(robot, [first_stage(robot, pose) for pose in poses])
     found = []
-    for candidate in locked:
+    for candidate in tried_ones:
         hypothesis = candidate.hypothesis
-        other = with_effect(robot, hypothesis, dict.fromkeys(hypothesis.names, BEGIN))
+        other = with_effect(robot, hypothesis, dict.fromkeys(hypothesis.names, _begin(robot, hypothesis)))
         after, values = _few_stages(other, [first_stage(other, pose) for pose in poses])
         falls = [(b - a) / BAND for b, a in zip(before, after, strict=True)]
         if sum(falls) > LEAST:
             found.append((_with_fall(candidate, falls, values, result), values))
     return sorted(found, key=lambda each: -each[0].evidence)
+
+
+def _is_tried(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
+    if hypothesis.names == (f"{hypothesis.owner}.{CUBIC}",):
+        return hypothesis.owner in shaken
+    return hypothesis.kind.soft and hypothesis.owner not in shaken
+
+
+def _begin(robot: Robot, hypothesis: ArmHypothesis) -> float:
+    if hypothesis.kind.soft:
+        return BEGIN
+    return robot.parameters[f"{hypothesis.owner}.{STIFFNESS}"].value / (3.0 * HARDENS**2)
 
 
 def _few_stages(robot: Robot, problems: Sequence[FrequencySet]) -> tuple[list[float], Robot]:
@@ -76,7 +94,8 @@ def _with_fall(
     """The candidate with what its stages told; its sigmas are not known before it is calibrated."""
     hypothesis: ArmHypothesis = candidate.hypothesis
     fall, count = sum(falls), sum(problem.measured for problem in result.problems) / BAND
-    sizes = tuple(1.0 / robot.parameters[name].value for name in hypothesis.names)
+    values = [robot.parameters[name].value for name in hypothesis.names]
+    sizes = tuple(1.0 / value if hypothesis.kind.soft else value for value in values)
     gain = Gain(1.0 - float(np.exp(-fall / count)), sum(f > 0.0 for f in falls) / len(falls))
     return replace(
         candidate,
@@ -85,10 +104,6 @@ def _with_fall(
         evidence=fall,
         gains={**candidate.gains, FREQUENCY: gain},
         sizes=sizes,
-        sigmas=tuple(sizes),
+        sigmas=tuple(abs(size) for size in sizes),
         verdict="missing",
     )
-
-
-def _shaken(robot: Robot) -> tuple[str, ...]:
-    return () if robot.frequency is None else robot.frequency.joints

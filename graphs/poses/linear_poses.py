@@ -34,6 +34,7 @@ class LinearPoses:
         r: shape (3 m,) [sigma].
         J: columns of the values and of the points of contacts, shape (3 m, p).
         tied: information on the columns from priors and known distances, shape (p, p).
+        pull: slope of the cost of these, shape (p,).
         groups: number of the group of each pose, shape (m,).
         contacts: number of the contact of each pose, shape (m,); -1 where a tracker measured.
         whiten: of each pose, shape (m, 3, 3).
@@ -42,6 +43,7 @@ class LinearPoses:
     r: Array
     J: Array
     tied: Array
+    pull: Array
     groups: NDArray[np.intp]
     contacts: NDArray[np.intp]
     whiten: Array
@@ -54,7 +56,8 @@ class LinearPoses:
         pieces, names, held, size = [], list[str](), list[int](), len(result.names)
         total = size + 3 * sum(len(problem.contacts) for problem in result.problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
-        tied[:size, :size] = prior_information(result.robot, result.names)
+        tied[:size, :size], pull = prior_information(result.robot, result.names), np.zeros(total)
+        pull[:size] = prior_pull(result.robot, result.names)
         first = size
         for problem, calibration in zip(result.problems, result.calibrations, strict=True):
             index = calibration.columns[DYNAMICS]
@@ -64,8 +67,9 @@ class LinearPoses:
             W, r, J = _whitened(problem, calibration)
             wide = np.zeros((len(r), total))
             wide[:, place] = J
-            apart = problem.distances(calibration)[1]
+            off, apart = problem.distances(calibration)
             tied[np.ix_(place, place)] += apart.T @ apart
+            pull[place] += apart.T @ off
             number = {contact: (first - size) // 3 + i for i, contact in enumerate(problem.contacts)}
             held += [number[c] for c in problem.poses.contacts] or [-1] * len(problem.poses)
             names += problem.poses.groups
@@ -74,7 +78,7 @@ class LinearPoses:
         groups = {name: i for i, name in enumerate(dict.fromkeys(names))}
         r, J, W = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
         numbers = np.array([groups[name] for name in names])
-        return LinearPoses(r, J, tied, numbers, np.array(held), W)
+        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W)
 
     @cached_property
     def fold_of(self) -> NDArray[np.intp]:
@@ -134,6 +138,16 @@ class LinearPoses:
 def prior_information(robot: Robot, names: Sequence[str]) -> Array:
     """Of the priors on some parameters, shape (p, p)."""
     return np.diag([robot.parameters[name].coordinate_sigma ** -2.0 for name in names])
+
+
+def prior_pull(robot: Robot, names: Sequence[str]) -> Array:
+    """Slope of the cost of the priors on some parameters at the robot's values, shape (p,)."""
+    away = []
+    for name in names:
+        p = robot.parameters[name]
+        distance = np.log(p.value / p.prior) if p.positive else p.value - p.prior
+        away.append(distance / p.coordinate_sigma**2)
+    return np.array(away)
 
 
 def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:

@@ -66,13 +66,7 @@ class ArmEffectKind:
 
 
 KINDS = (
-    ArmEffectKind(
-        "encoder_eccentricity",
-        WAVES,
-        "rad",
-        1e-3,
-        unseen={FREQUENCY: "over a swing of some degrees a wave once per turn is a scale of the angle of 1 + 1e-4"},
-    ),
+    ArmEffectKind("encoder_eccentricity", WAVES, "rad", 1e-3),
     ArmEffectKind("gear_ripple", RIPPLE[:2], "rad", 1e-3, orders=tuple(range(2, 201))),
     ArmEffectKind("joint_elasticity", (STIFFNESS,), "N m/rad", 1e-4, soft=True),
     ArmEffectKind("bearing_flexibility", BEARING, "N m/rad", 3e-5, soft=True),

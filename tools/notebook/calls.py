@@ -18,12 +18,14 @@ from jointscope.graphs.discovery.discover import discover as discover_motion
 from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
+from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.transmission.calibrate_links import calibrate_links
 from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
+from jointscope.robots.errors import SolveError
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
@@ -215,14 +217,21 @@ def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replay
     return Replayed.of(replace(found, source=arrivals.source(found.recording_seconds, model.name)))
 
 
-def graph(result: CalibrationResult, per_sample: bool = False) -> CalibrationGraph:
+def graph(result: CalibrationResult | ArmCalibration, per_sample: bool = False) -> CalibrationGraph:
     """The GTSAM graph of a calibration.
 
     Args:
-        result: of `calibrate`.
-        per_sample: one factor for every sample, instead of one for every thousand.
+        result: of `calibrate`; also of `calibrate_poses`, `calibrate_frequency` and `calibrate_kinds`.
+        per_sample: one factor for every sample, instead of one for every thousand; of motion alone.
+
+    Raises:
+        SolveError: a factor for every sample, and recordings of other kinds than motion.
     """
-    return CalibrationGraph.of(result, per_sample)
+    if isinstance(result, CalibrationResult):
+        return CalibrationGraph.of(result, per_sample)
+    if per_sample:
+        raise SolveError("a factor for every sample (per_sample) takes recordings of motion only; leave it out")
+    return arm_graph(result)
 
 
 def simulate(

@@ -48,7 +48,7 @@ def rest_errors_text(by_label: Mapping[str, RestErrors], robots: Mapping[str, Ro
 
 def rests_beside_motion(result: CalibrationResult) -> str:
     """What rests say of a calibration with motion; empty without rests."""
-    problems = [problem.of_robot(result.robot) for problem, _ in result.sets if isinstance(problem, RestSet)]
+    problems = [problem.of_robot(result.robot) for problem, *_ in result.sets if isinstance(problem, RestSet)]
     if not problems:
         return ""
     errors, count = rest_errors(problems), sum(len(problem.rests) for problem in problems)

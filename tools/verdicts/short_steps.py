@@ -14,10 +14,11 @@ SHIFTED = 0.01  # of an inertia: what is called right is right within a percent
 
 def short_steps(result: CalibrationResult) -> tuple[str, str]:
     """Level and sentence."""
-    if result.inertia_shifts is None:
+    shifts = result.inertia_shifts
+    if shifts is None:
         return "info", "Not checked here."
-    worst = max(result.inertia_shifts, key=lambda name: abs(result.inertia_shifts[name]), default=None)
-    if worst is None or abs(result.inertia_shifts[worst]) < SHIFTED:
+    worst = max(shifts, key=lambda name: abs(shifts[name]), default="")
+    if not worst or abs(shifts[worst]) < SHIFTED:
         return "good", "Between two states the motion is as the integration has it."
     step = 1e3 * float(np.median(np.diff(result.bags[0].ticks)))
     joint = worst.rsplit(".", 1)[0]

@@ -27,7 +27,7 @@ def provenance(result: Any) -> dict[str, Any]:
 
 def other_kinds(result: Any) -> dict[str, Any]:
     """Rests that a calibration used beside motion."""
-    rests = [problem.rests for problem, _ in result.sets if problem.kind == "rests"]
+    rests = [problem.rests for problem, *_ in result.sets if problem.kind == "rests"]
     found = [{"path": each.path, "sha256": each.sha256, "count": len(each)} for each in rests]
     return {"rests": found} if found else {}
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from weighed_springs import WeighedSprings
 
+import jointscope as js
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.robots.errors import SolveError
 
 
 def test_weighings_make_the_stiffness_of_a_calibration_better_known(simulated, doggy):
@@ -27,3 +29,20 @@ def test_weighings_make_the_stiffness_of_a_calibration_better_known(simulated, d
     # every shared value has a name of its own, that of the dial's zero included
     assert len(set(result.names)) == len(result.names) == len(result.correlation)
     assert set(result.names) - set(without.names) == {"dial.zero.0"}
+
+
+def test_weighings_are_in_the_graph_of_a_calibration(simulated, doggy):
+    motion = simulated.recording.between(4.5, 5.5)
+    torques = np.linspace(-1.0, 3.0, 10)
+    dial = torques / simulated.truth["parameters"]["joint1.stiffness"] + 2e-3
+    result = calibrate(doggy, [motion], sets=[WeighedSprings(doggy, "joint1", torques, dial, (1e-6, 1e-6))])
+    g = js.graph(result)
+    assert "rows of weights: dynamics, dial.zero (bag 2)" in g.describe() and "rows of motion: x " in g.describe()
+    assert g.values.atVector(g.keys["dial.zero (bag 2)"])[0] == pytest.approx(2e-3, abs=1e-5)
+    found, sigmas = g.parameters(g.optimize()), g.sigmas(g.values)
+    for p in result.parameters:
+        if p.name in found:
+            assert found[p.name] == pytest.approx(p.value, abs=1e-2 * p.sigma)
+            assert sigmas[p.name] == pytest.approx(p.sigma / result.sigma_inflation[p.name], rel=1e-3)
+    with pytest.raises(SolveError, match="takes recordings of motion only; leave it out"):
+        js.graph(result, per_sample=True)

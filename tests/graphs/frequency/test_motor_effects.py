@@ -8,6 +8,8 @@ import pytest
 from shaken_arm import made_up
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.motor_effects import motor_effects, stiffer_drives
+from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage, with_columns
 from jointscope.robots.files.robot_file import load_robot
@@ -66,6 +68,29 @@ def test_the_column_of_an_effect_is_what_the_whole_balance_does(label, robot, po
     # columns are those of the arm that stands; a wave makes its lines by the motion that carries the excitation
     share = 0.15 if hypothesis.kind.orders else 0.05
     assert np.linalg.norm(moved - size * column) < share * np.linalg.norm(moved)
+
+
+def test_the_column_of_an_eccentric_encoder_is_what_it_does_beside_the_offset_that_poses_tell(robot, pose):
+    hypothesis, size, base = effect("encoder_eccentricity@joint2"), 1e-2, settled(robot, pose)
+    columns = with_columns(base, at_null(robot, [hypothesis])).stage.geometry
+    for name, wave in zip(hypothesis.names, (np.cos, np.sin), strict=True):
+        there = with_effect(robot, hypothesis, {n: size if n == name else 0.0 for n in hypothesis.names})
+        there = there.with_values({"joint2.offset": -size * float(wave(pose.q[1]))})
+        moved = balance(settled(there, pose, 3)) - balance(settled(robot, pose, 3))
+        assert np.linalg.norm(moved - size * columns[name]) < 0.1 * np.linalg.norm(moved)
+
+
+def test_an_arm_that_is_found_about_its_stiffness_under_load_is_the_same_arm(robot, pose):
+    hypothesis = effect("spring_cubic@joint2")
+    hardening = with_effect(robot, hypothesis, {hypothesis.names[0]: 5e9})
+    problem = settled(hardening, pose, 12)
+    arm, values, x = problem.arm, problem.stage.values, problem.stage.x
+    more = stiffer_drives(arm, pose, values, x)
+    assert more[1] > 1e-3 * values["joint2.stiffness"] and more[0] == more[2] == 0.0
+    effects = motor_effects(arm, pose, values, problem.sharpness(values), x)
+    offset = effects.offset(values, pose.motions.shape)
+    plain, about = (moving_arm(arm, pose, values, x, offset, each) for each in (None, more))
+    np.testing.assert_allclose(about.torques, plain.torques, atol=1e-5 * np.abs(plain.torques).max())
 
 
 def test_a_locked_joint_with_a_rigid_spring_is_a_locked_joint(robot, pose):

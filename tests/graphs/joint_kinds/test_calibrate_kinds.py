@@ -3,21 +3,28 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from shaken_arm import TX90L, truth
 
+import jointscope as js
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
 from jointscope.graphs.poses.calibrate_poses import placed
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
+from jointscope.robots.errors import SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
+ROOT = Path(__file__).parents[3]
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not TX90L.is_dir(), reason="shared/data/tx90l is not beside the project"),
@@ -75,3 +82,41 @@ def test_both_kinds_agree_and_the_poses_pay_for_the_responses(joint):
     alone, together = joint.pose_squares
     assert alone < together < 120.0
     assert not joint.poses.left_out
+
+
+def test_the_graph_of_both_kinds_is_printed_on_one_screen(capsys, tmp_path, monkeypatch):
+    for entry in TX90L.iterdir():
+        (tmp_path / entry.name).symlink_to(entry)
+    monkeypatch.chdir(tmp_path)
+    code, printed = re.findall(
+        r"<!-- executed by tests/graphs/joint_kinds/test_calibrate_kinds.py -->\n```python\n(.*?)```\n\n```\n(.*?)```",
+        (ROOT / "docs/gtsam.md").read_text(encoding="utf-8"),
+        re.DOTALL,
+    )[0]
+    exec(compile(code, "docs/gtsam.md", "exec"), {})
+    said = capsys.readouterr().out
+    assert said == printed
+    assert len(said.splitlines()) < 40
+
+
+def test_the_graph_of_both_kinds_has_the_values_and_sigmas_of_the_calibration(joint):
+    g = js.graph(joint)
+    sigmas, values = g.sigmas(g.values), g.parameters(g.optimize())
+    assert set(values) == {n for n, p in joint.robot.parameters.items() if not p.fixed}
+    for name, value in values.items():
+        p = joint.robot.parameters[name]
+        assert abs(value - p.value) < 0.02 * p.sigma, name
+        assert sigmas[name] == pytest.approx(p.sigma, rel=1e-3), name
+
+
+def test_the_graph_of_responses_alone_has_the_sigmas_of_their_calibration():
+    robot = load_robot("tx90l")
+    found = calibrate_frequency(robot, [read_shaken(TX90L / "frequency" / "frequency_P1", robot)])
+    g = js.graph(found)
+    sigmas = g.sigmas(g.values)
+    assert all(sigmas[name] == pytest.approx(found.robot.parameters[name].sigma, rel=1e-2) for name in found.told)
+
+
+def test_a_factor_for_every_sample_is_for_motion(joint):
+    with pytest.raises(SolveError, match="takes recordings of motion only; leave it out"):
+        js.graph(joint, per_sample=True)

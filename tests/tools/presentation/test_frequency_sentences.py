@@ -22,7 +22,7 @@ def found(*sigmas):
     springs = [SimpleNamespace(stiffness="joint2.stiffness", damping="joint2.damping")]
     problem = SimpleNamespace(arm=SimpleNamespace(springs=springs))
     covariance = np.diag(np.square(sigmas))
-    return FrequencyCalibration(robot, robot, (problem,), NAMES, covariance, 1, 1, 0.0, 0.0)
+    return FrequencyCalibration(robot, robot, (problem,), NAMES, covariance, 1, 1, 0.0, 0.0, None)
 
 
 def test_sharpness_that_is_known_says_nothing_and_all_springs_are_identifiable():

@@ -94,7 +94,15 @@ def test_a_torque_constant_scales_the_torque_that_is_told(robot, plain):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["backlash@joint3:half_gap=1e-3", "spring_cubic@joint3:stiffness=1e12"])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "backlash@joint3:half_gap=1e-3",
+        "spring_cubic@joint3:stiffness=1e12",
+        "motor_stribeck@joint3:torque=6",
+        "load_dependent_friction@joint3:coefficient=0.1",
+    ],
+)
 def test_what_is_not_linear_changes_the_motion(effect, robot, plain):
     (odd,), _, _ = shaken(robot, 1, effects=[effect])
     q = [r.signals.outputs.values[:, 2] - r.signals.outputs.values[:, 2].mean() for r in (plain, odd)]

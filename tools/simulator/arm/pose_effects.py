@@ -20,6 +20,8 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "payload": {"mass": 2.0},  # [kg] at the target
     "link_mass": {"mass": 2.0},  # [kg] more than in the URDF, at the centre of mass of the link behind the joint
     "torque_constant_error": {"share": 0.05},  # motors make that much more torque than they say
+    "motor_stribeck": {"torque": 6.0, "velocity": 0.02},  # [N m], [rad/s] dry friction's breakaway; nothing at rest
+    "load_dependent_friction": {"coefficient": 0.03},  # of what the drive passes on, as dry friction; nothing at rest
     "torque_delay": {"seconds": 1.0e-3},  # [s] by which the torques of all motors are late; nothing at rest
     "tracker_drift": {"x": 1.0e-4, "y": 0.0, "z": 5.0e-5},  # [m] from the first pose to the last
 }

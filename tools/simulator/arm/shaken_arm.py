@@ -60,6 +60,7 @@ class ShakenArm:
         self._smooth = self._each("coulomb_torque") * (friction == "smooth")
         self._sharpness = np.array([robot.sharpness_of(joint, values) for joint in self.joints])
         self._k = np.array([1.0 / self._bodies.compliance(joint) for joint in self.joints])
+        self._damping = self._each("damping")
         self._size = {
             part: np.array([self._bodies.size(effect, joint, part) for joint in self.joints])
             for effect, part in (
@@ -68,11 +69,15 @@ class ShakenArm:
                 ("gear_ripple", "amplitude"),
                 ("gear_ripple", "order"),
                 ("gear_ripple", "phase"),
+                ("motor_stribeck", "torque"),
+                ("motor_stribeck", "velocity"),
+                ("load_dependent_friction", "coefficient"),
             )
         }
         self._size["half_gap"] -= self._each("backlash")
         odd = self._size["half_gap"], self._size["stiffness"], self._size["amplitude"]
         self._linear = not any(np.any(part) for part in odd)
+        self._plain = not np.any(self._size["torque"]) and not np.any(self._size["coefficient"])
 
     @property
     def inertias(self) -> Array:
@@ -122,7 +127,8 @@ class ShakenArm:
 
         def push(model: Any, _: Any) -> None:
             q, v = qpos[motors], qvel[motors]
-            passive[motors] += drive(q, v) - self._smooth * np.tanh(self._sharpness * v)
+            dry = self._smooth if self._plain else self._dry(qpos[links] - q, qvel[links] - v, v)
+            passive[motors] += drive(q, v) - dry * np.tanh(self._sharpness * v)
             if not self._linear:
                 pull, turned = self._more_pull(qpos[links] - q, q)
                 passive[links] += pull
@@ -147,6 +153,13 @@ class ShakenArm:
                 "hangs on it, or a damper too strong"
             )
         return np.swapaxes(np.array(found), 0, 1)
+
+    def _dry(self, d: Array, rate: Array, v: Array) -> Array:
+        """How large dry friction is where it breaks away and grows with what the drive passes on, shape (n,) [N m]."""
+        part = self._size
+        slow = np.where(part["torque"] != 0.0, v / np.where(part["velocity"] > 0.0, part["velocity"], 1.0), 0.0)
+        passed = np.abs(self._k * d + self._damping * rate)
+        return np.asarray(self._smooth + part["torque"] * np.exp(-(slow**2)) + part["coefficient"] * passed)
 
     def _more_pull(self, d: Array, q: Array) -> tuple[Array, Array]:
         """Torque on the links beyond that of linear springs at deflections d, and what the motors feel of all of it."""

@@ -45,7 +45,7 @@ def rest_pictures(problems: list[RestSet], covariance: np.ndarray) -> list[Secti
 
 def rests_of(result: CalibrationResult) -> tuple[list[RestSet], np.ndarray]:
     """The rests beside the motion of a calibration, with its robot, and the covariance of the robot's values."""
-    problems = [problem.of_robot(result.robot) for problem, _ in result.sets if isinstance(problem, RestSet)]
+    problems = [problem.of_robot(result.robot) for problem, *_ in result.sets if isinstance(problem, RestSet)]
     free = [p for p in result.parameters if p.name in result.robot.parameters]
     sigmas, n = np.array([p.sigma for p in free]), len(free)
     return problems, result.correlation[:n, :n] * np.outer(sigmas, sigmas)
