@@ -31,6 +31,7 @@ BETWEEN = 9  # levels between the neighbours of the best of them, and once more
 WIDTHS = (0.06, 0.12, 0.24)  # [s] of windows; the one that tells most about the excess counts
 REFINED = 12  # steps of a golden section
 GOLDEN = 0.6180339887498949
+HINT = 1.2  # times less is left open with a limit, in windows of a middle width, where others are tried
 BETTER = 2.0  # times less is left open with a limit than without
 OPEN = 0.01  # of the mean square of the command that may be left open where a limit is believed
 LOST, SURE = 0.8, 0.06  # of the excess that must be lost, and its sigma at most
@@ -121,14 +122,24 @@ def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | 
     grid = grid[grid > 0.0]
     if not len(grid):
         return None
-    level, left = _best_level(middle, joint, np.append(grid, sizes.max()))
-    share, whole = float(np.mean(sizes > level)), _left_open(middle, joint, np.inf)
+    grid = np.append(grid, sizes.max())
+    level, left = _best_level(middle, joint, grid)
+    whole = _left_open(middle, joint, np.inf)
+    if whole < HINT * left:
+        return None
+    # narrow windows pass noise, wide ones lose motion: those that leave least open, where they tell what is lost
+    telling = [some for some in by_width.values() if _lost(some, joint, level)[1] < SURE]
+    if not telling:
+        return None
+    windows = min(telling, key=lambda some: _left_open(some, joint, level))
+    if windows is not middle:
+        level, left = _best_level(windows, joint, grid)
+        whole = _left_open(windows, joint, np.inf)
     if whole < BETTER * left or left > OPEN or np.count_nonzero(sizes > level) < FEWEST:
         return None
-    told = [_lost(some, joint, level) for some in by_width.values()]
-    lost, sigma, several = min(told, key=lambda value: value[1])
+    lost, sigma, several = _lost(windows, joint, level)
     believed = lost > LOST and sigma < SURE and (several or whole > FAR_BETTER * left)
-    return CommandLimit(level, share, lost) if believed else None
+    return CommandLimit(level, float(np.mean(sizes > level)), lost) if believed else None
 
 
 def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float, float]:
