@@ -95,18 +95,18 @@ def test_a_torque_constant_scales_the_torque_that_is_told(robot, plain):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "effect",
+    ("effect", "share"),
     [
-        "backlash@joint3:half_gap=1e-3",
-        "spring_cubic@joint3:stiffness=1e12",
-        "motor_stribeck@joint3:torque=6",
-        "load_dependent_friction@joint3:coefficient=0.1",
+        ("backlash@joint3:half_gap=1e-3", 0.01),
+        ("spring_cubic@joint3:stiffness=1e12", 0.01),
+        ("motor_stribeck@joint3:torque=6", 1e-3),  # at low speeds only: 50 times the encoder's noise
+        ("load_dependent_friction@joint3:coefficient=0.1", 0.01),
     ],
 )
-def test_what_is_not_linear_changes_the_motion(effect, robot, plain):
+def test_what_is_not_linear_changes_the_motion(effect, share, robot, plain):
     (odd,), _, _ = shaken(robot, 1, effects=[effect])
     q = [r.signals.outputs.values[:, 2] - r.signals.outputs.values[:, 2].mean() for r in (plain, odd)]
-    assert np.std(q[1] - q[0]) > 0.01 * np.std(q[0])
+    assert np.std(q[1] - q[0]) > share * np.std(q[0])
 
 
 @pytest.mark.parametrize(
