@@ -26,6 +26,9 @@ WRONG_SIDE = "below zero, where it has no meaning: it stands for something else"
 def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
     """The free parameters with notes.
 
+    A positive value that ran into its bound has the sigma that it would have at its prior: a damping of 0.8 N m s/rad of
+    which the recording told little came out as 0.008 +- 0.018.
+
     Args:
         robot: before the calibration.
         calibration: the values that were found.
@@ -35,6 +38,8 @@ def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) ->
     for i, name in enumerate(calibration.names):
         p, value, sigma = robot.parameters[name], float(calibration.values[i]), float(sigmas[i] * slopes[i])
         note = _note(p, value, sigma, float(sigmas[i]))
+        if note == AT_BOUND:  # near zero a logarithm's slope is as small as the value, and so would be its sigma
+            sigma = float(sigmas[i]) * p.prior
         if not note and name in one_sided and value < one_sided[name] - SURELY_BELOW * sigma:
             note = WRONG_SIDE
         found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))

@@ -36,6 +36,16 @@ def test_a_positive_value_that_may_be_zero_says_so(share, relative, note):
     assert note_of(FRICTION, share * prior, relative * share * prior) == note
 
 
+def test_a_value_that_fell_to_its_bound_has_no_smaller_sigma_than_at_its_prior():
+    calibration = Calibration.of(
+        replace(ROBOT, parameters={**ROBOT.parameters, FRICTION: replace(ROBOT.parameter(FRICTION), value=1e-4)})
+    )
+    sigmas = np.full(len(calibration.names), 2.0)
+    found = next(p for p in dynamic_parameters(ROBOT, calibration, sigmas) if p.name == FRICTION)
+    assert found.note == AT_BOUND
+    assert found.sigma == pytest.approx(2.0 * ROBOT.parameter(FRICTION).prior)
+
+
 @pytest.mark.parametrize("value, sigma, note", [(0.4, 0.01, ""), (-0.01, 0.01, ""), (-0.4, 0.01, WRONG_SIDE)])
 def test_a_friction_that_drives_is_marked(value, sigma, note):
     assert note_of(VISCOUS, value, sigma) == note
