@@ -26,8 +26,8 @@ WRONG_SIDE = "below zero, where it has no meaning: it stands for something else"
 def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
     """The free parameters with notes.
 
-    A positive value that ran into its bound has the sigma that it would have at its prior: a damping of 0.8 N m s/rad of
-    which the recording told little came out as 0.008 +- 0.018.
+    A positive value that ran into its bound has the sigma that it would have at its prior: a damping of 0.8 N m s/rad
+    of which the recording told little came out as 0.008 +- 0.018.
 
     Args:
         robot: before the calibration.

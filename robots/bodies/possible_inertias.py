@@ -4,7 +4,8 @@
 A body that cannot exist (principal moments of which one exceeds the sum of the other two) still has such equations.
 Makers round, and fill in guesses; that is worth a remark, not a refusal. A joint that moves something negative has
 none. The last joint of a branch may move nothing at all, as the fingers of many grippers: its rotor has an inertia.
-Where it carries other joints, the file tells geometry only.
+Where a body carries others and has none itself, the mass matrix may be definite all the same: that is worth a remark,
+as the drive's inertia takes its place. Where nothing at all has one, the file tells geometry only.
 """
 
 from __future__ import annotations
@@ -57,6 +58,7 @@ def check_inertias(
     if values[worst, 0] > SINGULAR:
         remarks = [text for size, text in odd.values() if size > SLIGHT]
         remarks += [f"{odd[joint][1] or joint + ' moves no inertia'}; its rotor has it all" for joint in massless]
+        remarks += [_without_own(model, joint) for joint in joints if joint in carriers and _has_nothing(model, joint)]
         return tuple(f"{file}: {text}" for text in remarks), massless
     joint = joints[int(np.argmax(np.abs(vectors[worst, :, 0])))]
     reason = odd[joint][1] or max(odd.values())[1] or f"{joint} moves {_links(model, model.getJointId(joint))}"
@@ -64,6 +66,20 @@ def check_inertias(
         f"{file}: {reason}; the mass matrix is not positive definite, so {joint} has no equation of motion. Give "
         "what it moves a <mass> and an <inertia> in the URDF with positive principal moments, none above the sum of "
         f"the others, or leave {joint} out of the joints"
+    )
+
+
+def _has_nothing(model: pin.Model, joint: str) -> bool:
+    inertia = model.inertias[model.getJointId(joint)]
+    return bool(inertia.mass == 0.0 and not np.any(inertia.inertia))
+
+
+def _without_own(model: pin.Model, joint: str) -> str:
+    """What becomes of the inertia of a body that carries others and has none in the file, as makers leave out some."""
+    return (
+        f"{_links(model, model.getJointId(joint))}, moved by {joint}, has no inertia of its own; if the real one has, "
+        f"what turns with {joint} is counted to {joint}.inertia, and its weight is missing: give it a <mass> and an "
+        "<inertia>"
     )
 
 
