@@ -193,7 +193,7 @@ def test_expressions_of_xacro_in_bodies_are_said_with_the_command_that_expands_t
 
 
 def test_a_link_that_carries_others_without_an_inertia_of_its_own_is_a_remark(tmp_path):
-    """Nothing else tells: what turns with it about an upright axis is found as the drive's inertia, with a small sigma."""
+    """What turns with it about an upright axis is found as the inertia of the drive, and no value or sigma tells."""
     body = '<inertial><mass value="3"/><inertia ixx="0.04" iyy="0.04" izz="0.006" ixy="0" ixz="0" iyz="0"/></inertial>'
     joint = '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><axis xyz="{3}"/></joint>'
     pan, lift = joint.format("pan", "base", "turret", "0 0 1"), joint.format("lift", "turret", "arm", "0 1 0")
