@@ -27,6 +27,7 @@ from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
+from jointscope.tools.init.estimates.soft_joints import soft_joints
 from jointscope.tools.init.estimates.wiring_by_torques import Exchange, wiring_by_torques
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
@@ -72,7 +73,7 @@ class RobotGuess:
         held: other joints that matter, and where they stand [rad or m].
         motor_zero: reading of each motor's encoder at zero, where encoders on the links tell it [rad or m].
         following: sentences about mimic joints of the URDF.
-        elastic: joints that get a spring at once, as a gyroscope behind them sees what their motors do not.
+        elastic: joints that get a spring at once, as a gyroscope behind them, or an encoder, sees what their motors do not.
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
         held_command: whether each value of the command acts until the next one; else it was measured.
@@ -148,6 +149,9 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
     elastic = _seen(tree, gyros) if masses else ()
+    if masses and robot.links is not None and roles.link_encoder is not None:
+        both = np.hypot(_in_si(robot, noises), _in_si(robot, robot.noise(roles.link_encoder)))
+        elastic = _with_soft(tree, elastic, soft_joints(turned, seen, both))
     drive, exchanged = drives(turned, elastic), None
     if masses and not robot.gyros and robot.links is None:
         others, exchanged = _by_torques(robot, turned, drive)
@@ -239,6 +243,16 @@ def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     seen = {joint for gyro in gyros for joint in tree.joints_below(gyro.mount.body)}
     no_spring = {*tree.slides, *tree.massless}
     return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in no_spring)
+
+
+def _with_soft(tree: RigidTree, elastic: Sequence[str], soft: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The elastic joints, with those whose two encoders tell that they give way."""
+    no_spring = {*tree.slides, *tree.massless}
+    return tuple(
+        name
+        for name, gives in zip(tree.joints, soft, strict=True)
+        if name not in no_spring and (gives or name in elastic)
+    )
 
 
 def _gyros(

@@ -197,7 +197,8 @@ def test_a_link_that_carries_others_without_an_inertia_of_its_own_is_a_remark(tm
     body = '<inertial><mass value="3"/><inertia ixx="0.04" iyy="0.04" izz="0.006" ixy="0" ixz="0" iyz="0"/></inertial>'
     joint = '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><axis xyz="{3}"/></joint>'
     pan, lift = joint.format("pan", "base", "turret", "0 0 1"), joint.format("lift", "turret", "arm", "0 1 0")
-    text = f'<robot name="p"><link name="base"/><link name="turret">%s</link><link name="arm">{body}</link>{pan}{lift}</robot>'
+    links = f'<link name="base"/><link name="turret">%s</link><link name="arm">{body}</link>'
+    text = f'<robot name="p">{links}{pan}{lift}</robot>'
     path = tmp_path / "p.urdf"
     path.write_text(text % body)
     assert RigidTree(path, ("pan", "lift"), DOWN).remarks == ()
