@@ -73,7 +73,7 @@ class RobotGuess:
         held: other joints that matter, and where they stand [rad or m].
         motor_zero: reading of each motor's encoder at zero, where encoders on the links tell it [rad or m].
         following: sentences about mimic joints of the URDF.
-        elastic: joints that get a spring at once, as a gyroscope behind them, or an encoder, sees what their motors do not.
+        elastic: joints that get a spring at once: a gyroscope or an encoder behind them sees what their motors do not.
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
         held_command: whether each value of the command acts until the next one; else it was measured.
@@ -148,10 +148,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
-    elastic = _seen(tree, gyros) if masses else ()
-    if masses and robot.links is not None and roles.link_encoder is not None:
-        both = np.hypot(_in_si(robot, noises), _in_si(robot, robot.noise(roles.link_encoder)))
-        elastic = _with_soft(tree, elastic, soft_joints(turned, seen, both))
+    elastic = (*_seen(tree, gyros), *_giving(robot, turned, seen)) if masses else ()
     drive, exchanged = drives(turned, elastic), None
     if masses and not robot.gyros and robot.links is None:
         others, exchanged = _by_torques(robot, turned, drive)
@@ -245,14 +242,15 @@ def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in no_spring)
 
 
-def _with_soft(tree: RigidTree, elastic: Sequence[str], soft: NDArray[np.bool_]) -> tuple[str, ...]:
-    """The elastic joints, with those whose two encoders tell that they give way."""
+def _giving(robot: MeasuredRobot, motor: Stream, links: Stream) -> tuple[str, ...]:
+    """Joints whose two encoders tell that they give way."""
+    tree, roles = robot.tree, robot.roles
+    if robot.links is None or roles.link_encoder is None:
+        return ()
+    of_motor, of_link = (_in_si(robot, robot.noise(encoder)) for encoder in (roles.motor_encoder, roles.link_encoder))
+    soft = soft_joints(motor, links, np.hypot(of_motor, of_link))
     no_spring = {*tree.slides, *tree.massless}
-    return tuple(
-        name
-        for name, gives in zip(tree.joints, soft, strict=True)
-        if name not in no_spring and (gives or name in elastic)
-    )
+    return tuple(name for name, gives in zip(tree.joints, soft, strict=True) if gives and name not in no_spring)
 
 
 def _gyros(
