@@ -12,11 +12,10 @@ import json
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from biorob_arms import coverage
-from biorob_rests import rests_alone, together
+from biorob_rests import rests_alone, together, true_drives
 from section_runs import run_sections
 from tables import Section, Table
 
@@ -65,7 +64,7 @@ def _clean(robot: Robot) -> Section:
     cpu, wall = time.process_time(), time.perf_counter()
     result = calibrate(robot, [train])
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    wanted = _truth(json.loads((DATA / "clean" / "truth.json").read_text(encoding="utf-8"))["train"]["true"])
+    wanted = true_drives(json.loads((DATA / "clean" / "truth.json").read_text(encoding="utf-8"))["train"]["true"])
     found = result.robot.parameters
     off = {name: (found[name].value - value) / (found[name].sigma or np.nan) for name, value in wanted.items()}
     worst = max(off, key=lambda name: abs(off[name]))
@@ -121,21 +120,6 @@ def _pair(robot: Robot, folder: str) -> tuple[Recording, Recording]:
     """Recordings to learn from and to judge by."""
     paths = [next(iter(sorted((DATA / folder).glob(f"{name}*")))) for name in ("train", "test")]
     return read_recording(paths[0], robot), read_recording(paths[1], robot)
-
-
-def _truth(true: dict[str, Any]) -> dict[str, float]:
-    """What can be compared by name: friction, rotors, total damping of the motors, damping of the links."""
-    found = {}
-    for i in range(4):
-        joint, friction = f"joint{i + 1}", true["friction_Nm_powers_0_1_2_of_abs_load"][i]
-        found[f"{joint}.coulomb_torque"] = friction[0]
-        found[f"{joint}.weight_dependent_friction.coefficient"] = friction[1]
-        found[f"{joint}.weight_dependent_friction.quadratic"] = friction[2]
-        found[f"{joint}.inertia"] = true["motor_inertia_pulley_kgm2"][i]
-        back, own = (true[f"{name}_pulley_Nms_per_rad"][i] for name in ("back_emf_damping", "motor_viscous"))
-        found[f"{joint}.k_mi"] = back + own
-        found[f"{joint}.link_viscous.coefficient"] = true["link_damping_Nms_per_rad"][i]
-    return found
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from jointscope.tools.verb_parts.rest_runs import read_all_rests
 
 Array = NDArray[np.float64]
 MOST_LOAD = 0.2  # [N m] at a motor, up to which friction is compared
+RADII = (0.0079, 0.0121, 0.0121, 0.0090)  # [m] of the motors' pulleys
 SETTLED = 0.8  # [s] at the end of a rest
 MASSES = {"1.2": "1.0", "0.9": "1.05", "0.13": "0.16", "0.2": "0.17"}  # [kg] of the URDF, and others
 Found = CalibrationResult | RestCalibration
@@ -56,9 +57,8 @@ def together(data: Path) -> Section:
     rows = _statics(result, truth, _reach(data), 0.2, 1.0)
     weighed, *_ = _calibrated(data, masses=False)
     rows.append(_gravity(weighed, truth))
-    inertia = [_off(result, f"joint{i + 1}.inertia", v) for i, v in enumerate(truth["motor_inertia_pulley_kgm2"])]
-    parts = (truth[f"{name}_pulley_Nms_per_rad"] for name in ("back_emf_damping", "motor_viscous"))
-    damping = [_off(result, f"joint{i + 1}.k_mi", sum(both)) for i, both in enumerate(zip(*parts, strict=True))]
+    off = {name: _off(result, name, value) for name, value in true_drives(truth).items()}
+    inertia, damping = ([off[f"joint{i + 1}.{law}"] for i in range(4)] for law in ("inertia", "k_mi"))
     robot = load_robot("biorob")
     test = read_recording(next(iter(sorted((data / "clean").glob("test*")))), robot)
     held = heldout_error(result.robot, test) / heldout_error(_true_robot(truth), test)
@@ -177,29 +177,31 @@ def _sigma(result: Found, name: str) -> float:
     return next(estimate.sigma for estimate in result.parameters if estimate.name == name)
 
 
-def _true_robot(truth: dict[str, Any]) -> Robot:
-    """The ready robot with the true values."""
-    values = {}
-    r = (0.0079, 0.0121, 0.0121, 0.0090)
+def true_drives(true: dict[str, Any]) -> dict[str, float]:
+    """Friction, rotors, total damping of motors and damping of links, by the names of the robot file."""
+    found = {}
     for i in range(4):
-        joint, spring = f"joint{i + 1}", truth["spring_N_per_m_powers_1_2_3"][i]
-        friction = truth["friction_Nm_powers_0_1_2_of_abs_load"][i]
-        values |= {
-            f"{joint}.stiffness": spring[0] * r[i] ** 2,
-            f"{joint}.damping": truth["spring_damping_Ns_per_m"][i] * r[i] ** 2,
-            f"{joint}.coulomb_torque": friction[0],
-            f"{joint}.weight_dependent_friction.coefficient": friction[1],
-            f"{joint}.weight_dependent_friction.quadratic": friction[2],
-            f"{joint}.inertia": truth["motor_inertia_pulley_kgm2"][i],
-            f"{joint}.k_mi": truth["back_emf_damping_pulley_Nms_per_rad"][i]
-            + truth["motor_viscous_pulley_Nms_per_rad"][i],
-            f"{joint}.link_viscous.coefficient": truth["link_damping_Nms_per_rad"][i],
-        }
-        if i < 2:
-            values |= {
-                f"{joint}.spring_curve.quadratic": -spring[1] * r[i] ** 3,
-                f"{joint}.spring_curve.cubic": spring[2] * r[i] ** 4,
-            }
+        joint, friction = f"joint{i + 1}", true["friction_Nm_powers_0_1_2_of_abs_load"][i]
+        found[f"{joint}.coulomb_torque"] = friction[0]
+        found[f"{joint}.weight_dependent_friction.coefficient"] = friction[1]
+        found[f"{joint}.weight_dependent_friction.quadratic"] = friction[2]
+        found[f"{joint}.inertia"] = true["motor_inertia_pulley_kgm2"][i]
+        back, own = (true[f"{name}_pulley_Nms_per_rad"][i] for name in ("back_emf_damping", "motor_viscous"))
+        found[f"{joint}.k_mi"] = back + own
+        found[f"{joint}.link_viscous.coefficient"] = true["link_damping_Nms_per_rad"][i]
+    return found
+
+
+def _true_robot(true: dict[str, Any]) -> Robot:
+    """The ready robot with the true values."""
+    values = true_drives(true)
+    for i, r in enumerate(RADII):
+        joint, spring = f"joint{i + 1}", true["spring_N_per_m_powers_1_2_3"][i]
+        values[f"{joint}.stiffness"] = spring[0] * r**2
+        values[f"{joint}.damping"] = true["spring_damping_Ns_per_m"][i] * r**2
+        if any(spring[1:]):
+            values[f"{joint}.spring_curve.quadratic"] = -spring[1] * r**3
+            values[f"{joint}.spring_curve.cubic"] = spring[2] * r**4
     return load_robot("biorob").with_values(values)
 
 

@@ -18,6 +18,17 @@ SHARP_TURN = 4.0  # change of the argument of the friction's tanh, with its sign
 HALVINGS = 5
 
 
+def turns_sharply(v0: Array, v1: Array, sharpness: Array) -> NDArray[np.bool_]:
+    """Whether velocities that dry friction acts against change their sign within a small part of a step.
+
+    Args:
+        v0: at the beginning of a step, shape (..., n) [rad/s].
+        v1: at its end, shape (..., n) [rad/s].
+        sharpness: k in tanh(k v), shape (n,) [s/rad].
+    """
+    return (v0 * v1 < 0.0) & (np.abs(v1 - v0) * sharpness > SHARP_TURN)
+
+
 def times_of_reversals(robot: Robot, ticks: Array, x: Array) -> Array:
     """Ends of ever shorter steps around the moments at which dry friction turns over sharply, shape (k,) [s].
 
@@ -26,11 +37,8 @@ def times_of_reversals(robot: Robot, ticks: Array, x: Array) -> Array:
         ticks: shape (m + 1,) [s].
         x: states, shape (m + 1, d).
     """
-    layout = robot.layout
-    columns = layout.joint_v if robot.choices.friction_velocity == "link" else layout.motor_v
-    v, sharpness = x[:, columns], robot.friction_sharpness()
-    turns = (v[:-1] * v[1:] < 0.0) & (np.abs(np.diff(v, axis=0)) * sharpness > SHARP_TURN)
-    steps, joints = np.nonzero(turns)
+    v = x[:, robot.layout.velocities_at(robot.choices.friction_velocity)]
+    steps, joints = np.nonzero(turns_sharply(v[:-1], v[1:], robot.friction_sharpness()))
     share = v[steps, joints] / (v[steps, joints] - v[steps + 1, joints])
     found, low, high = [], np.zeros(len(steps)), np.ones(len(steps))
     for _ in range(HALVINGS):

@@ -53,7 +53,7 @@ class RatesOfMany:
         self._coulomb, self._sharpness = parameters.of(values, "coulomb_torque"), robot.friction_sharpness(values)
         if sharpness is not None:
             self._sharpness = np.full(robot.n, sharpness)
-        self._friction = layout.joint_v if robot.choices.friction_velocity == "link" else layout.motor_v
+        self._friction = layout.velocities_at(robot.choices.friction_velocity)
         own = [robot.joints.index(joint) for joint in layout.motors]
         n, m = layout.n_link, layout.n_motor
         self._inertia, self._motors = parameters.of(values, "inertia")[own], slice(n, n + m)

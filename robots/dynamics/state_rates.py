@@ -60,8 +60,7 @@ class StateRates:
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
         self._coulomb = parameters.of(named, "coulomb_torque")
         self.sharpness = robot.friction_sharpness(named)
-        on_link = robot.choices.friction_velocity == "link"
-        self.friction_columns = layout.joint_v if on_link else layout.motor_v
+        self.friction_columns = layout.velocities_at(robot.choices.friction_velocity)
         self._rows = layout.motor_row
         n = layout.n_link
         # a slice where all motors have equations of their own: quicker

@@ -111,6 +111,10 @@ class StateLayout:
         """Column of each joint's link position, shape (n,)."""
         return self.joint_link
 
+    def velocities_at(self, side: str) -> Columns:
+        """Columns of each joint's velocity at the "link" or the "motor", as friction depends on one of them."""
+        return self.joint_v if side == "link" else self.motor_v
+
     @cached_property
     def joint_v(self) -> Columns:
         """Column of each joint's link velocity, shape (n,)."""

@@ -128,6 +128,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     roles, tree, masses = robot.roles, robot.tree, robot.masses
     torque = None if roles.joint_torque is None else role_stream(roles.joint_torque, roles.joints)
     noises = robot.noise(roles.motor_encoder)
+    of_links = None if roles.link_encoder is None else robot.noise(roles.link_encoder)
 
     def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
         return _drives(robot, positions, noises, torque, elastic, typed.unit)
@@ -148,7 +149,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
-    elastic = (*_seen(tree, gyros), *_giving(robot, turned, seen)) if masses else ()
+    elastic = (*_seen(tree, gyros), *_giving(robot, turned, seen, noises, of_links)) if masses else ()
     drive, exchanged = drives(turned, elastic), None
     if masses and not robot.gyros and robot.links is None:
         others, exchanged = _by_torques(robot, turned, drive)
@@ -171,7 +172,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         held_command=drive.held,
         exchanged=exchanged,
         encoder_noise=noises,
-        link_noise=None if roles.link_encoder is None else robot.noise(roles.link_encoder),
+        link_noise=of_links,
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
         left_out=left_out,
@@ -242,13 +243,18 @@ def _seen(tree: RigidTree, gyros: Sequence[GuessedGyro]) -> tuple[str, ...]:
     return tuple(name for j, name in enumerate(tree.joints) if j in seen and name not in no_spring)
 
 
-def _giving(robot: MeasuredRobot, motor: Stream, links: Stream) -> tuple[str, ...]:
+def _giving(
+    robot: MeasuredRobot,
+    motor: Stream,
+    links: Stream,
+    of_motors: Sequence[NoiseGuess],
+    of_links: Sequence[NoiseGuess] | None,
+) -> tuple[str, ...]:
     """Joints whose two encoders tell that they give way."""
-    tree, roles = robot.tree, robot.roles
-    if robot.links is None or roles.link_encoder is None:
+    if of_links is None:
         return ()
-    of_motor, of_link = (_in_si(robot, robot.noise(encoder)) for encoder in (roles.motor_encoder, roles.link_encoder))
-    soft = soft_joints(motor, links, np.hypot(of_motor, of_link))
+    tree = robot.tree
+    soft = soft_joints(motor, links, np.hypot(_in_si(robot, of_motors), _in_si(robot, of_links)))
     no_spring = {*tree.slides, *tree.massless}
     return tuple(name for name, gives in zip(tree.joints, soft, strict=True) if gives and name not in no_spring)
 

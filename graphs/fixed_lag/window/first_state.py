@@ -149,9 +149,9 @@ def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:
         sigma: of a sample [rad].
     """
     span = float(max(t[-1] - t[0], 1e-4))
-    way = float(np.polyfit(t, q, 1)[0])
+    line = float(np.polyfit(t, q, 1)[0]), float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
     if len(t) < FEWEST:
-        return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
+        return line
     powers = np.vander(t / span, 3, increasing=True)
     (_, slope, bend), spread = (
         np.linalg.lstsq(powers, q)[0],
@@ -159,5 +159,5 @@ def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:
     )
     bent = 2.0 * (abs(bend) + SURELY * spread[2]) / span**2
     if bent > ACCELERATION:
-        return way, float(np.hypot(4.0 * sigma / span, 0.5 * ACCELERATION * span))
+        return line
     return float(slope / span), float(np.hypot(spread[1] / span, 0.5 * bent * span))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from jointscope.graphs.problem.reversals import HALVINGS, SHARP_TURN
+from jointscope.graphs.problem.reversals import HALVINGS, turns_sharply
 from jointscope.robots.dynamics.state_rates import StateRates
 
 Array = NDArray[np.float64]
@@ -123,16 +123,11 @@ def _halved(
 ) -> TickStep:
     """One step, or two of half its length where dry friction turns over sharply."""
     step = undivided_step(model, rule, x0, torque, h, before)
-    if halvings == 0 or not _turns_sharply(model, x0, step.x1):
+    turning = model.friction_columns
+    if halvings == 0 or not turns_sharply(x0[turning], step.x1[turning], model.sharpness).any():
         return step
     first = _halved(model, rule, x0, torque, 0.5 * h, before, halvings - 1)
     return first.then(_halved(model, rule, first.x1, torque, 0.5 * h, first.end, halvings - 1))
-
-
-def _turns_sharply(model: StateRates, x0: Array, x1: Array) -> bool:
-    """Whether a velocity that dry friction acts against changes its sign within a small part of a step."""
-    v0, v1 = x0[model.friction_columns], x1[model.friction_columns]
-    return bool(((v0 * v1 < 0.0) & (np.abs(v1 - v0) * model.sharpness > SHARP_TURN)).any())
 
 
 def undivided_step(

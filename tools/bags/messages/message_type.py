@@ -67,10 +67,16 @@ class MessageType:
         return kind is not None and primitive_type(kind) == "byte"
 
     def decode(self, raw: bytes) -> Any:
-        """The message with these bytes."""
-        if self.ros2:
-            return self.typestore.deserialize_cdr(raw, self.name)
-        return self.typestore.deserialize_ros1(raw, self.name)
+        """The message with these bytes.
+
+        Raises:
+            RecordingError: they are none of this type.
+        """
+        read = self.typestore.deserialize_cdr if self.ros2 else self.typestore.deserialize_ros1
+        try:
+            return read(raw, self.name)
+        except Exception as err:  # the decoder leaks errors of many kinds on damaged bytes
+            raise RecordingError(f"{len(raw)} bytes are not a {self.name}; the bag is damaged") from err
 
     def encode(self, message: Any) -> bytes:
         """The bytes of a message."""

@@ -59,10 +59,8 @@ def slow_columns(raw: Sequence[bytes], message_type: MessageType, field: str, to
 def _decode(data: bytes, message_type: MessageType, topic: str, k: int) -> Any:
     try:
         return message_type.decode(data)
-    except Exception as err:  # the decoder leaks errors of many kinds on damaged bytes
-        raise RecordingError(
-            f"topic {topic}, message {k}: its {len(data)} bytes are not a {message_type.name}; the bag is damaged"
-        ) from err
+    except RecordingError as err:
+        raise RecordingError(f"topic {topic}, message {k}: its {err}") from err
 
 
 def _same_names(before: tuple[str, ...] | None, now: tuple[str, ...], topic: str, k: int) -> tuple[str, ...]:

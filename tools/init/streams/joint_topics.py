@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.messages.joined_topics import PLUS, SINGLE_TYPES, WOVEN_TYPE
 from jointscope.tools.bags.messages.open_bag import Bag
 from jointscope.tools.init.streams.joint_names import NameMatch, match_names
@@ -133,7 +134,7 @@ def _name_one_each(bag: Bag, family: dict[str, str]) -> bool:
         try:
             first = next(iter(bag.messages([topic])), None)
             names = () if first is None else tuple(bag.message_type(topic).decode(first[2]).name)
-        except Exception:  # the decoder leaks errors of many kinds on damaged bytes
+        except RecordingError:
             return False
         if len(names) != 1:
             return False

@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from jointscope.robots.errors import RecordingError
 from jointscope.tools.bags.messages.field_path import EVERY
 from jointscope.tools.bags.messages.message_type import MessageType, is_list_of_texts
 
@@ -92,7 +93,7 @@ def _interfaces(kind: MessageType, first: bytes) -> list[KnownField]:
             continue
         try:
             items: list[Any] = list(getattr(kind.decode(first), name))
-        except Exception:  # the decoder leaks errors of many kinds on damaged bytes
+        except RecordingError:
             continue
         common = set.intersection(*(set(getattr(item, texts[0])) for item in items)) if items else set()
         found += [
