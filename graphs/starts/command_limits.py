@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import Driven, load_of
 from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands, motion_cells
-from jointscope.graphs.starts.windowed_sums import joint_signals, windowed_rows
+from jointscope.graphs.starts.windowed_sums import SIGNALS, joint_signals, windowed_rows
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
 
@@ -39,6 +39,7 @@ FEWEST = 8  # commands beyond a limit
 FEWEST_ROWS = 60  # windows in which a joint moves; fewer are explained by anything
 SEVERAL, GOOD_PART = 3, 0.02  # blocks of the recording with such a part of the excess, mean square
 FAR_BETTER = 20.0  # times less must be left open where there are fewer: a push may look alike
+DRY_COLUMN = SIGNALS.index("dry") - 1  # of the motion: all signals but the command
 PIECES = 6  # of the windows with excess that are left out one by one
 
 
@@ -173,14 +174,20 @@ def _clipped(some: _Windows, joint: int, level: float) -> Array:
 
 
 def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
-    """Share of the mean square of the limited command that the motion does not explain."""
+    """Share of the mean square of the limited command, beyond what dry friction may be, that motion does not explain.
+
+    Where a drive always pushes in the direction of its motion, its limited command is a dry friction, the more so the
+    lower the limit.
+    """
     y = np.concatenate([some.of_command(joint, _clipped(some, joint, level)) for some in windows])
     X = np.concatenate([some.motion[joint] for some in windows])
     if len(y) <= X.shape[1] or not y.any():
         return 1.0
     X = X / np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
     rest = y - X @ np.linalg.lstsq(X, y, rcond=1e-10)[0]
-    return float(rest @ rest / (y @ y))
+    dry = X[:, DRY_COLUMN]
+    beyond = y - dry * (dry @ y) / max(float(dry @ dry), 1e-300)
+    return float(rest @ rest / max(float(beyond @ beyond), 1e-300))
 
 
 def _lost(windows: list[_Windows], joint: int, level: float) -> tuple[float, float, bool]:

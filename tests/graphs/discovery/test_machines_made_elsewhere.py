@@ -30,8 +30,7 @@ def found_in(folder: Path, tmp_path: Path, unit: str):
     assert main(["init", str(urdf), str(folder / "train"), "--unit", unit, "-o", str(path)]) == 0
     robot = load_robot(path)
     train, test = (read_recording(folder / name, robot) for name in ("train", "test"))
-    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
-    return discover(robot, [train], holdout=test, missing_torque=False), truth
+    return discover(robot, [train], holdout=test, missing_torque=False), truth_of(folder)
 
 
 def added(found):
@@ -66,12 +65,32 @@ def test_the_large_effect_of_a_slide_comes_first_with_its_size_and_nothing_false
 
 
 @pytest.mark.parametrize("name", ("linear", "hardening"))
-def test_a_rotary_drive_gets_its_spring_then_what_the_link_feels(name, tmp_path):
-    found, truth = found_in(DATA / "rotary" / name, tmp_path, "V")
-    values, labels = found.robot.parameters, added(found)
-    second = {"linear": "link_viscous@arm", "hardening": "spring_cubic@arm"}[name]
-    assert labels[:2] == ["joint_elasticity@arm", second]
-    if name == "linear":
-        assert len(labels) == 2
-        assert_near(values["arm.joint_elasticity.compliance"], 1.0 / truth["stiffness"])
+def test_a_rotary_drive_declared_rigid_gets_its_spring_then_what_the_link_feels(name):
+    folder = DATA / "rotary" / name
+    robot = load_robot(folder / "rotary.yaml")
+    train, test = (read_recording(folder / part, robot) for part in ("train", "test"))
+    found = discover(robot, [train], holdout=test, missing_torque=False)
+    assert_is_the_rotary_drive(found, folder, ["joint_elasticity@arm"])
+    compliance = found.robot.parameters["arm.joint_elasticity.compliance"]
+    assert_near(compliance, 1.0 / truth_of(folder)["stiffness"])
+
+
+@pytest.mark.parametrize("name", ("linear", "hardening"))
+def test_a_rotary_drive_whose_spring_two_encoders_tell_gets_what_the_link_feels(name, tmp_path):
+    folder = DATA / "rotary" / name
+    found, truth = found_in(folder, tmp_path, "V")
+    assert_is_the_rotary_drive(found, folder, [])
+    assert_near(found.robot.parameters["arm.stiffness"], truth["stiffness"])
+
+
+def assert_is_the_rotary_drive(found, folder, first):
+    values, labels, truth = found.robot.parameters, added(found), truth_of(folder)
+    later = {"linear": ["link_viscous@arm"], "hardening": ["spring_cubic@arm", "link_viscous@arm"]}[folder.name]
+    assert labels == first + later
+    if truth["cubic"]:
+        assert_near(values["arm.spring_cubic.stiffness"], truth["cubic"])
     assert all(step.floor <= step.heldout_error for step in found.steps)
+
+
+def truth_of(folder):
+    return json.loads((folder / "truth.json").read_text(encoding="utf-8"))

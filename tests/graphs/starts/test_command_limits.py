@@ -12,6 +12,7 @@ from simulated_arm import Arm, divided, moved, written
 from jointscope.graphs.starts.command_limits import command_limits, limited
 from jointscope.graphs.starts.drive_regression import Driven, drive_equations
 from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.recordings.recording import Stream
 
 ARM = Arm()
 SIGMAS = np.full(3, 1e-5)
@@ -65,3 +66,31 @@ def test_nothing_is_said_of_drives_that_give_what_is_commanded(tree, arm, how, s
     sigmas = SIGMAS if "counts" not in how else np.full(3, 2.0 * np.pi / 2048 / np.sqrt(12.0))
     assert command_limits(tree, [Driven(encoder, command)], sigmas) == [None] * 3
     assert limited(command, [None] * 3) is command
+
+
+SOFT = """<robot name="drive"><link name="base"/><link name="arm_link"><inertial><mass value="0.07"/>
+<inertia ixx="1e-5" iyy="2.6e-3" izz="2.6e-3" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="arm" type="revolute"><parent link="base"/><child link="arm_link"/><axis xyz="0 0 1"/>
+<limit lower="-9" upper="9" effort="5" velocity="50"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_drive_that_always_pushes_the_way_it_moves_is_not_taken_for_one_that_saturates(tmp_path, seed):
+    # steps, losses far above the inertia, a soft spring: at a low limit the command is the sign of the velocity, a
+    # friction, while no rigid arm explains the whole of it
+    rng, h, hold, rate = np.random.default_rng(seed), 1e-4, 2000, 20
+    command = np.repeat(rng.uniform(-0.35, 0.35, 25), hold)
+    q, v = np.zeros(2), np.zeros(2)
+    positions = np.empty(len(command))
+    for i, torque in enumerate(command):
+        positions[i] = q[0]
+        spring = 1.3 * (q[0] - q[1]) + 0.004 * (v[0] - v[1])
+        friction = 0.07 * v[0] + 0.03 * np.tanh(200.0 * v[0])
+        v += h * np.array([(torque - friction - spring) / 2e-3, spring / 2.6e-3])
+        q += h * v
+    path = tmp_path / "drive.urdf"
+    path.write_text(SOFT, encoding="utf-8")
+    tree, times = RigidTree(path, ("arm",), np.array([0.0, 0.0, -9.81])), h * rate * np.arange(len(command) // rate)
+    noisy = positions[::rate] + 4e-4 * rng.standard_normal(len(times))
+    streams = [Stream("", times, values[:, None], ("arm",), "") for values in (noisy, command[::rate])]
+    assert command_limits(tree, [Driven(*streams)], np.array([4e-4])) == [None]
