@@ -161,7 +161,6 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
     process_sigma = np.concatenate([s for _, s in collector.process])
     u, states = problem.timeline.u, solution.estimate.states[i]
     calibration = solution.estimate.calibrations[i]
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     return BagFit(
         recording=problem.recording,
         calibration=calibration,
@@ -172,7 +171,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,
-        isolated=external_torques_of(problem, states, process, values),
+        isolated=external_torques_of(problem, states, calibration),
     )
 
 

@@ -10,17 +10,19 @@ Motors are not looked at: nobody reaches them, and dry friction holds a resting 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label, maximum
 from scipy.spatial import KDTree
 
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.joint_states import JointStates
 from jointscope.graphs.problem.motion_regimes import slowest_visible_speed
+from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.model.lasting_torques import equation_inertias
 from jointscope.robots.model.robot import Robot
@@ -84,11 +86,23 @@ class ExternalTorque:
         }
 
 
-def external_torques_of(
-    problem: BagProblem, x: Array, defects: Array, values: Mapping[str, float] | None = None
-) -> tuple[ExternalTorque, ...]:
-    """As `external_torques`, for a recording with its model, and with parameters other than the robot's own."""
-    robot = problem.robot.with_values(values or {})
+def external_torques_of(problem: BagProblem, x: Array, calibration: Calibration) -> tuple[ExternalTorque, ...]:
+    """As `external_torques`, for a recording with its model.
+
+    Whoever smoothed these states may have asked standstills, too. Here a joint that friction may hold says nothing, and
+    what it lacks then is in no equation but its own.
+
+    Args:
+        problem: the recording.
+        x: smoothed states, shape (m + 1, d).
+        calibration: values and biases.
+    """
+    robot = problem.robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    recording = problem.recording
+    known = {**leaving_standstill_out(robot, recording).sticking, **recording.sticking}
+    if known != recording.sticking:
+        problem = problem.of_recording(replace(recording, sticking=known))
+    defects = problem.dynamics.residual((x[:-1], x[1:]), calibration)
     return external_torques(robot, problem.recording, problem.timeline.ticks, x, defects)
 
 

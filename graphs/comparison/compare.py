@@ -102,7 +102,6 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         )
     error = float(np.sqrt(np.mean([(c.horizons[str(HORIZON)] / c.noise_sigma) ** 2 for c in channels.values()])))
     floors = channel_floors(problem, states, calibration, HORIZON)
-    defects = problem.dynamics.residual((states[:-1], states[1:]), calibration)
     return ModelComparison(
         label=label,
         robot=robot,
@@ -115,7 +114,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
         motion=JointStates.of(robot, problem.timeline.ticks, states),
         predicted_motion=_predicted_motion(robot, recording, ahead[HORIZONS[0]]),
         free_run=_free_run(robot, recording),
-        isolated=external_torques_of(problem, states, defects),
+        isolated=external_torques_of(problem, states, calibration),
     )
 
 

@@ -5,9 +5,14 @@ A missing effect inflates the process noise of a calibration. The floor therefor
 torques that last beside it (see `lasting_noise`). A disturbance that lasts longer than a few milliseconds cannot be
 told from a missing effect and is no part of the floor. An encoder's floor grows with the uncertainty of the motion, a
 gyro's about an axis that nothing turns about stays at its noise.
+
+Noise acts where it was found. A friction that is rounded off leaves most of it where a joint stands or turns over, and
+brakes what it does there; spread over the motion, where nothing does, it would exceed the errors themselves.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +22,9 @@ from jointscope.graphs.comparison.causal_filter import filter_around
 from jointscope.graphs.noise.lasting_noise import separate_noise, without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.robots.errors import SolveError
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Accelerometer
 
 Array = NDArray[np.float64]
@@ -61,7 +68,7 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
         own = without_lasting(problem.robot)
         x, problem = own.layout.carried_over(x, problem.robot.layout), problem.of_robot(own)
     try:
-        quiet = problem.with_noise(separate_noise(problem, x, calibration).white)
+        quiet, ahead = _with_white_noise(problem, x, calibration)
     except SolveError:
         return dict.fromkeys(problem.robot.channels, 1.0)
     filtered = filter_around(quiet, x, calibration)
@@ -71,11 +78,43 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
     start = np.unique(np.linspace(min(first, last), last, STARTS).astype(int))
     judged = are_judged(problem, start, horizon)
     start = start[judged] if np.any(judged) else start
-    P, ahead = filtered.covariance[start], quiet.as_predicted
+    P = filtered.covariance[start]
     for i in range(min(steps, len(x) - 2)):
         P = _advance(ahead, x, calibration, start + i, P)
     floors = np.sqrt(np.mean(_channel_variances(quiet, x, calibration, start + steps, P), axis=0))
     return dict(zip(problem.robot.channels, map(float, floors), strict=True))
+
+
+def _with_white_noise(problem: BagProblem, x: Array, calibration: Calibration) -> tuple[BagProblem, BagProblem]:
+    """The problem with its white noise where that acts, for the states where predictions begin and for what follows."""
+    everywhere = separate_noise(problem, x, calibration).white
+    moving = problem.of_recording(leaving_standstill_out(problem.robot, problem.recording))
+    left_out = moving.dynamics.steps.free
+    if left_out is None or not moving.recording.sticking:
+        quiet = problem.with_noise(everywhere)
+        return quiet, quiet.as_predicted
+    free = problem.dynamics.steps.free
+    before = np.zeros_like(left_out) if free is None else free
+    stands, told = left_out > before, before == 0.0
+    noise = separate_noise(moving, x, calibration).white
+    share = np.sum(stands & told, axis=0) / np.maximum(np.sum(told, axis=0), 1)
+    whole, own = _squared(everywhere), _squared(noise)
+    standing = np.divide(whole - (1.0 - share) * own, share, out=np.zeros_like(share), where=share > 0.0)
+    least = stands * np.sqrt(np.maximum(standing, 0.0))
+    quiet = problem.with_noise(noise)
+    return _not_below(quiet, least), _not_below(quiet.as_predicted, least)
+
+
+def _squared(noise: ProcessNoise) -> Array:
+    """Squared densities of velocities, link before motor, shape (k,)."""
+    return np.concatenate([noise.link_velocity, noise.motor_velocity]) ** 2
+
+
+def _not_below(problem: BagProblem, least: Array) -> BagProblem:
+    """The problem with at least these densities of velocities in its steps, shape (m, k) [rad/s/sqrt(s)]."""
+    steps = problem.dynamics.steps
+    free = least if steps.free is None else np.maximum(steps.free, least)
+    return replace(problem, dynamics=replace(problem.dynamics, steps=replace(steps, free=free)))
 
 
 def _advance(problem: BagProblem, x: Array, calibration: Calibration, ticks: NDArray[np.intp], P: Array) -> Array:

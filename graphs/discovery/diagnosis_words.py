@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import isfinite
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.verdicts import SAME
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.robot import Robot
 
@@ -122,4 +123,15 @@ def what_came_in(candidate: Candidate, robot: Robot, before: float, after: float
     values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
     what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
     why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0].removeprefix('it ')}."
-    return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"
+    way = "falls" if f"{after:.3g}" != f"{before:.3g}" and after < before else "goes"
+    return f"{what}: the training error {way} from {before:.3g} to {after:.3g} sigma.{why}"
+
+
+def rises_elsewhere(before: float, after: float) -> str:
+    """What is said of an effect with which the error on the held-out recording, which never chooses, is larger."""
+    if not after > (1.0 + SAME) * before:
+        return ""
+    return (
+        f" On the held-out recording the error rises from {before:.3g} to {after:.3g} sigma: it may fit what is "
+        "peculiar to the training recordings."
+    )

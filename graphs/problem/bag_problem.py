@@ -121,6 +121,10 @@ class BagProblem:
         """The same recording, the same piece, of a robot with other choices, constants or sensors."""
         return replace(BagProblem.of(robot, self.recording), owner=self.owner)
 
+    def of_recording(self, recording: Recording) -> BagProblem:
+        """The same piece of the same recording, of which something else is left out."""
+        return replace(BagProblem.of(self.robot, recording), owner=self.owner).with_noise(self.dynamics.steps.noise)
+
     @property
     def as_predicted(self) -> BagProblem:
         """The same problem with the noise that predictions have: about a motor that sticks nothing is open."""
