@@ -21,7 +21,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque, estimate_m
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidates, score_candidates
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.spring_trials import SpringTrials
-from jointscope.graphs.discovery.starting_model import starting_model
+from jointscope.graphs.discovery.starting_model import starting_model, turns_over_sharper
 from jointscope.graphs.discovery.torque_verdicts import TorqueVerdicts, torque_verdicts
 from jointscope.graphs.discovery.unexplained import believed_floor, unexplained, unexplained_share
 from jointscope.graphs.discovery.verdicts import (
@@ -160,7 +160,9 @@ def diagnose(
         missing_torque_percent=None if torques is None else torques.percent,
         small=() if torques is None else torques.small,
     )
-    return replace(result, paragraphs=(*_to_look_at_first(base), *_in_torques(torques), *paragraphs_of(result)))
+    sharper = turns_over_sharper(robot, base.robot)
+    first = [*_to_look_at_first(base), *([sharper] if sharper else [])]
+    return replace(result, paragraphs=(*first, *_in_torques(torques), *paragraphs_of(result)))
 
 
 def _by_torques(

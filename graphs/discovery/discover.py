@@ -19,6 +19,7 @@ from jointscope.graphs.discovery.diagnosis_words import did_not_hold, rises_else
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep, with_lasting_floors
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.starting_model import turns_over_sharper
 from jointscope.graphs.discovery.unexplained import unexplained
 from jointscope.graphs.discovery.verdicts import MATTERS, SAME, SURE
 from jointscope.graphs.solving.batch_solver import Progress
@@ -111,7 +112,8 @@ class _Search:
         self.report("calibrating the base model", 0.0)
         base = self.kind.calibrated(self.steps[-1].robot if self.steps else robot)
         if not self.steps:
-            self._add_step(None, None, base, "The base model.", self.kind.errors(base))
+            sharper = turns_over_sharper(robot, base.robot)
+            self._add_step(None, None, base, f"The base model. {sharper}".strip(), self.kind.errors(base))
         stop, diagnosis = self._loop(base)
         last = self.steps[-1]
         adequate = diagnosis.adequate if diagnosis is not None else unexplained(last.comparison) < ADEQUATE

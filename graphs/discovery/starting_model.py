@@ -4,11 +4,15 @@
 Where an encoder tells torques that are far smaller than the missing one, it is asked of these, and friction at rest has
 no say in the calibration. Elsewhere predictions are asked, and these go through standstills, so the calibration does,
 too. A search that changed from one to the other when an effect came in would take for physics what the other left.
+
+How sharply dry friction turns over is a number of the robot file that nobody measured. Where an encoder tells slower
+speeds from none, it is asked before any effect is: what a friction that is rounded off too much leaves looks like one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,19 +20,23 @@ import numpy as np
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, seen_by_one_encoder
 from jointscope.graphs.discovery.scored_candidates import segments_of
+from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.judging.elastic_reaction import known_springs
 from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, TorqueJudge
 from jointscope.graphs.judging.torque_rows import TorqueEquations
-from jointscope.graphs.problem.standstill import ADDED_SPRING
+from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowest_seen
 from jointscope.graphs.refits.loop_validation import judged_by_loop
-from jointscope.robots.errors import EffectError
+from jointscope.graphs.refits.validation import fit_and_judge, judged_error
+from jointscope.robots.errors import EffectError, JointscopeError
 from jointscope.robots.files.effect_editing import remove_effect
-from jointscope.robots.model.robot import Robot
+from jointscope.robots.model.robot import SHARPNESS, Robot
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.recordings.recording import Recording
 
 BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FEWEST_ROWS = 100
+SHARPER = 1.5  # times the sharpness that the robot file says, from which another one is tried
 
 
 def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
@@ -38,6 +46,10 @@ def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
         robot: the model with start values.
         recordings: training recordings.
     """
+    return _as_sharp_as_seen(_by_its_measure(robot, recordings))
+
+
+def _by_its_measure(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
     if not seen_by_one_encoder(robot) or judged_by_loop(robot, recordings):
         return BaseModel.of(robot, recordings, by_torques=False)
     base = BaseModel.of(robot, recordings, by_torques=True)
@@ -45,6 +57,57 @@ def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
     if judge is not None and is_quiet(judge):
         return base
     return BaseModel.of(robot, recordings, by_torques=False)
+
+
+def _as_sharp_as_seen(base: BaseModel) -> BaseModel:
+    """The model, or one whose dry friction turns over as sharply as its encoder tells, if that predicts better."""
+    sharper = _sharper_joints(base.robot, base.recordings)
+    if not sharper:
+        return base
+    try:
+        other = BaseModel.of(with_sharpness(base.robot, sharper), base.recordings, base)
+        before, after = (judged_error(b, b.robot, b.calibrations, fit_and_judge(b)[1]).error for b in (base, other))
+    except JointscopeError:
+        return base
+    return other if after**2 < (1.0 - MATTERS) * before**2 else base
+
+
+def _sharper_joints(robot: Robot, recordings: Sequence[Recording]) -> dict[str, float]:
+    """Sharpness of rigid joints that have none of their own, where the encoder tells far slower speeds from none."""
+    found = {}
+    for joint in robot.joints:
+        if joint in robot.layout.motors or f"{joint}.{SHARPNESS}" in robot.parameters:
+            continue
+        slowest = min(slowest_seen(robot, recording, joint) for recording in recordings)
+        if np.isfinite(slowest) and slowest > 0.0 and SATURATED / slowest > SHARPER * robot.sharpness_of(joint):
+            found[joint] = SATURATED / slowest
+    return found
+
+
+def with_sharpness(robot: Robot, sharpness: Mapping[str, float]) -> Robot:
+    """The robot with the dry friction of some joints held to turn over so sharply [s/rad, s/m]."""
+    document, parameters = copy.deepcopy(robot.document), dict(robot.parameters)
+    for joint, value in sharpness.items():
+        name, k, unit = f"{joint}.{SHARPNESS}", float(f"{value:.4g}"), robot.unit_at(joint, "s/rad")
+        parameters[name] = Parameter(name, k, unit, k, k, fixed=True)
+        document.setdefault("parameters", {})[name] = {"value": k, "unit": unit, "fixed": True}
+    return replace(robot, parameters=parameters, document=document)
+
+
+def turns_over_sharper(before: Robot, after: Robot) -> str:
+    """What is said of a model that was given a sharpness which the robot file does not have; nothing for others."""
+    joints = [j for j in after.joints if f"{j}.{SHARPNESS}" in after.parameters and j in before.joints]
+    told = [
+        f"{joint} at {after.sharpness_of(joint):.3g} {after.unit_at(joint, 's/rad')}"
+        for joint in joints
+        if f"{joint}.{SHARPNESS}" not in before.parameters
+    ]
+    if not told:
+        return ""
+    return (
+        f"Dry friction turns over more sharply than the robot file says ({before.choices.friction_sharpness:.3g} "
+        f"s/rad); the model is judged with what the encoder tells: {', '.join(told)}."
+    )
 
 
 def torque_judge(base: BaseModel) -> TorqueJudge | None:

@@ -115,6 +115,28 @@ def test_what_leaves_the_missing_torque_as_it_was_is_taken_out_again(doggy, made
     assert f"{FIRST} leaves the missing torque" in found.stop_reason and not found.adequate
 
 
+def test_what_takes_missing_torque_and_raises_the_training_error_is_refused(doggy, made_up):
+    """Torques were judged on blocks left out: 5 N m fell to 2.5; with it the predictions of all data are worse."""
+    computed = made_up([FIRST, SECOND], torque=True)
+    halves = computed.error
+    computed.error = lambda robot: 9.6 if FIRST in computed.labels(robot) else halves(robot)
+    found, saved = run(doggy)
+    assert saved == [(0, "base model"), (1, f"+ {SECOND}")]
+    assert f"{FIRST} raises the training error to 9.6 sigma" in found.stop_reason
+    errors = [step.train_error for step in found.steps]
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_a_step_that_does_worse_on_the_held_out_recording_says_so(doggy, made_up):
+    computed = made_up([FIRST, SECOND])
+    computed.compare = lambda robot: SimpleNamespace(
+        judged_error=9.0 if FIRST in computed.labels(robot) else 8.0, judged_floor=1.0
+    )
+    found, _ = run(doggy, max_steps=1)
+    assert [step.train_error for step in found.steps] == [8.0, 4.0]  # the held-out recording chooses nothing
+    assert "On the held-out recording the error rises from 8 to 9 sigma" in found.steps[1].paragraph
+
+
 def test_sizes_that_run_away_in_the_calibration_are_held_as_they_were_judged(doggy, made_up):
     made_up([SECOND], torque=True, runs_away=[FIRST])
     found, saved = run(doggy, max_steps=1)
