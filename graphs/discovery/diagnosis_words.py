@@ -110,6 +110,8 @@ def did_not_hold(refused: Mapping[str, str]) -> str:
 
 def why_it_stopped(diagnosis: Diagnosis) -> str:
     """Why a search stopped with the last diagnosis."""
+    if diagnosis.adequate and diagnosis.missing_torque_percent is not None:
+        return "the model is adequate: no effect of the catalogue and no smooth law explain more of the missing torque"
     if diagnosis.adequate:
         return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
     part = part_in_words(diagnosis.unexplained_share)

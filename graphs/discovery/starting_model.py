@@ -6,7 +6,8 @@ no say in the calibration. Elsewhere predictions are asked, and these go through
 too. A search that changed from one to the other when an effect came in would take for physics what the other left.
 
 How sharply dry friction turns over is a number of the robot file that nobody measured. Where an encoder tells slower
-speeds from none, it is asked before any effect is: what a friction that is rounded off too much leaves looks like one.
+speeds from none, the recordings are asked for it before any effect is: what a friction that is rounded off too much
+leaves looks like one.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, seen_by_one_encoder
+from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.discovery.scored_candidates import segments_of
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.judging.elastic_reaction import known_springs
@@ -46,7 +48,7 @@ def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
         robot: the model with start values.
         recordings: training recordings.
     """
-    return _as_sharp_as_seen(_by_its_measure(robot, recordings))
+    return _as_sharp_as_told(_by_its_measure(robot, recordings))
 
 
 def _by_its_measure(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
@@ -59,21 +61,29 @@ def _by_its_measure(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
     return BaseModel.of(robot, recordings, by_torques=False)
 
 
-def _as_sharp_as_seen(base: BaseModel) -> BaseModel:
-    """The model, or one whose dry friction turns over as sharply as its encoder tells, if that predicts better."""
-    sharper = _sharper_joints(base.robot, base.recordings)
-    if not sharper:
+def _as_sharp_as_told(base: BaseModel) -> BaseModel:
+    """The model, or one whose dry friction turns over as sharply as the recordings say, if that predicts better.
+
+    A true sign drives the sharpness up without an end: no sharper than what the encoder tells from one. Steps in which
+    friction would stop a joint several times over drive it down, below that of the file: there that stays.
+    """
+    robot, told = base.robot, _told_sharpness(base.robot, base.recordings)
+    if base.by_torques or not told:  # torques are asked while friction has its full size
         return base
     try:
-        other = BaseModel.of(with_sharpness(base.robot, sharper), base.recordings, base)
+        asked = with_sharpness(robot, {joint: robot.sharpness_of(joint) for joint in told}, fixed=False)
+        found = calibrate(asked, base.recordings, near=base.calibrations, standstill=True, memory=False).robot
+        held = {joint: min(found.sharpness_of(joint), most) for joint, most in told.items()}
+        sharper = {joint: k for joint, k in held.items() if k > robot.sharpness_of(joint)}
+        other = BaseModel.of(with_sharpness(robot, sharper), base.recordings, base)
         before, after = (judged_error(b, b.robot, b.calibrations, fit_and_judge(b)[1]).error for b in (base, other))
     except JointscopeError:
         return base
     return other if after**2 < (1.0 - MATTERS) * before**2 else base
 
 
-def _sharper_joints(robot: Robot, recordings: Sequence[Recording]) -> dict[str, float]:
-    """Sharpness of rigid joints that have none of their own, where the encoder tells far slower speeds from none."""
+def _told_sharpness(robot: Robot, recordings: Sequence[Recording]) -> dict[str, float]:
+    """What encoders tell from a sign, of rigid joints without a sharpness of their own, where that is far sharper."""
     found = {}
     for joint in robot.joints:
         if joint in robot.layout.motors or f"{joint}.{SHARPNESS}" in robot.parameters:
@@ -84,13 +94,13 @@ def _sharper_joints(robot: Robot, recordings: Sequence[Recording]) -> dict[str, 
     return found
 
 
-def with_sharpness(robot: Robot, sharpness: Mapping[str, float]) -> Robot:
-    """The robot with the dry friction of some joints held to turn over so sharply [s/rad, s/m]."""
+def with_sharpness(robot: Robot, sharpness: Mapping[str, float], fixed: bool = True) -> Robot:
+    """The robot with the dry friction of some joints held to turn over so sharply, or beginning there [s/rad, s/m]."""
     document, parameters = copy.deepcopy(robot.document), dict(robot.parameters)
     for joint, value in sharpness.items():
         name, k, unit = f"{joint}.{SHARPNESS}", float(f"{value:.4g}"), robot.unit_at(joint, "s/rad")
-        parameters[name] = Parameter(name, k, unit, k, k, fixed=True)
-        document.setdefault("parameters", {})[name] = {"value": k, "unit": unit, "fixed": True}
+        parameters[name] = Parameter(name, k, unit, k, k, fixed=fixed)
+        document.setdefault("parameters", {})[name] = {"value": k, "unit": unit, "fixed": fixed}
     return replace(robot, parameters=parameters, document=document)
 
 
@@ -106,7 +116,7 @@ def turns_over_sharper(before: Robot, after: Robot) -> str:
         return ""
     return (
         f"Dry friction turns over more sharply than the robot file says ({before.choices.friction_sharpness:.3g} "
-        f"s/rad); the model is judged with what the encoder tells: {', '.join(told)}."
+        f"s/rad); the model is judged with what the recordings tell: {', '.join(told)}."
     )
 
 
