@@ -68,7 +68,7 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
         own = without_lasting(problem.robot)
         x, problem = own.layout.carried_over(x, problem.robot.layout), problem.of_robot(own)
     try:
-        quiet, ahead = _with_white_noise(problem, x, calibration)
+        quiet = _with_white_noise(problem, x, calibration)
     except SolveError:
         return dict.fromkeys(problem.robot.channels, 1.0)
     filtered = filter_around(quiet, x, calibration)
@@ -80,29 +80,26 @@ def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, hori
     start = start[judged] if np.any(judged) else start
     P = filtered.covariance[start]
     for i in range(min(steps, len(x) - 2)):
-        P = _advance(ahead, x, calibration, start + i, P)
+        P = _advance(quiet, x, calibration, start + i, P)
     floors = np.sqrt(np.mean(_channel_variances(quiet, x, calibration, start + steps, P), axis=0))
     return dict(zip(problem.robot.channels, map(float, floors), strict=True))
 
 
-def _with_white_noise(problem: BagProblem, x: Array, calibration: Calibration) -> tuple[BagProblem, BagProblem]:
-    """The problem with its white noise where that acts, for the states where predictions begin and for what follows."""
+def _with_white_noise(problem: BagProblem, x: Array, calibration: Calibration) -> BagProblem:
+    """The problem with its white noise where that acts, as predicted: about a motor that sticks nothing is open."""
     everywhere = separate_noise(problem, x, calibration).white
     moving = problem.of_recording(leaving_standstill_out(problem.robot, problem.recording))
-    left_out = moving.dynamics.steps.free
+    left_out, free = moving.dynamics.steps.free, problem.dynamics.steps.free
+    quiet = problem.as_predicted
     if left_out is None or not moving.recording.sticking:
-        quiet = problem.with_noise(everywhere)
-        return quiet, quiet.as_predicted
-    free = problem.dynamics.steps.free
+        return quiet.with_noise(everywhere)
     before = np.zeros_like(left_out) if free is None else free
     stands, told = left_out > before, before == 0.0
     noise = separate_noise(moving, x, calibration).white
     share = np.sum(stands & told, axis=0) / np.maximum(np.sum(told, axis=0), 1)
     whole, own = _squared(everywhere), _squared(noise)
     standing = np.divide(whole - (1.0 - share) * own, share, out=np.zeros_like(share), where=share > 0.0)
-    least = stands * np.sqrt(np.maximum(standing, 0.0))
-    quiet = problem.with_noise(noise)
-    return _not_below(quiet, least), _not_below(quiet.as_predicted, least)
+    return _not_below(quiet.with_noise(noise), stands * np.sqrt(np.maximum(standing, 0.0)))
 
 
 def _squared(noise: ProcessNoise) -> Array:
