@@ -106,17 +106,15 @@ def with_sharpness(robot: Robot, sharpness: Mapping[str, float], fixed: bool = T
 
 def turns_over_sharper(before: Robot, after: Robot) -> str:
     """What is said of a model that was given a sharpness which the robot file does not have; nothing for others."""
-    joints = [j for j in after.joints if f"{j}.{SHARPNESS}" in after.parameters and j in before.joints]
-    told = [
-        f"{joint} at {after.sharpness_of(joint):.3g} {after.unit_at(joint, 's/rad')}"
-        for joint in joints
-        if f"{joint}.{SHARPNESS}" not in before.parameters
-    ]
+    new = {f"{joint}.{SHARPNESS}": joint for joint in after.joints}
+    told = [joint for name, joint in new.items() if name in after.parameters and name not in before.parameters]
     if not told:
         return ""
+    found = [f"{joint} at {after.sharpness_of(joint):.3g} {after.unit_at(joint, 's/rad')}" for joint in told]
+    said = f"{before.sharpness_of(told[0]):.3g} {before.unit_at(told[0], 's/rad')}"
     return (
-        f"Dry friction turns over more sharply than the robot file says ({before.choices.friction_sharpness:.3g} "
-        f"s/rad); the model is judged with what the recordings tell: {', '.join(told)}."
+        f"Dry friction turns over more sharply than the robot file says ({said}); the model is judged with what the "
+        f"recordings tell: {', '.join(found)}."
     )
 
 

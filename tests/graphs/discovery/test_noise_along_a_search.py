@@ -16,7 +16,6 @@ ARM = Arm("yx", inertia=(0.7, 0.2), dry=(2.0, 0.8), viscous=(1.5, 0.6))
 CABLE = 30.0  # [N m/rad]
 
 
-@pytest.mark.slow
 def test_the_noise_of_what_was_missing_leaves_with_it(tmp_path):
     encoder, command = moved(ARM, seconds=6.0, cable=CABLE, sticks=True)
     recordings = [Recording("cable.mcap", "", 10**18, {"encoder": encoder, "command": command})]

@@ -29,7 +29,6 @@ def robot(tmp_path):
     return load_robot(path)
 
 
-@pytest.mark.slow
 def test_a_sharper_friction_than_the_file_says_is_found_and_predicts_better(robot, tmp_path):
     base = BaseModel.of(robot, [recording()], by_torques=False)
     found = module._as_sharp_as_told(base)
