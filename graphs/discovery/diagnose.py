@@ -160,9 +160,7 @@ def diagnose(
         missing_torque_percent=None if torques is None else torques.percent,
         small=() if torques is None else torques.small,
     )
-    sharper = turns_over_sharper(robot, base.robot)
-    first = [*_to_look_at_first(base), *([sharper] if sharper else [])]
-    return replace(result, paragraphs=(*first, *_in_torques(torques), *paragraphs_of(result)))
+    return replace(result, paragraphs=(*_first(base, robot, torques), *paragraphs_of(result)))
 
 
 def _by_torques(
@@ -206,8 +204,10 @@ def _to_look_at_first(base: BaseModel) -> list[str]:
     return [f"{LOOK_FIRST}: {text}." for text in texts]
 
 
-def _in_torques(torques: TorqueVerdicts | None) -> tuple[str, ...]:
-    return () if torques is None else (torques.sentence,)
+def _first(base: BaseModel, given: Robot, torques: TorqueVerdicts | None) -> list[str]:
+    """What is said before the verdict, also of a model that is not the one given, and of the torques that judge it."""
+    texts = [turns_over_sharper(given, base.robot), "" if torques is None else torques.sentence]
+    return [*_to_look_at_first(base), *(text for text in texts if text)]
 
 
 def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorque | None:
