@@ -13,7 +13,7 @@ FLOORS = ("robots", "factors", "graphs", "tools")
 MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 ROOMS = """
 robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects
-robots.dynamics robots.recordings robots.files robots.ready
+robots.dynamics robots.recordings robots.rests robots.files robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns
 graphs.scoring graphs.calibration.stages graphs.calibration

@@ -27,7 +27,7 @@ from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
 EDGES = (1.0, 0.2, EDGE)  # of the friction: blur of the bands' edges, stage by stage

@@ -5,8 +5,9 @@
     links       0 = -g(q) + J^T F - A^T tau_c(delta) + effects
     motors      y = tau_motor(u) + tau_c(delta) + effects within the band of dry friction (factors/friction_band.py)
 
-A motor that has not moved since the last rest stands where it stood for another reason: it says nothing of its band. A
-rigid joint has one coordinate, which its motor's band holds.
+A motor that has not moved since the last rest stands where it stood for another reason: it says nothing of its band.
+One that creeps has its friction at the band's edge, as well as this edge repeats. A rigid joint has one coordinate,
+which its motor's band holds.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes, at_rest
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
 EXACT = 1e-4  # of the largest torque that a coordinate carries: how well equilibrium holds
@@ -108,7 +109,7 @@ class RestSet:
         """What holds the robot at positions of shape (m, d)."""
         q = x[:, self.robot.layout.q_link]
         loads = known_loads(self.robot.kinematic_tree, self.rests.links, self.rests.forces, q)
-        return at_rest(self.model, x, self.rests.u, calibration.values, loads)
+        return at_rest(self.model, x, self.rests.u, calibration.values, loads, self.rests.creep)
 
     def encoder_sigmas(self) -> tuple[Array, Array]:
         """Of the means of motor and link encoders in each rest, shape (m, n) each [rad]."""
@@ -163,7 +164,8 @@ class RestSet:
         gain = np.abs(self.model.drive_gain(calibration.values))
         sigma = np.hypot(self.edge * self.friction_scale, gain * self.rests.u_scatter)
         found = band_cost(y, half, sigma)
-        counts = self.rests.moved.astype(float)
+        creeps = self.rests.creep != 0.0
+        counts = (self.rests.moved & ~creeps).astype(float)
         difference = WithSlopes(
             y,
             torques.motors.by_position - torques.middle.by_position,
@@ -177,8 +179,9 @@ class RestSet:
             weight = counts * np.sqrt(information)
             _, J, P = self._scaled(part, weight, calibration)
             rows.append((counts * gradient / np.sqrt(information), J, P))
-        r, J, P = (np.hstack([row[i] for row in rows]) for i in range(3))
-        return (r, J, P), np.sum(counts * found.cost, axis=1)
+        sliding = self._scaled(torques.sliding, creeps / sigma, calibration)
+        r, J, P = (np.hstack([row[i] for row in (*rows, sliding)]) for i in range(3))
+        return (r, J, P), np.sum(counts * found.cost, axis=1) + 0.5 * np.sum(sliding[0] ** 2, axis=1)
 
     def _scaled(self, part: WithSlopes, weight: Array, calibration: Calibration) -> tuple[Array, Array, Array]:
         """Residuals with derivatives by positions and by the calibration's coordinates."""

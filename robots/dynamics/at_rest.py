@@ -48,15 +48,19 @@ class AtRest:
         links: torques on link coordinates that no motor turns itself, which vanish in equilibrium, k = number of them.
         motors: y, what friction has to hold, k = n.
         middle, half: of the band of y, k = n.
+        sliding: torques on motors that creep, with their whole friction, which vanish, k = n; y where they stand.
     """
 
     links: WithSlopes
     motors: WithSlopes
     middle: WithSlopes
     half: WithSlopes
+    sliding: WithSlopes
 
 
-def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads) -> AtRest:
+def at_rest(
+    model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads, creep: Array | None = None
+) -> AtRest:
     """Torques of a standing robot.
 
     Args:
@@ -65,6 +69,7 @@ def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array,
         u: commands in their SI unit, shape (m, n).
         parameters: values of the free parameters, shape (p,).
         loads: what hangs on it.
+        creep: velocities of motors that slide on slowly, shape (m, n) [rad/s], 0 where they stand; none without.
     """
     layout, values = model.layout, model.named(parameters)
     x = np.zeros((len(positions), layout.size))
@@ -83,15 +88,16 @@ def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array,
     driven = set(layout.motor_row.tolist())
     held = [row for row in range(n) if row not in driven]
     sliding = []
-    for speed in (SLIPPING, -SLIPPING):
+    for speed in (SLIPPING, -SLIPPING, 0.0 if creep is None else creep):
         x[:, layout.motor_v] = speed
         terms_there = model.torques(x, u, parameters, outside, np.full(len(layout.joints), AT_ONCE))
         sliding.append(_rows(terms_there, layout.motor_row, layout.positions))
-    forwards, backwards = sliding
+    forwards, backwards, creeping = sliding
     # the balance y is held by minus the friction that would act
     middle = _sum((plain, 1.0), (forwards, -0.5), (backwards, -0.5))
     half = _sum((backwards, 0.5), (forwards, -0.5))
-    return AtRest(_rows(terms, held, layout.positions), _rows(terms, layout.motor_row, layout.positions), middle, half)
+    links, motors = (_rows(terms, rows, layout.positions) for rows in (held, layout.motor_row))
+    return AtRest(links, motors, middle, half, creeping)
 
 
 def _rows(terms: TorqueTerms, rows: Columns | list[int], positions: Columns) -> WithSlopes:

@@ -24,7 +24,7 @@ from jointscope.robots.recordings.resting_joints import (
     must_move,
     what_it_cannot_tell,
 )
-from jointscope.robots.recordings.rests import OFTEN, standing_share
+from jointscope.robots.recordings.still_stretches import OFTEN, standing_share
 from jointscope.robots.recordings.target_plausibility import check_targets
 from jointscope.robots.recordings.wrapped_counter import wrapping_jump
 from jointscope.robots.units import UNITS, si_factor, si_unit

@@ -11,7 +11,7 @@ from typing import Any
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress

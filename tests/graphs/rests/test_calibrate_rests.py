@@ -14,7 +14,7 @@ from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 from jointscope.tools.terminal.rests_text import verdict
 
 URDF = """<robot name="lever"><link name="base"/>
@@ -67,11 +67,14 @@ def lever(folder, rigid=False):
     return load_robot(folder / "lever.yaml")
 
 
-def hanging(count, seed, rigid=False):
-    """Rests with weights on the hook, pulled sideways by a rope over a pulley; friction anywhere in its band."""
+def hanging(count, seed, rigid=False, creeping=0):
+    """Rests with weights on the hook, pulled sideways by a rope over a pulley; friction anywhere in its band.
+
+    The motor still creeps in the first ones, and friction is all that it can be.
+    """
     rng = np.random.default_rng(seed)
     pull = rng.choice([0.0, 4.0, 8.0, 12.0, -4.0, -8.0, -12.0], count)
-    motor, link, u = np.zeros((3, count, 1))
+    motor, link, u, creep = np.zeros((4, count, 1))
     for k in range(count):
         # 2 kg at 0.3 m turn the rod down, a force along x at 0.5 m turns it up against it
         def weight(q, k=k):
@@ -81,13 +84,17 @@ def hanging(count, seed, rigid=False):
         tau = weight(q)
         # the spring pulls the link back: K d + K2 d^2 + K3 d^3 = tau with d = q_link - q_motor
         d = 0.0 if rigid else brentq(lambda d, tau=tau: K * d + K2 * d**2 + K3 * d**3 - tau, -0.5, 0.5)
-        friction = (C0 + (0.0 if rigid else C1 * abs(tau))) * rng.uniform(-1.0, 1.0)
+        share = rng.uniform(-1.0, 1.0)
+        if k < creeping:
+            share = np.sign(share)
+            creep[k] = share * 1e-3
+        friction = (C0 + (0.0 if rigid else C1 * abs(tau))) * share
         link[k], motor[k], u[k] = q + 2e-4 * rng.normal() * (not rigid), q - d, -tau + friction
     zero = np.zeros((count, 1))
     forces = np.column_stack([pull, 0.0 * pull, 0.0 * pull])
     return Rests(
         "bench", "", np.zeros((count, 2)), motor, None if rigid else link, u, zero, zero, zero, forces,
-        ("hook",) * count, np.ones((count, 1), dtype=bool),
+        ("hook",) * count, np.ones((count, 1), dtype=bool), creep,
     )  # fmt: skip
 
 
@@ -110,6 +117,17 @@ def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path)
     assert held_out.error < 1.05 * exact.error
 
 
+def test_motors_that_creep_tell_their_friction_better_than_those_that_stand(tmp_path):
+    robot = lever(tmp_path)
+    stands, creeps = (calibrate_rests(robot, [hanging(40, 5, creeping=n)]) for n in (0, 30))
+    before, after = ({p.name: p for p in result.parameters} for result in (stands, creeps))
+    for name, value in {"swing.coulomb_torque": C0, "swing.weight_dependent_friction.coefficient": C1}.items():
+        assert abs(after[name].value - value) < 3.0 * after[name].sigma, name
+        assert after[name].sigma < 0.5 * before[name].sigma, name
+    assert after["swing.coulomb_torque"].value == pytest.approx(C0, rel=0.02)
+    assert abs(after["swing.stiffness"].value - K) < 3.0 * after["swing.stiffness"].sigma
+
+
 def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
     robot = lever(tmp_path)
     assert verdict(calibrate_rests(robot, [hanging(60, 1)])).startswith("Yes")
@@ -124,7 +142,7 @@ def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
 
 def test_gradients_are_those_of_differences(tmp_path):
     robot = lever(tmp_path)
-    problem = RestSet.of(robot, hanging(6, 3))
+    problem = RestSet.of(robot, hanging(6, 3, creeping=2))
     x, calibration = problem.start(Calibration.of(robot))
     x, h = x + 1e-3, 1e-7
     system = problem.linearize(x, calibration)
