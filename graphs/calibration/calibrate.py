@@ -37,6 +37,7 @@ from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
@@ -57,7 +58,7 @@ from jointscope.robots.recordings.resting_joints import must_move
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
-TOLD_OF_WHITE = ("timing", "masses", "lacking", "inertia_shifts")  # what torques that last would hide
+TOLD_OF_WHITE = ("timing", "masses", "lacking", "causes", "inertia_shifts")  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
@@ -188,7 +189,10 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     for motion in zip(*solved.of_motions, strict=True):
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
-    return replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
+    recordings = [problem.recording for problem in solved.problems]
+    causes = confirmed(regressed_causes(result.robot, recordings), test) if stage else ()
+    told = dict(timing=timing, masses=masses, lacking=lacking, causes=causes)
+    return replace(result, inertia_shifts=shifts, **told)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -69,7 +69,7 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    for mass in result.masses:
+    for mass in () if result.causes else result.masses:  # an effect with a name looks like a mass to one linear step
         shares = mass.moved(result.found)
         if not shares:
             continue
