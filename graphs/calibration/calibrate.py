@@ -190,7 +190,8 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
     recordings = [problem.recording for problem in solved.problems]
-    causes = confirmed(regressed_causes(result.robot, recordings), test) if stage else ()
+    asked = stage is not None and not result.saturated
+    causes = confirmed(regressed_causes(result.robot, recordings), test) if asked else ()
     told = dict(timing=timing, masses=masses, lacking=lacking, causes=causes)
     return replace(result, inertia_shifts=shifts, **told)
 

@@ -69,7 +69,8 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    for mass in () if result.causes else result.masses:  # an effect with a name looks like a mass to one linear step
+    named = result.causes or result.saturated  # to one linear step these look like masses
+    for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:
             continue
