@@ -35,6 +35,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
@@ -58,7 +59,7 @@ from jointscope.robots.recordings.resting_joints import must_move
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
-TOLD_OF_WHITE = ("timing", "masses", "lacking", "causes", "inertia_shifts")  # what torques that last would hide
+TOLD_OF_WHITE = ("timing", "masses", "lacking", "causes", "changed", "inertia_shifts")  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
@@ -163,7 +164,7 @@ def _calibrated(
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        result = _asked_for_causes(result, solved, stage if memory else None)
+        result = _asked_for_causes(result, solved, stage if memory else None, recordings)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -178,7 +179,9 @@ def _calibrated(
     return result
 
 
-def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeStage | None) -> CalibrationResult:
+def _asked_for_causes(
+    result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
+) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
     test = ScoreTest.of(*solved.of_motions)
     lacking = lacking_effects(test) if stage else ()
@@ -189,10 +192,13 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     for motion in zip(*solved.of_motions, strict=True):
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
-    recordings = [problem.recording for problem in solved.problems]
+    # noise of encoders as it was before a model that lacks something took a part of it
+    as_told = replace(result.robot, sensors=result.start.sensors)
     asked = stage is not None and not result.saturated
-    causes = confirmed(regressed_causes(result.robot, recordings), test) if asked else ()
-    told = dict(timing=timing, masses=masses, lacking=lacking, causes=causes)
+    changed = changed_load(as_told, recordings) if asked else None
+    asked = asked and changed is None
+    causes = confirmed(regressed_causes(as_told, recordings), test) if asked else ()
+    told = dict(timing=timing, masses=masses, lacking=lacking, causes=causes, changed=changed)
     return replace(result, inertia_shifts=shifts, **told)
 
 

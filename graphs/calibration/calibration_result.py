@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
+from jointscope.graphs.scoring.changed_load import ChangedLoad
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.regressed_causes import RegressedCause
@@ -174,6 +175,7 @@ class CalibrationResult:
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         lacking: effects of the catalogue that the recordings ask for, surest first.
         causes: effects that regression names, joint by joint, and the calibration asks for, too.
+        changed: when the robot takes up or sets down a load; None where nothing tells of it.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
@@ -204,6 +206,7 @@ class CalibrationResult:
     masses: tuple[WrongMass, ...] = ()
     lacking: tuple[LackingEffect, ...] = ()
     causes: tuple[RegressedCause, ...] = ()
+    changed: ChangedLoad | None = None
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
@@ -216,11 +219,16 @@ class CalibrationResult:
         return {p.name: Value(p.value, p.sigma) for p in self.parameters}
 
     @property
+    def of_two_kinds(self) -> bool:
+        """Whether drives saturate or a load changes: no single step with an effect tells anything then."""
+        return bool(self.saturated) or self.changed is not None
+
+    @property
     def has_named_causes(self) -> bool:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        return late or heavy or bool(self.causes) or any(bag.isolated for bag in self.bags)
+        return late or heavy or bool(self.causes) or self.changed is not None or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

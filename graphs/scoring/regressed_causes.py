@@ -19,12 +19,11 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
+from jointscope.graphs.scoring.joint_regression import Fit, JointRows, applies, fit
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.torque_columns import TorqueColumns
-from jointscope.graphs.starts.drive_regression import DRY, GAIN, INERTIA, PLACES, VISCOUS, load_of
-from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
-from jointscope.graphs.starts.motion_cells import motion_cells
-from jointscope.graphs.starts.windowed_sums import WIDTHS, joint_signals, windowed_rows
+from jointscope.graphs.starts.drive_regression import DRY, GAIN, INERTIA, VISCOUS
+from jointscope.graphs.starts.drive_starts import parts_of
+from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.errors import RecordingError
@@ -39,7 +38,6 @@ CONSTANTS = ("torque_constant_error",)  # what the regression has anyhow
 LEFT = 0.5  # of the mean square, that an effect may leave of what the plain regression leaves
 AS_GOOD = 1.2  # times the mean square that the best leaves, up to which a simpler effect, or another, is as good
 LARGE = 0.005  # of the drive's rms torque, from which what an effect explains matters to anybody
-FEWEST_ROWS = 60  # windows
 SHARED = 2.5  # windows that overlap so much that they count as one
 BY_CHANCE = 1e-4  # probability, over all causes that are confirmed together, from which one may be chance
 SURE = 30.0  # ratio of variances, explained over left, from which it is no chance
@@ -78,13 +76,11 @@ def regressed_causes(robot: Robot, recordings: Sequence[Recording]) -> tuple[Reg
         robot: the calibrated robot.
         recordings: those of the calibration.
     """
-    if robot.layout.motors or robot.choices.link_dynamics != "model" or robot.transmission is not None:
-        return ()
-    if not {here.effect.id for here in robot.effects} <= {PLAIN, LIMIT}:
+    if not applies(robot):
         return ()
     robot = robot.in_posture(recordings[0].posture)
     try:
-        rows = _Rows(robot, recordings)
+        rows = JointRows(robot, recordings)
     except RecordingError:  # streams that do not overlap: others say so
         return ()
     asked = _hypotheses(robot)
@@ -113,51 +109,6 @@ def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
     return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
 
 
-class _Rows:
-    """Windowed rows of the regression, with columns of effects.
-
-    Args:
-        robot: in the posture of the recordings.
-        recordings: of it.
-    """
-
-    def __init__(self, robot: Robot, recordings: Sequence[Recording]):
-        self.robot, sigmas = robot, robot.motor_encoder.sigmas
-        driven = driven_joints(robot, recordings)
-        cells = [motion_cells(e, c, sigmas, robot.command_held, left_out) for e, c, left_out in driven]
-        self._plain = [joint_signals(c, load_of(robot.tree, c), robot.friction_sharpness()) for c in cells]
-        self._columns = [TorqueColumns(robot, c) for c in cells]
-
-    def of(self, joint: int, width: float, hypothesis: EffectHypothesis | None = None) -> Array | None:
-        """The signals and the columns of an effect under all windows, shape (w, 5 + k); None where it does not act."""
-        rows = []
-        for plain, columns in zip(self._plain, self._columns, strict=True):
-            more = [] if hypothesis is None else columns.of(hypothesis, joint)
-            if more is None:
-                return None
-            signals = np.column_stack([plain[:, joint], *more])[:, None, :]
-            under, _ = windowed_rows(columns.alone(joint), signals, width)
-            rows += [part for part, _, _ in under]
-        return np.vstack(rows) if rows else None
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """A regression with one effect, or none.
-
-    Attributes:
-        left: mean square that is left, in squares of the command.
-        values: factors of load and of the signals of PLACES, in units of the command.
-        hypothesis: the effect.
-        sizes: how many it has.
-    """
-
-    left: float
-    values: dict[str, float]
-    hypothesis: EffectHypothesis | None = None
-    sizes: int = 0
-
-
 class _Told(NamedTuple):
     """Regressions in windows of one width.
 
@@ -168,35 +119,13 @@ class _Told(NamedTuple):
         count: of windows that do not overlap.
     """
 
-    plain: _Fit
-    fits: list[_Fit]
+    plain: Fit
+    fits: list[Fit]
     driving: float
     count: float
 
 
-def _fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | None = None) -> _Fit:
-    """The regression of commands on motion and on the columns of an effect."""
-    parts = parts_of(robot, robot.joints[joint])
-    held = {law: sum(f * p.value for p, f in some) for law, some in parts.items() if all(p.fixed for p, _ in some)}
-    held = {VISCOUS: 0.0, **held} if VISCOUS not in parts else held
-    if GAIN not in parts:
-        held[GAIN] = 1.0
-    load = rows[:, 1] + sum((held[law] * rows[:, place] for law, place in PLACES.items() if law in held), np.zeros(1))
-    free = [law for law in PLACES if law not in held]
-    columns, more = [rows[:, PLACES[law]] for law in free], rows[:, 5:]
-    target = rows[:, 0]
-    if GAIN in held:
-        target = target - load / held[GAIN]
-    else:
-        free, columns = [GAIN, *free], [load, *columns]
-    X = np.column_stack([*columns, more])
-    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
-    found = np.linalg.lstsq(X / size, target, rcond=1e-10)[0] / size
-    values = dict(zip(free, found.tolist(), strict=False))
-    return _Fit(float(np.mean((target - X @ found) ** 2)), values, hypothesis, more.shape[1])
-
-
-def _of_joint(rows: _Rows, joint: int, asked: Sequence[EffectHypothesis]) -> RegressedCause | None:
+def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) -> RegressedCause | None:
     """The effect that a joint lacks; None where none stands out, or where it is a cause of another kind."""
     tried = [_under(rows, joint, width, asked) for width in WIDTHS]
     told = [one for one in tried if one is not None]
@@ -219,22 +148,22 @@ def _of_joint(rows: _Rows, joint: int, asked: Sequence[EffectHypothesis]) -> Reg
     return RegressedCause(_id(best), rows.robot.joints[joint], tuple(alike), explained, size, changes)
 
 
-def _under(rows: _Rows, joint: int, width: float, asked: Sequence[EffectHypothesis]) -> _Told | None:
+def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypothesis]) -> _Told | None:
     """The regressions in windows of one width [s]; None where there are too few windows."""
     here = rows.of(joint, width)
-    if here is None or len(here) < FEWEST_ROWS:
+    if here is None:
         return None
-    plain, driving = _fit(rows.robot, joint, here), float(np.mean(here[:, 0] ** 2))
+    plain, driving = fit(rows.robot, joint, here), float(np.mean(here[:, 0] ** 2))
     with_columns = [(hypothesis, rows.of(joint, width, hypothesis)) for hypothesis in asked]
-    fits = [_fit(rows.robot, joint, more, h) for h, more in with_columns if more is not None]
+    fits = [fit(rows.robot, joint, more, h) for h, more in with_columns if more is not None]
     return _Told(plain, fits, driving, len(here) / SHARED) if fits and plain.left > 0.0 < driving else None
 
 
-def _id(fit: _Fit) -> str:
+def _id(fit: Fit) -> str:
     return "" if fit.hypothesis is None else fit.hypothesis.here.effect.id
 
 
-def _is_own(fit: _Fit) -> bool:
+def _is_own(fit: Fit) -> bool:
     """Whether it is a cause of this joint that is asked for nowhere else: no weight, no delay."""
     assert fit.hypothesis is not None
     effect = fit.hypothesis.here.effect
@@ -243,10 +172,10 @@ def _is_own(fit: _Fit) -> bool:
     return isinstance(effect, JointTorque) and effect.id not in WEIGHTS
 
 
-def _changes(robot: Robot, joint: str, plain: _Fit, best: _Fit) -> dict[str, float]:
+def _changes(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:
     """By which factor each value would change that is no other joint's, by name."""
 
-    def values(fit: _Fit) -> dict[str, float]:
+    def values(fit: Fit) -> dict[str, float]:
         gain = 1.0 / fit.values[GAIN] if fit.values.get(GAIN) else 1.0
         laws = {law: fit.values[law] * gain for law in (VISCOUS, DRY, INERTIA) if law in fit.values}
         return {**laws, GAIN: gain} if GAIN in fit.values else laws
@@ -262,10 +191,11 @@ def _changes(robot: Robot, joint: str, plain: _Fit, best: _Fit) -> dict[str, flo
 def _agreed(found: list[RegressedCause]) -> tuple[RegressedCause, ...]:
     """Of effects that are alike, those that most joints lack."""
     votes = Counter(effect for cause in found for effect in (cause.effect, *cause.alike))
+    places = Counter(effect for cause in found for effect in cause.alike)  # how often it is not the first
     agreed = []
     for cause in found:
         among = (cause.effect, *cause.alike)
-        first = max(among, key=lambda effect: (votes[effect], -among.index(effect)))
+        first = max(among, key=lambda effect: (votes[effect], -places[effect], effect))
         others = tuple(effect for effect in among if effect != first)
         agreed.append(RegressedCause(first, cause.joint, others, cause.explained, cause.size, cause.with_it))
     return tuple(agreed)

@@ -18,6 +18,7 @@ from jointscope.graphs.scoring.columns.column import STEP, null_values
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.starts.motion_cells import MotionCells
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 from jointscope.robots.effect_kinds.structure import Structure
@@ -95,6 +96,14 @@ class TorqueColumns:
     @cached_property
     def _tilts(self) -> list[Array]:
         return tilt_torques(self.robot.tree, self.robot.tree, self.cells.q, np.zeros(2))
+
+
+def has_columns(effect: Effect) -> bool:
+    """Whether an effect acts on rigid joints only in ways that columns tell."""
+    if isinstance(effect, JointTorque):
+        return _is_plain(effect)
+    gravity = isinstance(effect, Structure) and effect.form == "gravity"
+    return gravity or isinstance(effect, CommandEffect | InertiaEffect)
 
 
 def _is_plain(effect: JointTorque) -> bool:

@@ -18,6 +18,7 @@ from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.short_steps import short_steps
 from jointscope.tools.verdicts.torque_constants import suspicious_constants
+from jointscope.tools.verdicts.two_loads import two_loads
 from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
 LEVELS = ("good", "info", "warn", "bad")
@@ -118,8 +119,9 @@ def _agreeing(signs: Sequence[Check]) -> list[Check]:
 
 
 def _given(result: CalibrationResult) -> list[Check]:
-    """A check that fails where drives saturate, which the model does not know."""
-    return [Check("bad", "Drives that give what is commanded", result.saturated)] if result.saturated else []
+    """Checks that fail where drives saturate or a load changes, which the model does not know."""
+    found = [Check("bad", "Drives that give what is commanded", result.saturated)] if result.saturated else []
+    return [*found, Check("bad", "One load throughout", two_loads(result))] if result.changed else found
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:

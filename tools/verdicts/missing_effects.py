@@ -22,8 +22,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     """A level of `judgement.LEVELS` and a sentence."""
     if result.robot.free_links:
         return "info", "Without masses this cannot be checked."
-    if result.saturated:
-        return "info", "Drives that saturate make this impossible to tell."
+    if result.of_two_kinds:
+        return "info", "Drives that saturate, or a load that changes, make this impossible to tell."
     if result.causes:
         return _named(result)
     found = result.found
