@@ -15,6 +15,7 @@ from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.changed_load import ChangedLoad
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
+from jointscope.graphs.scoring.load_friction import LoadFriction
 from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
@@ -176,6 +177,7 @@ class CalibrationResult:
         lacking: effects of the catalogue that the recordings ask for, surest first.
         causes: effects that regression names, joint by joint, and the calibration asks for, too.
         changed: when the robot takes up or sets down a load; None where nothing tells of it.
+        load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
@@ -207,6 +209,7 @@ class CalibrationResult:
     lacking: tuple[LackingEffect, ...] = ()
     causes: tuple[RegressedCause, ...] = ()
     changed: ChangedLoad | None = None
+    load_frictions: tuple[LoadFriction, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
@@ -228,7 +231,8 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        return late or heavy or bool(self.causes) or self.changed is not None or any(bag.isolated for bag in self.bags)
+        named = bool(self.causes or self.load_frictions) or self.changed is not None
+        return late or heavy or named or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

@@ -77,8 +77,8 @@ class JointRows:
             hypothesis: the other effect.
             since: from when on it acts; always where None.
         """
-        rows = []
-        for i, (plain, columns) in enumerate(zip(self._plain, self._columns, strict=True)):
+        added = []
+        for i, columns in enumerate(self._columns):
             own = [column for here in self._own for column in columns.of(here, joint) or ()]
             more = [] if hypothesis is None else columns.of(hypothesis, joint)
             if more is None:
@@ -86,11 +86,35 @@ class JointRows:
             if since is not None:
                 acts = (columns.cells.times >= since.time) & (i == since.recording)
                 more = [column * acts for column in more]
-            more = [*own, *more]
+            added.append([*own, *more])
+        found = self.beside(joint, width, added)
+        return None if found is None else found[0]
+
+    def beside(
+        self, joint: int, width: float, columns: Sequence[Sequence[Array]]
+    ) -> tuple[Array, NDArray[np.intp]] | None:
+        """Signals of a joint and other columns under all windows, shape (w, 5 + k), and the block of each, shape (w,).
+
+        None where there are too few windows.
+
+        Args:
+            joint: index.
+            width: of the windows [s].
+            columns: for each recording k of them, shape (m,).
+        """
+        rows, blocks, first = list[Array](), list[NDArray[np.intp]](), 0
+        for plain, here, more in zip(self._plain, self._columns, columns, strict=True):
             signals = np.column_stack([plain[:, joint], *more])[:, None, :]
-            under, _ = windowed_rows(columns.alone(joint), signals, width)
-            rows += [part for part, _, _ in under]
-        return np.vstack(rows) if sum(map(len, rows)) >= FEWEST_ROWS else None
+            for part, block, count in windowed_rows(here.alone(joint), signals, width)[0]:
+                rows.append(part)
+                blocks.append(block + first)
+                first += count
+        return (np.vstack(rows), np.concatenate(blocks)) if sum(map(len, rows)) >= FEWEST_ROWS else None
+
+    def motions(self, joint: int) -> list[tuple[Array, Array]]:
+        """Signals of a joint, shape (m, 5), and the weight that it carries, shape (m,) [N m], of each recording."""
+        pairs = zip(self._plain, self._columns, strict=True)
+        return [(plain[:, joint], columns.weight[:, joint]) for plain, columns in pairs]
 
     def spans(self) -> list[tuple[float, float]]:
         """First and last time of each recording [s]."""
@@ -104,14 +128,26 @@ class Fit:
     Attributes:
         left: mean square that is left, in squares of the command.
         values: factors of load and of the signals of PLACES, in units of the command.
+        more: factors of the columns beside them, shape (e + k,).
         hypothesis: the effect.
         sizes: how many it has.
     """
 
     left: float
     values: dict[str, float]
+    more: Array
     hypothesis: EffectHypothesis | None = None
     sizes: int = 0
+
+    @property
+    def gain(self) -> float:
+        """Torque of one unit of the command; 1 where that is known [N m]."""
+        return 1.0 / self.values[GAIN] if self.values.get(GAIN) else 1.0
+
+    def laws(self) -> dict[str, float]:
+        """What was found, by law."""
+        laws = {law: self.values[law] * self.gain for law in PLACES if law in self.values}
+        return {**laws, GAIN: self.gain} if GAIN in self.values else laws
 
 
 def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | None = None) -> Fit:
@@ -134,7 +170,17 @@ def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | No
     found = np.linalg.lstsq(X / size, target, rcond=1e-10)[0] / size
     values = dict(zip(free, found.tolist(), strict=False))
     sizes = 0 if hypothesis is None else len(hypothesis.sizes)
-    return Fit(float(np.mean((target - X @ found) ** 2)), values, hypothesis, sizes)
+    return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
+
+
+def changes_between(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:
+    """By which factor each value changes from one regression to another, if it is no other joint's, by name."""
+    before, after, found = plain.laws(), best.laws(), dict[str, float]()
+    for law, some in parts_of(robot, joint).items():
+        free = [p for p, _ in some if not p.fixed]
+        if law in before and before[law] and len(some) == 1 and free and free[0].name.startswith(f"{joint}."):
+            found[free[0].name] = after[law] / before[law]
+    return found
 
 
 def _as_it_is(robot: Robot, here: EffectAt) -> EffectHypothesis:

@@ -19,10 +19,8 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, applies, fit
+from jointscope.graphs.scoring.joint_regression import Fit, JointRows, applies, changes_between, fit
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.starts.drive_regression import DRY, GAIN, INERTIA, VISCOUS
-from jointscope.graphs.starts.drive_starts import parts_of
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
@@ -144,7 +142,7 @@ def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) ->
         return None
     alike = dict.fromkeys(_id(f) for f in good[1:] if f.sizes == best.sizes)
     alike.pop(_id(best), None)
-    changes = _changes(rows.robot, rows.robot.joints[joint], plain, best)
+    changes = changes_between(rows.robot, rows.robot.joints[joint], plain, best)
     return RegressedCause(_id(best), rows.robot.joints[joint], tuple(alike), explained, size, changes)
 
 
@@ -170,22 +168,6 @@ def _is_own(fit: Fit) -> bool:
     if isinstance(effect, CommandEffect):
         return all(size.unit != "s" for size in effect.parameters)
     return isinstance(effect, JointTorque) and effect.id not in WEIGHTS
-
-
-def _changes(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:
-    """By which factor each value would change that is no other joint's, by name."""
-
-    def values(fit: Fit) -> dict[str, float]:
-        gain = 1.0 / fit.values[GAIN] if fit.values.get(GAIN) else 1.0
-        laws = {law: fit.values[law] * gain for law in (VISCOUS, DRY, INERTIA) if law in fit.values}
-        return {**laws, GAIN: gain} if GAIN in fit.values else laws
-
-    before, after, found = values(plain), values(best), {}
-    for law, some in parts_of(robot, joint).items():
-        free = [p for p, _ in some if not p.fixed]
-        if law in before and before[law] and len(some) == 1 and free and free[0].name.startswith(f"{joint}."):
-            found[free[0].name] = after[law] / before[law]
-    return found
 
 
 def _agreed(found: list[RegressedCause]) -> tuple[RegressedCause, ...]:

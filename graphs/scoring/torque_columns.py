@@ -68,7 +68,7 @@ class TorqueColumns:
         effect, q, v = hypothesis.here.effect, self.cells.q[:, joint], self._v[:, joint]
         assert isinstance(effect, JointTorque)
         sharpness = self.robot.sharpness_of(self.robot.joints[joint])
-        signals = JointSignals(q, v, q, v, self._weight[:, joint], 1.0, sharpness)
+        signals = JointSignals(q, v, q, v, self.weight[:, joint], 1.0, sharpness)
         p = null_values(hypothesis)
         steps = [{**p, size.name: p[size.name] + 1j * STEP} for size in hypothesis.sizes]
         return [np.broadcast_to(-np.imag(effect.law(signals, step)) / STEP, q.shape) for step in steps]
@@ -78,7 +78,8 @@ class TorqueColumns:
         return np.asarray(0.5 * (self.cells.v_smooth[1:] + self.cells.v_smooth[:-1]))
 
     @cached_property
-    def _weight(self) -> Array:
+    def weight(self) -> Array:
+        """Torque that holds every joint against gravity, shape (m, n) [N m]."""
         still = np.zeros_like(self._v)
         return self.robot.tree.torque(self.cells.q, still, still)
 

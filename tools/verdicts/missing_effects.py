@@ -15,6 +15,7 @@ from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
+MOST_CHANGES = 3
 MATTERS = 0.01  # of the rms torque of a drive that an effect explains, from which values cannot be relied on
 
 
@@ -26,6 +27,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Drives that saturate, or a load that changes, make this impossible to tell."
     if result.causes:
         return _named(result)
+    if result.load_frictions:
+        return "bad", _growing_friction(result)
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
     within = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found, sigmas=0.0))]
@@ -58,6 +61,24 @@ def _named(result: CalibrationResult) -> tuple[str, str]:
         f"The recording asks for {listed}: at {worst.joint} {100.0 * worst.explained:.0f} % of what regression leaves "
         f"open is of its shape, {significant(100.0 * worst.size, 2)} % of the drive's torque{_moved(causes)}. Add it: "
         f"`jointscope add {robot_argument(result.start)} {labels} -o {output}`, then calibrate again."
+    )
+
+
+def _growing_friction(result: CalibrationResult) -> str:
+    """Friction that no effect of rigid joints knows: what it does to the values, and what is left to do."""
+    told = result.load_frictions
+    shares = [(one.joint, significant(100.0 * one.share, 2), significant(100.0 * one.sigma, 1)) for one in told]
+    listed = ", ".join(f"{joint} ({share} ± {sigma} % of it)" for joint, share, sigma in shares)
+    found = result.found
+    factors = {n: f for one in told for n, f in one.with_it.items() if n in found}
+    changed = "; ".join(
+        f"{name} {significant(factor * found[name].value)} instead of {significant(found[name].value)}"
+        for name, factor in sorted(factors.items(), key=lambda item: -abs(item[1] - 1.0))[:MOST_CHANGES]
+    )
+    return (
+        f"By regression the dry friction of {listed} grows with the torque that the drive passes on, as that of gears "
+        f"does; with it {changed}. Effects of rigid joints know friction that grows with the weight alone. Which "
+        f"comes nearest: `{_discover(result)}`."
     )
 
 

@@ -25,7 +25,7 @@ def two_loads(result: CalibrationResult) -> str:
     ]
     return (
         f"From {changed.time:.2f} s of {changed.path} on the arm carries something else than before, as if a payload "
-        f"were taken up or set down: at {changed.joint} {significant(100.0 * changed.size, 2)} % of the drive's torque. "
-        f"Calibrate the part alone whose load {result.robot.tree.urdf.name} has, before with {commands[0]}, or after "
+        f"were taken up or set down: at {changed.joint} {significant(100.0 * changed.size, 2)} % of the drive's torque."
+        f" Calibrate the part alone whose load {result.robot.tree.urdf.name} has, before with {commands[0]}, or after "
         f"with {commands[1]}."
     )
