@@ -222,11 +222,6 @@ class CalibrationResult:
         return {p.name: Value(p.value, p.sigma) for p in self.parameters}
 
     @property
-    def of_two_kinds(self) -> bool:
-        """Whether drives saturate or a load changes: no single step with an effect tells anything then."""
-        return bool(self.saturated) or self.changed is not None
-
-    @property
     def has_named_causes(self) -> bool:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))

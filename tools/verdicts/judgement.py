@@ -12,13 +12,13 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.short_steps import short_steps
 from jointscope.tools.verdicts.torque_constants import suspicious_constants
-from jointscope.tools.verdicts.two_loads import two_loads
 from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
 
 LEVELS = ("good", "info", "warn", "bad")
@@ -86,7 +86,7 @@ def judge(result: CalibrationResult) -> Judgement:
     held, steps = values_from_data(result), short_steps(result)
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
-        *_given(result),
+        *(Check("bad", name, text) for name, text in given(result)),
         *signs,
         *_agreeing(signs),
         Check(steps[0], "Steps short enough", steps[1]),
@@ -116,12 +116,6 @@ def _agreeing(signs: Sequence[Check]) -> list[Check]:
         "the sigmas do not include it. `jointscope diagnose` says what it may be."
     )
     return [Check("bad", "No two signs that something is missing", text)]
-
-
-def _given(result: CalibrationResult) -> list[Check]:
-    """Checks that fail where drives saturate or a load changes, which the model does not know."""
-    found = [Check("bad", "Drives that give what is commanded", result.saturated)] if result.saturated else []
-    return [*found, Check("bad", "One load throughout", two_loads(result))] if result.changed else found
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:

@@ -12,6 +12,7 @@ from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
@@ -23,8 +24,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     """A level of `judgement.LEVELS` and a sentence."""
     if result.robot.free_links:
         return "info", "Without masses this cannot be checked."
-    if result.of_two_kinds:
-        return "info", "Drives that saturate, or a load that changes, make this impossible to tell."
+    if given(result):
+        return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
     if result.causes:
         return _named(result)
     if result.load_frictions:
