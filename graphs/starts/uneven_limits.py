@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 TRIED = (0.5, 0.6, 0.7, 0.8, 0.88, 0.93, 0.97, 0.985, 0.995)  # quantiles of the commands of one sign
 SLOPES = (0.0, 0.1, 0.25, 0.5, 0.9)  # share of the larger level that is gone at the largest speed
+LOWEST, EVEN = 0.3, 12  # quantile of the smallest even level, and how many are tried in each round
 ROUNDS = 4  # over levels and slope, each with half the step of the one before
 STEP = 0.3  # relative, of the first round
 BETTER = 5.0  # times less is left open than without limits, and ...
@@ -77,7 +78,7 @@ def uneven_limit(windows: Sequence[DrivenWindows], joint: int) -> UnevenLimit | 
         return None
     fastest = max(float(np.max(np.abs(part.v))) for part in parts)
     best, left = _best(open_with, _starts(u, fastest), fastest)
-    even = min(open_with(np.array([level, level, 0.0])) for level in np.quantile(np.abs(u), TRIED))
+    even = _best_even(open_with, u)
     beyond = [part.u != part.limited(*best) for part in parts]
     count = sum(int(np.count_nonzero(flags)) for flags in beyond)
     if BETTER * left > whole or THAN_ONE * left > even or left > OPEN or count < FEWEST:
@@ -143,6 +144,17 @@ def _best(open_with: Callable[[Array], float], starts: Sequence[Array], fastest:
                 break
         step *= 0.35
     return best, left
+
+
+def _best_even(open_with: Callable[[Array], float], u: Array) -> float:
+    """What the best level for both directions and all speeds leaves open."""
+    sizes = np.abs(u[u != 0.0])
+    levels, least = np.geomspace(float(np.quantile(sizes, LOWEST)), float(sizes.max()), EVEN), np.inf
+    for _ in range(ROUNDS):
+        found = [open_with(np.array([level, level, 0.0])) for level in levels]
+        k, least = int(np.argmin(found)), min(least, *found)
+        levels = np.geomspace(levels[max(k - 1, 0)], levels[min(k + 1, EVEN - 1)], EVEN)
+    return least
 
 
 def _stretches(times: Array, flags: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
