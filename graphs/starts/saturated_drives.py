@@ -10,7 +10,7 @@ import numpy as np
 
 from jointscope.graphs.starts.command_limits import CommandLimit, command_limits, windows_of_drives
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
-from jointscope.graphs.starts.uneven_limits import UnevenLimit, uneven_limit
+from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_limit
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
@@ -19,7 +19,6 @@ from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import si_unit
 
 SATURATION = "saturation"  # kind of its notices
-WIDTH = 0.12  # [s] of windows in which uneven limits are looked for
 FALLS = 0.1  # of a level that is gone at the largest speed, from which it falls with speed
 MARGIN = 0.02  # [s] before and after commands beyond a limit
 NEAR = 0.15  # [s] between moments that are left out as one

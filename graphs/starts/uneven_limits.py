@@ -20,10 +20,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.command_limits import OPEN, DrivenWindows, left_open
+from jointscope.graphs.starts.command_limits import (
+    OPEN,
+    CommandLimit,
+    DrivenWindows,
+    command_limits,
+    left_open,
+    windows_of_drives,
+)
+from jointscope.graphs.starts.drive_regression import Driven
+from jointscope.robots.bodies.rigid_tree import RigidTree
 
 Array = NDArray[np.float64]
 
+WIDTH = 0.12  # [s] of windows
 TRIED = (0.5, 0.6, 0.7, 0.8, 0.88, 0.93, 0.97, 0.985, 0.995)  # quantiles of the commands of one sign
 SLOPES = (0.0, 0.1, 0.25, 0.5, 0.9)  # share of the larger level that is gone at the largest speed
 LOWEST, EVEN = 0.3, 12  # quantile of the smallest even level, and how many are tried in each round
@@ -87,6 +97,12 @@ def uneven_limit(windows: Sequence[DrivenWindows], joint: int) -> UnevenLimit | 
     lower, upper = (level if np.any(sign * u > 0.0) else np.inf for level, sign in zip(best[:2], (-1, 1), strict=True))
     falls = float(best[2]) * fastest / max(x for x in (lower, upper) if x < np.inf)
     return UnevenLimit(float(lower), float(upper), float(best[2]), falls, count / len(u), stretches)
+
+
+def even_limits(tree: RigidTree, recordings: Sequence[Driven], sigmas: Array) -> list[CommandLimit | None]:
+    """As `command_limits`, but None where the limit differs between directions or falls with speed."""
+    windows, found = windows_of_drives(tree, recordings, sigmas)[WIDTH], command_limits(tree, recordings, sigmas)
+    return [None if limit and uneven_limit(windows, joint) else limit for joint, limit in enumerate(found)]
 
 
 @dataclass(frozen=True)

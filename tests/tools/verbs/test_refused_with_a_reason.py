@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,8 +32,8 @@ def taken_up(t, u, model, _):
 
 
 def back_emf(_, u, __, data):
-    limit = np.array([14.0, 5.0, 3.0])
-    slope = np.array([4.0, 1.0, 0.6])
+    limit = np.array([55.0, 24.0, 6.5])
+    slope = np.array([10.0, 4.0, 1.0])
     return np.clip(u, -limit - slope * data.qvel, limit - slope * data.qvel)
 
 
@@ -50,7 +51,7 @@ def refused(drive, capsys):
     encoder, command = moved(ARM, drive=drive, **HOW)
     states = Topic("/joint_states", encoder.times, ARM.joints, {"position": encoder.values})
     commands = Topic("/motor_command", np.maximum(command.times, 1e-4), ARM.joints, {"effort": command.values})
-    write_topics("train.mcap", [states, commands])
+    write_topics(Path("train.mcap"), [states, commands])
     typed(capsys, "init arm.urdf train.mcap -o arm.yaml --unit Nm")
     said = typed(capsys, "calibrate arm.yaml train.mcap -o c.yaml")
     assert "\nNo, do not rely on this calibration yet." in said
