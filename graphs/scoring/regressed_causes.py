@@ -114,13 +114,13 @@ class _Told(NamedTuple):
         plain: without any effect.
         fits: with one each.
         driving: mean square of the commands.
-        count: of windows that do not overlap.
+        windows: that do not overlap.
     """
 
     plain: Fit
     fits: list[Fit]
     driving: float
-    count: float
+    windows: float
 
 
 def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) -> RegressedCause | None:
