@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, applies, changes_between, fit
+from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, applies, changes_between, fit
+from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -56,7 +57,9 @@ def load_frictions(robot: Robot, recordings: Sequence[Recording]) -> tuple[LoadF
         robot: a model of rigid joints.
         recordings: of it.
     """
-    if not applies(robot):
+    # what else a robot has is regressed on to first order only, which a few percent of a torque do not bear
+    more = [here for here in robot.effects if here.effect.id not in (PLAIN, LIMIT) and here.label != DELAY]
+    if more or not applies(robot):
         return ()
     robot = robot.in_posture(recordings[0].posture)
     try:

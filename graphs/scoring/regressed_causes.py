@@ -154,11 +154,20 @@ def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypo
     plain, driving = fit(rows.robot, joint, here), float(np.mean(here[:, 0] ** 2))
     with_columns = [(hypothesis, rows.of(joint, width, hypothesis)) for hypothesis in asked]
     fits = [fit(rows.robot, joint, more, h) for h, more in with_columns if more is not None]
+    fits = [one for one in fits if _is_possible(one)]
     return _Told(plain, fits, driving, len(here) / SHARED) if fits and plain.left > 0.0 < driving else None
 
 
 def _id(fit: Fit) -> str:
     return "" if fit.hypothesis is None else fit.hypothesis.here.effect.id
+
+
+def _is_possible(fit: Fit) -> bool:
+    """Whether sizes of which only one sign is physical have it."""
+    assert fit.hypothesis is not None
+    scale = 1.0 if isinstance(fit.hypothesis.here.effect, CommandEffect) else fit.gain
+    found = zip(fit.hypothesis.sizes, (scale * fit.more[len(fit.more) - fit.sizes :]).tolist(), strict=True)
+    return all(value > 0.0 for size, value in found if size.sign == "+")
 
 
 def _is_own(fit: Fit) -> bool:
