@@ -65,7 +65,7 @@ def limited(command: Stream, limits: Sequence[CommandLimit | None]) -> Stream:
 
 
 @dataclass(frozen=True)
-class _Windows:
+class DrivenWindows:
     """One recording under windows of one width: motion of each joint, and what its commands need to follow."""
 
     cells: MotionCells
@@ -100,7 +100,20 @@ def command_limits(
         held: whether a command acts until the next one.
         sharpness: k in tanh(k v) of dry friction, of all joints or of each, shape (n,) [s/rad].
     """
-    by_width: dict[float, list[_Windows]] = {width: [] for width in WIDTHS}
+    by_width = windows_of_drives(tree, recordings, sigmas, held=held, sharpness=sharpness)
+    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
+
+
+def windows_of_drives(
+    tree: RigidTree,
+    recordings: Sequence[Driven],
+    sigmas: Array,
+    *,
+    held: bool = True,
+    sharpness: float | Array = 1e4,
+) -> dict[float, list[DrivenWindows]]:
+    """The recordings under windows of each width [s]; arguments as of `command_limits`."""
+    by_width: dict[float, list[DrivenWindows]] = {width: [] for width in WIDTHS}
     for encoder, command, left_out in recordings:
         cells = motion_cells(encoder, command, sigmas, held, left_out)
         signals = joint_signals(cells, load_of(tree, cells), sharpness)[:, :, 1:]
@@ -108,11 +121,11 @@ def command_limits(
             rows, _ = windowed_rows(cells, signals, width)
             if rows:
                 parts = [motion for motion, _, _ in rows], [block for _, block, _ in rows]
-                by_width[width].append(_Windows(cells, command, held, width, *parts))
-    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
+                by_width[width].append(DrivenWindows(cells, command, held, width, *parts))
+    return by_width
 
 
-def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | None:
+def _limit(joint: int, by_width: dict[float, list[DrivenWindows]]) -> CommandLimit | None:
     """The limit of one drive."""
     by_width = {w: some for w, some in by_width.items() if sum(len(x.motion[joint]) for x in some) >= FEWEST_ROWS}
     if not by_width:
@@ -143,7 +156,7 @@ def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | 
     return CommandLimit(level, float(np.mean(sizes > level)), lost) if believed else None
 
 
-def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float, float]:
+def _best_level(windows: list[DrivenWindows], joint: int, grid: Array) -> tuple[float, float]:
     """Where the motion leaves least of the command open, between the neighbours of the best of a grid; and how much."""
     for _ in range(2):
         found = [_left_open(windows, joint, float(level)) for level in grid]
@@ -169,17 +182,27 @@ def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float
     return float(best[1]), float(best[0])
 
 
-def _clipped(some: _Windows, joint: int, level: float) -> Array:
+def _clipped(some: DrivenWindows, joint: int, level: float) -> Array:
     return np.clip(some.command.channel(joint).values[:, 0], -level, level)
 
 
-def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
-    """Share of the mean square of the limited command, beyond what dry friction may be, that motion does not explain.
+def _left_open(windows: list[DrivenWindows], joint: int, level: float) -> float:
+    """What motion leaves open of a command that is limited to a level, see `left_open`."""
+    return left_open(windows, joint, [_clipped(some, joint, level) for some in windows])
+
+
+def left_open(windows: Sequence[DrivenWindows], joint: int, given: Sequence[Array]) -> float:
+    """Share of the mean square of what a drive gave, beyond what dry friction may be, that motion does not explain.
 
     Where a drive always pushes in the direction of its motion, its limited command is a dry friction, the more so the
     lower the limit.
+
+    Args:
+        windows: of each recording.
+        joint: index.
+        given: what the drive gave instead of each command, shape (s,) for each recording.
     """
-    y = np.concatenate([some.of_command(joint, _clipped(some, joint, level)) for some in windows])
+    y = np.concatenate([some.of_command(joint, values) for some, values in zip(windows, given, strict=True)])
     X = np.concatenate([some.motion[joint] for some in windows])
     if len(y) <= X.shape[1] or not y.any():
         return 1.0
@@ -190,7 +213,7 @@ def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
     return float(rest @ rest / max(float(beyond @ beyond), 1e-300))
 
 
-def _lost(windows: list[_Windows], joint: int, level: float) -> tuple[float, float, bool]:
+def _lost(windows: list[DrivenWindows], joint: int, level: float) -> tuple[float, float, bool]:
     """Part of the excess that is lost, its sigma from leaving out pieces of it, and whether it comes several times."""
     y, e, X, blocks, first = [], [], [], [], 0
     for some in windows:

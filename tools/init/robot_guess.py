@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.command_limits import command_limits, limited
+from jointscope.graphs.starts.command_limits import limited
 from jointscope.graphs.starts.drive_regression import Driven
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
+from jointscope.graphs.starts.uneven_limits import even_limits
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
@@ -202,7 +203,7 @@ def _drives(
         return replace(found, unit=(unit, TYPED)) if unit else found
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     # what motors report beside their positions is what they gave
-    limits = [None] * tree.n if measured else command_limits(tree, [Driven(encoder, command)], sigmas)
+    limits = [None] * tree.n if measured else even_limits(tree, [Driven(encoder, command)], sigmas)
     limits = [None if joint in elastic else limit for joint, limit in zip(tree.joints, limits, strict=True)]
     command = limited(command, limits)
     told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)

@@ -18,6 +18,7 @@ from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
 from jointscope.robots.files.robot_file import robot_argument
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 
 CONSTANT = "torque_constant"
 MASSES = (0.05, 0.25)  # share by which one N m of the command may be off: fine up to the first, bad beyond the second
@@ -69,7 +70,8 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    for mass in result.masses:
+    named = result.causes or given(result)  # to one linear step these look like masses
+    for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:
             continue
