@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 
@@ -134,7 +135,8 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     if len(found) < FEWEST and share < OFTEN:
         raise RecordingError(
             f"{recording.path}: the motors stand {100 * share:.0f} % of the time only; expected rests; a recording of "
-            f"motion stands before the first option: jointscope calibrate ROBOT {recording.path} -o OUT.yaml"
+            f"motion stands before the first option: jointscope calibrate {robot_argument(robot)} {recording.path} "
+            f"-o {edited_argument(robot, 'calibrated')}"
         )
     times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = (np.array(p) for p in zip(*found, strict=True))
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]

@@ -8,7 +8,7 @@ import shlex
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
