@@ -254,7 +254,8 @@ class FixedLagEstimator(WindowAccess):
         self._books.count(innovations[len(innovations) - fresh :])
         fits = self._books.updated(engine.time, innovations)
         if not (fits and engine.newest.is_possible):
-            why = f"became impossible{RAN_AWAY * engine.ran_away}" if fits else "contradicted the encoders for a tenth of a second"
+            gone = f"became impossible{RAN_AWAY * engine.ran_away}"
+            why = gone if fits else "contradicted the encoders for a tenth of a second"
             self._restart(engine.time, f"the estimate {why}")
             return
         if self._listener is not None:

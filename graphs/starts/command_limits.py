@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import Driven, load_of
-from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands, motion_cells
+from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands
 from jointscope.graphs.starts.windowed_sums import SIGNALS, joint_signals, windowed_rows
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
@@ -101,14 +101,14 @@ def command_limits(
         sharpness: k in tanh(k v) of dry friction, of all joints or of each, shape (n,) [s/rad].
     """
     by_width: dict[float, list[_Windows]] = {width: [] for width in WIDTHS}
-    for encoder, command, left_out in recordings:
-        cells = motion_cells(encoder, command, sigmas, held, left_out)
-        signals = joint_signals(cells, load_of(tree, cells), sharpness)[:, :, 1:]
+    for driven in recordings:
+        cells, of_links = driven.cells(sigmas, held)
+        signals = joint_signals(cells, load_of(tree, of_links), sharpness)[:, :, 1:]
         for width in WIDTHS:
             rows, _ = windowed_rows(cells, signals, width)
             if rows:
                 parts = [motion for motion, _, _ in rows], [block for _, block, _ in rows]
-                by_width[width].append(_Windows(cells, command, held, width, *parts))
+                by_width[width].append(_Windows(cells, driven.command, held, width, *parts))
     return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
 
 
