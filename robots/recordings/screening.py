@@ -200,7 +200,7 @@ def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
                 raise RecordingError(f"{text}; {_one_joint_hint(robot, others)}")
             raise RecordingError(f"{text}; {_unit_hint(robot, k, float(share[k]))}")
         if share[k] > BEYOND_LIMIT:
-            notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
+            notices.append(Notice(robot.motor_encoder.name, "limit", 0, text))
     return notices
 
 

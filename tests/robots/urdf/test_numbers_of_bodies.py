@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Masses and inertias that are no numbers: the parser leaves the body out, so the file is refused with the link's name."""
+"""Masses and inertias that are no numbers: the parser leaves such a body out, so the file is refused by the link."""
 
 import pytest
 
