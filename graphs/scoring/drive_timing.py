@@ -26,7 +26,7 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -60,7 +60,7 @@ class JointRows:
         driven = driven_joints(robot, recordings, delay)
         more = [h for h in robot.effects if h.label != DELAY and h.effect.id not in (PLAIN, LIMIT)]
         self._own = [_as_it_is(robot, here) for here in more]
-        cells = [motion_cells(e, c, sigmas, robot.command_held, left_out) for e, c, left_out in driven]
+        cells = [motion_cells(d.encoder, d.command, sigmas, robot.command_held, d.left_out) for d in driven]
         self._plain = [joint_signals(c, load_of(robot.tree, c), robot.friction_sharpness()) for c in cells]
         self._columns = [TorqueColumns(robot, c) for c in cells]
 

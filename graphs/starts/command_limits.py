@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import Driven, load_of
-from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands, motion_cells
+from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands
 from jointscope.graphs.starts.windowed_sums import SIGNALS, joint_signals, windowed_rows
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
@@ -114,14 +114,14 @@ def windows_of_drives(
 ) -> dict[float, list[DrivenWindows]]:
     """The recordings under windows of each width [s]; arguments as of `command_limits`."""
     by_width: dict[float, list[DrivenWindows]] = {width: [] for width in WIDTHS}
-    for encoder, command, left_out in recordings:
-        cells = motion_cells(encoder, command, sigmas, held, left_out)
-        signals = joint_signals(cells, load_of(tree, cells), sharpness)[:, :, 1:]
+    for driven in recordings:
+        cells, of_links = driven.cells(sigmas, held)
+        signals = joint_signals(cells, load_of(tree, of_links), sharpness)[:, :, 1:]
         for width in WIDTHS:
             rows, _ = windowed_rows(cells, signals, width)
             if rows:
                 parts = [motion for motion, _, _ in rows], [block for _, block, _ in rows]
-                by_width[width].append(DrivenWindows(cells, command, held, width, *parts))
+                by_width[width].append(DrivenWindows(cells, driven.command, held, width, *parts))
     return by_width
 
 

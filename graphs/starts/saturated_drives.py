@@ -12,7 +12,7 @@ from jointscope.graphs.starts.command_limits import CommandLimit, command_limits
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
 from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_limit
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen

@@ -17,6 +17,7 @@ from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
 from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities, unseen_links
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.process_noise import ProcessNoise
@@ -78,7 +79,8 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     if held:
         raise EffectError(
             f"{label} cannot be removed from {robot.name}: {', '.join(held)} acts in that spring; remove both: "
-            f"jointscope remove {robot.path} {' '.join(held)} {label} -o OUT.yaml"
+            f"jointscope remove {robot_argument(robot)} {' '.join(held)} {label} "
+            f"-o {edited_argument(robot, 'without')}"
         )
     document = copy.deepcopy(robot.document)
     remove_at(document, "effects", document["effects"].index(label))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
@@ -103,7 +104,8 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     if len(found) < FEWEST and share < OFTEN:
         raise RecordingError(
             f"{recording.path}: the motors stand {100 * share:.0f} % of the time only; expected rests; a recording of "
-            f"motion stands before the first option: jointscope calibrate ROBOT {recording.path} -o OUT.yaml"
+            f"motion stands before the first option: jointscope calibrate {robot_argument(robot)} {recording.path} "
+            f"-o {edited_argument(robot, 'calibrated')}"
         )
     known, creep, times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = map(
         np.array, zip(*found, strict=True)

@@ -8,7 +8,7 @@ import shlex
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.numbers import significant
 
 RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, and what it did between them is not known

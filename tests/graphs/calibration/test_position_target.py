@@ -11,8 +11,9 @@ from jointscope.graphs.comparison.compare import compare_model
 from jointscope.graphs.fixed_lag.replay.replay import replay
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.effect_editing import add_effect
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.screening import screen
 
 TRUE = {"marker3.tracker_x": 0.03, "marker3.tracker_turn_z": 0.08, "marker3.offset_x": 0.006}
