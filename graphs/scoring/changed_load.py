@@ -58,14 +58,15 @@ def changed_load(robot: Robot, recordings: Sequence[Recording]) -> ChangedLoad |
         recordings: of it.
     """
     effect = catalogue()[EFFECT]
-    if not applies(robot) or not np.any(robot.tree.gravity):
+    owners = effect.owners_of(robot)  # none where no link has a mass
+    if not applies(robot) or not np.any(robot.tree.gravity) or not owners:
         return None
     robot = robot.in_posture(recordings[0].posture)
     try:
         rows = JointRows(robot, recordings)
     except RecordingError:  # streams that do not overlap: others say so
         return None
-    owner = effect.owners_of(robot)[-1]
+    owner = owners[-1]
     load = EffectHypothesis(EffectAt(effect, owner), effect.parameters_at(robot, owner))
     joints = [joint for joint in range(robot.n) if rows.of(joint, WIDTH, load) is not None]
     search = _Search(rows, load, joints)
