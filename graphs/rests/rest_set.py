@@ -12,6 +12,7 @@ which its motor's band holds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -28,7 +29,7 @@ from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes, at_rest
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.rests.rests import Rests
+from jointscope.robots.rests.rests import Rests, joined_rests
 
 Array = NDArray[np.float64]
 EXACT = 1e-4  # of the largest torque that a coordinate carries: how well equilibrium holds
@@ -44,8 +45,8 @@ class RestSet:
         robot: the model.
         rests: the rests.
         repeatability: factor on the sigmas of the link encoders, shape (n,).
-        torque_scale: what torques on links are compared with, shape (n_link,) [N m].
-        friction_scale: the same for what friction holds, shape (n,) [N m].
+        torque_scale: what torques on links are compared with, shape (n_link,), or (m, n_link) of each rest [N m].
+        friction_scale: the same for what friction holds, shape (n,) or (m, n) [N m].
         edge: of its friction, what the edges of a motor's band are blurred by.
         owner: number of the recording; None for a whole one.
     """
@@ -75,6 +76,18 @@ class RestSet:
         held = np.array([np.nanmedian(column) if np.any(np.isfinite(column)) else 1.0 for column in moved.T])
         largest = max(float(carried.max()), 1e-9)
         return replace(plain, torque_scale=np.maximum(carried, 1e-2 * largest), friction_scale=np.maximum(held, 1e-9))
+
+    @staticmethod
+    def joined(problems: Sequence[RestSet]) -> RestSet:
+        """Some recordings as one set, whose cost is the sum of theirs; one costs less time than many."""
+        first, count = problems[0], [len(problem.rests) for problem in problems]
+        scales = (
+            np.concatenate([np.broadcast_to(scale, (m, scale.shape[-1])) for m, scale in zip(count, each, strict=True)])
+            for each in ([p.torque_scale for p in problems], [p.friction_scale for p in problems])
+        )
+        torque_scale, friction_scale = scales
+        rests = joined_rests([problem.rests for problem in problems])
+        return replace(first, rests=rests, torque_scale=torque_scale, friction_scale=friction_scale)
 
     @property
     def measured(self) -> int:
@@ -155,7 +168,7 @@ class RestSet:
         return found
 
     def _links(self, torques: AtRest, calibration: Calibration) -> tuple[Array, Array, Array]:
-        sigma = EXACT * self.torque_scale[self.held]
+        sigma = EXACT * self.torque_scale[..., self.held]
         return self._scaled(torques.links, 1.0 / np.broadcast_to(sigma, torques.links.value.shape), calibration)
 
     def _bands(self, torques: AtRest, calibration: Calibration) -> tuple[tuple[Array, Array, Array], Array]:

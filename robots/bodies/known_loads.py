@@ -50,12 +50,12 @@ def known_loads(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) 
 
 
 def _torques(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) -> Array:
-    found, coupling = np.zeros_like(q), tree.coupling
+    found, coupling, axes = np.zeros_like(q), tree.coupling, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    pulled = forces.any(axis=1).tolist()
+    frames = {link: tree.frame_id(link) for link in {link for link, some in zip(links, pulled, strict=True) if link and some}}
     for i, (link, force) in enumerate(zip(links, forces, strict=True)):
-        if link and np.any(force):
+        if link and pulled[i]:
             own = q[i] if coupling is None else coupling.positions(q[i : i + 1])[0]
-            frame = tree.frame_id(link)
-            axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            J = pin.computeFrameJacobian(tree.model, tree.data, own, frame, axes)[:3]
+            J = pin.computeFrameJacobian(tree.model, tree.data, own, frames[link], axes)[:3]
             found[i] = (J if coupling is None else J @ coupling.G).T @ force
     return found
