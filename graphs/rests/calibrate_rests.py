@@ -99,19 +99,22 @@ class RestCalibration:
 
 
 @in_solver_context
-def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None) -> RestCalibration:
+def calibrate_rests(
+    robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None, near: RestSet | None = None
+) -> RestCalibration:
     """Calibrates a robot from rests.
 
     Args:
         robot: with start values and priors.
         recordings: rests of each.
         progress: called with a text and the share done.
+        near: rests with the weights to begin with, where the values of the robot are near the end.
 
     Raises:
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    problems, solution, iterations = settled_rests(robot, recordings, report)
+    problems, solution, iterations = settled_rests(robot, recordings, report, near)
     _, covariance = posteriors([RestSet.joined(problems)], solution)
     calibration = solution.estimate.calibrations[0]
     index = calibration.columns[DYNAMICS]
@@ -172,7 +175,7 @@ def settled_rests(
                 f"{len(whole.rests)} rests; loads, units, signs or names may be wrong: "
                 "look at what `jointscope compare ROBOT --rests BAG` says"
             )
-        scale = _repeatability(whole, solution)
+        scale = repeatability_of(whole, solution)
         agrees = np.all(np.abs(np.log(scale / whole.repeatability)) < AGREES)
         if edge == EDGE and agrees:
             break
@@ -187,7 +190,8 @@ def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, .
     return tuple(np.split(solution.estimate.states[0], ends))
 
 
-def _repeatability(whole: RestSet, solution: Solution) -> Array:
+def repeatability_of(whole: RestSet, solution: Solution) -> Array:
     """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
-    size = np.sqrt(np.mean(whole.residuals(solution.estimate.states[0]) ** 2, axis=0))
+    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
+    size = np.sqrt(np.mean(whole.residuals(x, whole.model.named(calibration.values)) ** 2, axis=0))
     return np.maximum(whole.repeatability * size, 1.0)

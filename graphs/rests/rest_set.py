@@ -12,7 +12,7 @@ which its motor's band holds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -29,6 +29,7 @@ from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes, at_rest
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.rests.at_encoders import acting_commands, encoder_errors, true_positions
 from jointscope.robots.rests.rests import Rests, joined_rests
 
 Array = NDArray[np.float64]
@@ -89,6 +90,11 @@ class RestSet:
         rests = joined_rests([problem.rests for problem in problems])
         return replace(first, rests=rests, torque_scale=torque_scale, friction_scale=friction_scale)
 
+    def only(self, kept: NDArray[np.bool_]) -> RestSet:
+        """Some of the rests, with the scales that they have here."""
+        torque, friction = (s[kept] if s.ndim > 1 else s for s in (self.torque_scale, self.friction_scale))
+        return replace(self, rests=self.rests.only(kept), torque_scale=torque, friction_scale=friction)
+
     @property
     def measured(self) -> int:
         """Number of measured values: positions, and torques that friction holds."""
@@ -111,18 +117,32 @@ class RestSet:
 
     def start(self, common: Calibration) -> tuple[Array, Calibration]:
         """Where the encoders say."""
-        layout, rests = self.robot.layout, self.rests
-        q_link = joint_angles(self.robot, rests.q_motor) if rests.q_link is None else rests.q_link
+        robot, layout, rests = self.robot, self.robot.layout, self.rests
+        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        q_motor = true_positions(robot, rests.q_motor, values, on_links=False)
+        seen = None if rests.q_link is None else true_positions(robot, rests.q_link, values, on_links=True)
+        q_link = joint_angles(robot, q_motor) if seen is None else seen
         x = np.zeros((len(rests), layout.size))
-        x[:, layout.motor_q] = rests.q_motor
+        x[:, layout.motor_q] = q_motor
         x[:, layout.joint_q] = q_link
         return x[:, layout.positions], common.only([DYNAMICS])
 
     def torques(self, x: Array, calibration: Calibration) -> AtRest:
         """What holds the robot at positions of shape (m, d)."""
-        q = x[:, self.robot.layout.q_link]
-        loads = known_loads(self.robot.kinematic_tree, self.rests.links, self.rests.forces, q)
-        return at_rest(self.model, x, self.rests.u, calibration.values, loads, self.rests.creep)
+        robot, model, q = self.robot, self.model, x[:, self.robot.layout.q_link]
+        loads = known_loads(robot.kinematic_tree, self.rests.links, self.rests.forces, q)
+        u, slopes = acting_commands(robot, self.rests.u, model.named(calibration.values))
+        found = at_rest(model, x, u, calibration.values, loads, self.rests.creep)
+        free = {name: slope for name, slope in slopes.items() if name in model.names}
+        if not free:
+            return found
+        gain, more = model.drive_gain(calibration.values), np.zeros_like(found.motors.by_parameter)
+        for name, slope in free.items():
+            more[:, :, model.names.index(name)] = gain * slope
+        motors, sliding = (
+            replace(part, by_parameter=part.by_parameter + more) for part in (found.motors, found.sliding)
+        )
+        return replace(found, motors=motors, sliding=sliding)
 
     def encoder_sigmas(self) -> tuple[Array, Array]:
         """Of the means of motor and link encoders in each rest, shape (m, n) each [rad]."""
@@ -132,11 +152,19 @@ class RestSet:
             return motor, np.full_like(motor, np.inf)
         return motor, self.repeatability * np.hypot(robot.link_encoder.sigmas, rests.link_scatter)
 
-    def residuals(self, x: Array) -> Array:
-        """Links measured less where they are in equilibrium, in sigmas, shape (m, n); zero without encoders."""
+    def residuals(self, x: Array, values: Mapping[str, float] | None = None) -> Array:
+        """Links measured less where they are in equilibrium, in sigmas, shape (m, n); zero without encoders.
+
+        Args:
+            x: shape (m, d).
+            values: of the robot's parameters by full name, where they are others than its own.
+        """
         if self.rests.q_link is None:
             return np.zeros_like(self.rests.q_motor)
-        return (self.rests.q_link - x[:, self.robot.layout.joint_link]) / self.encoder_sigmas()[1]
+        q = x[:, self.robot.layout.joint_link]
+        values = values or {name: parameter.value for name, parameter in self.robot.parameters.items()}
+        reading = q + encoder_errors(self.robot, q, values, on_links=True).value
+        return (self.rests.q_link - reading) / self.encoder_sigmas()[1]
 
     def predicted(self) -> Array:
         """Positions that the robot's own values say from motors and loads, no link encoder read, shape (m, d)."""
@@ -146,25 +174,42 @@ class RestSet:
 
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations at positions of shape (m, d)."""
+        return of_independent_states(*self.rows(x, calibration))
+
+    def rows(self, x: Array, calibration: Calibration) -> tuple[Array, Array, Array, Array]:
+        """What `of_independent_states` makes normal equations of: whitened residuals, derivatives, cost of each rest.
+
+        Returns:
+            Shapes (m, k), (m, k, d), (m, k, p) and (m,).
+        """
         torques = self.torques(x, calibration)
         parts = [*self._encoders(x, calibration), self._links(torques, calibration)]
         r, J, P = (np.hstack([part[i] for part in parts]) for i in range(3))
         costs = 0.5 * np.sum(r**2, axis=1)
         of_bands, band_costs = self._bands(torques, calibration)
         r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
-        return of_independent_states(r, J, P, costs + band_costs)
+        return r, J, P, costs + band_costs
 
     def _encoders(self, x: Array, calibration: Calibration) -> list[tuple[Array, Array, Array]]:
         layout, rests = self.robot.layout, self.rests
         place = {int(column): k for k, column in enumerate(layout.positions)}
         found, sigmas = [], self.encoder_sigmas()
-        pairs = [(rests.q_motor, layout.motor_q, sigmas[0])]
+        values, names = self.model.named(calibration.values), calibration.names
+        sides = [(rests.q_motor, layout.motor_q, sigmas[0], False)]
         if rests.q_link is not None:
-            pairs.append((rests.q_link, layout.joint_q, sigmas[1]))
-        for measured, columns, sigma in pairs:
+            sides.append((rests.q_link, layout.joint_q, sigmas[1], True))
+        for measured, columns, sigma, on_links in sides:
             own = [place[int(column)] for column in columns]
-            J = np.eye(x.shape[1])[own] / sigma[:, :, None]
-            found.append(((x[:, own] - measured) / sigma, J, np.zeros((*sigma.shape, calibration.size))))
+            error = encoder_errors(self.robot, x[:, own], values, on_links)
+            J = np.eye(x.shape[1])[own] * ((1.0 + error.by_position) / sigma)[:, :, None]
+            P = np.zeros((*sigma.shape, calibration.size))
+            for name, slope in error.by_parameter.items():
+                if name in names:
+                    k = names.index(name)
+                    P[:, :, calibration.columns[DYNAMICS].start + k] = (
+                        slope * calibration.value_by_coordinate[k] / sigma
+                    )
+            found.append(((x[:, own] + error.value - measured) / sigma, J, P))
         return found
 
     def _links(self, torques: AtRest, calibration: Calibration) -> tuple[Array, Array, Array]:
