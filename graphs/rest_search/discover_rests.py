@@ -101,11 +101,13 @@ def discover_rests(
     return RestDiscovery(tuple(steps), why, tuple(recordings), tuple(holdout))
 
 
-def diagnose_rests(robot: Robot, recordings: Sequence[Rests], progress: Report | None = None) -> RestDiscovery:
+def diagnose_rests(
+    robot: Robot, recordings: Sequence[Rests], holdout: Sequence[Rests] = (), progress: Report | None = None
+) -> RestDiscovery:
     """Calibrates a model and judges all effects that it lacks; arguments as of `discover_rests`."""
-    _check(recordings, ())
+    _check(recordings, holdout)
     step = diagnosed(robot, recordings, progress or (lambda text, share: None))
-    return RestDiscovery((step,), "", tuple(recordings))
+    return RestDiscovery((step,), "", tuple(recordings), tuple(holdout))
 
 
 @in_solver_context
@@ -145,7 +147,7 @@ def _check(recordings: Sequence[Rests], holdout: Sequence[Rests]) -> None:
         )
     for held in holdout:
         for rests in recordings:
-            if held.sha256 == rests.sha256 and held.path == rests.path or (held.sha256 and held.sha256 == rests.sha256):
+            if held is rests or (held.sha256 and held.sha256 == rests.sha256):
                 raise RecordingError(
                     f"--holdout-rests {held.path} is also given with --rests ({rests.path}); hold out one that the "
                     "model has not seen"

@@ -145,7 +145,9 @@ class _Judge:
             return "untestable"
         if leader is not None and score.label == leader.label:
             return "missing"
-        if not significant(score, self.count):
+        tried = self.race.tried.get(score.label)
+        worthless = tried is not None and tried.costs is not None and self.gains(tried).sum() <= 0.0
+        if worthless or not significant(score, self.count):
             return "absent"
         if leader is None or after is None or score.label in family:
             return "possible"
