@@ -142,8 +142,8 @@ def _check(recordings: Sequence[Rests], holdout: Sequence[Rests]) -> None:
     if count < FEWEST:
         paths = ", ".join(rests.path for rests in recordings)
         raise RecordingError(
-            f"{paths}: {count} rests; expected {FEWEST} or more, so that groups of them can be left out; let it rest in "
-            "more postures or with other weights, or use `jointscope calibrate` and `jointscope compare`"
+            f"{paths}: {count} rests; expected {FEWEST} or more, so that groups of them can be left out; let it "
+            "rest in more postures or with other weights, or use `jointscope calibrate` and `jointscope compare`"
         )
     for held in holdout:
         for rests in recordings:

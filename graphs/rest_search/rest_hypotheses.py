@@ -6,9 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.robots.dynamics.at_rest import AT_ONCE, SLIPPING
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.structure import Structure
@@ -16,6 +19,7 @@ from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_editing import parameter_of
 from jointscope.robots.model.robot import Robot
 
+FAST = 1e3  # [s/m, s/rad] no damping is so large beside its own size
 NOTHING = "does nothing while nothing moves"
 
 
@@ -69,4 +73,14 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
         return "its sensor is not read at rest"
     if isinstance(effect, JointTorque) and effect.memory is not None:
         return "depends on how a joint came to rest, which rests do not tell"
+    if isinstance(effect, JointTorque) and effect.side == "link" and _is_dry(effect, hypothesis):
+        return "would hold a link away from equilibrium, at which rests take all links"
     return ""
+
+
+def _is_dry(effect: JointTorque, hypothesis: EffectHypothesis) -> bool:
+    """Whether a torque of the link remains when its velocity goes to zero, but not at zero."""
+    sizes = {p.name: p.start for p in hypothesis.sizes} | dict(hypothesis.shapes)
+    still = JointSignals(*np.zeros((5, 1)), stiffness=0.0, sharpness=AT_ONCE)
+    slow = replace(still, v_link=np.full(1, SLIPPING))
+    return bool(abs(effect.law(slow, sizes)[0] - effect.law(still, sizes)[0]) > SLIPPING * FAST)

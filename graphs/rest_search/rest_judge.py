@@ -136,7 +136,7 @@ class _Judge:
         tried = self.race.tried.get(score.label)
         gains = None if tried is None or tried.costs is None else tuple(self.gains(tried).tolist())
         return RestCandidate(
-            score.label, score.score.plausible[0], score.dof, score.p_value, _sizes(score, tried), gains,
+            score.label, score.fall, score.dof, score.p_value, _sizes(score, tried), gains,
             self._look_alikes(score, family), self._verdict(score, leader, family, after), score.silent,
         )  # fmt: skip
 

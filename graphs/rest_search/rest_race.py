@@ -26,7 +26,7 @@ CHANCE = 0.01  # of any false effect among all that are looked at
 ALIKE = 0.95  # correlation of what two effects explain
 STARTERS, FINALISTS = 8, 4  # effects that are fitted for real, and those of them that are judged on what is left out
 OF_A_KIND = 3  # starters that explain the same to first order
-BLUNT = (1.0, EDGE)  # of the friction: blur of the bands' edges, stage by stage
+STAGES = ((EDGE,), (0.2, EDGE), (1.0, EDGE))  # of the friction: blur of the bands' edges; the next where one fails
 SMALLEST_START = 0.05  # of the start value, where a size that is estimated as a logarithm begins at least
 
 
@@ -102,14 +102,17 @@ def _starters(scores: RestScores, count: int) -> list[RestScore]:
 
 
 def _fitted(base: RestFit, score: RestScore) -> Tried | None:
-    """An effect fitted to all rests; None where the fit ran away."""
+    """An effect fitted to all rests; None where the fit ran away, which is where it explains less than nothing."""
     robot = with_score(base.robot, score)
-    try:
-        start = Calibration.of(robot).only(base.calibration.blocks)
-        fit = fit_rests(base.rests.of_robot(robot), base.x, start, BLUNT)
-    except SolveError:
-        return None
-    return Tried(score, fit, _sigmas(fit, score))
+    start = Calibration.of(robot).only(base.calibration.blocks)
+    for edges in STAGES:
+        try:
+            fit = fit_rests(base.rests.of_robot(robot), base.x, start, edges)
+        except SolveError:
+            continue
+        if fit.cost < base.cost:
+            return Tried(score, fit, _sigmas(fit, score))
+    return None
 
 
 def with_score(robot: Robot, score: RestScore) -> Robot:
@@ -118,7 +121,8 @@ def with_score(robot: Robot, score: RestScore) -> Robot:
     for size, value in zip(hypothesis.sizes, score.score.estimate.tolist(), strict=True):
         value = float(np.clip(value, -size.prior_sigma, size.prior_sigma))
         start[size.name] = max(value, SMALLEST_START * size.start) if size.logarithmic else value
-    robot = add_effect(robot, score.label, start)
+    known = {name: value for name, value in score.found.items() if name in robot.parameters}
+    robot = add_effect(robot.with_values(known), score.label, start)
     held = {hypothesis.here.parameter(name) for name in score.held}
     parameters = {
         name: replace(p, fixed=True, value=p.prior if p.null is None else p.null) if name in held else p
@@ -131,8 +135,12 @@ def _sigmas(fit: RestFit, score: RestScore) -> dict[str, float]:
     H, _ = reduced(fit.rests, fit.x, fit.calibration)
     parameters = fit.rests.robot.parameters
     weight = [1.0 / parameters[name].coordinate_sigma ** 2 for name in fit.calibration.names]
-    covariance = np.linalg.inv(H[fit.calibration.columns[DYNAMICS]][:, fit.calibration.columns[DYNAMICS]] + np.diag(weight))
-    sigmas = dict(zip(fit.calibration.names, np.sqrt(np.diag(covariance)) * fit.calibration.value_by_coordinate, strict=True))
+    covariance = np.linalg.inv(
+        H[fit.calibration.columns[DYNAMICS]][:, fit.calibration.columns[DYNAMICS]] + np.diag(weight)
+    )
+    sigmas = dict(
+        zip(fit.calibration.names, np.sqrt(np.diag(covariance)) * fit.calibration.value_by_coordinate, strict=True)
+    )
     here = score.score.hypothesis.here
     return {size.name: float(sigmas[here.parameter(size.name)]) for size in score.score.hypothesis.sizes}
 

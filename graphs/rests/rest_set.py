@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.factors.friction_band import band_cost
 from jointscope.graphs.rests.independent_states import of_independent_states
+from jointscope.graphs.rests.rest_bands import RestBands, Rows
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.whole_set import WholeSet
 from jointscope.robots.bodies.known_loads import known_loads
@@ -183,14 +183,39 @@ class RestSet:
             Shapes (m, k), (m, k, d), (m, k, p) and (m,).
         """
         torques = self.torques(x, calibration)
-        parts = [*self._encoders(x, calibration), self._links(torques, calibration)]
-        r, J, P = (np.hstack([part[i] for part in parts]) for i in range(3))
+        r, J, P = self.equations(x, torques, calibration)
         costs = 0.5 * np.sum(r**2, axis=1)
-        of_bands, band_costs = self._bands(torques, calibration)
+        of_bands, band_costs = self.bands(torques, calibration).rows()
         r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
         return r, J, P, costs + band_costs
 
-    def _encoders(self, x: Array, calibration: Calibration) -> list[tuple[Array, Array, Array]]:
+    def equations(self, x: Array, torques: AtRest, calibration: Calibration) -> Rows:
+        """Rows of encoders, of links in equilibrium, and of motors that creep: all that is Gaussian."""
+        sigma = EXACT * self.torque_scale[..., self.held]
+        links = self._scaled(torques.links, 1.0 / np.broadcast_to(sigma, torques.links.value.shape), calibration)
+        creeping = self._scaled(torques.sliding, (self.rests.creep != 0.0) / self._band_sigma(calibration), calibration)
+        parts = [*self._encoders(x, calibration), links, creeping]
+        r, J, P = (np.hstack([part[i] for part in parts]) for i in range(3))
+        return r, J, P
+
+    def bands(self, torques: AtRest, calibration: Calibration) -> RestBands:
+        """What friction holds where motors stand."""
+        whole = WithSlopes(
+            torques.motors.value - torques.middle.value,
+            torques.motors.by_position - torques.middle.by_position,
+            torques.motors.by_parameter - torques.middle.by_parameter,
+        )
+        y, *y_slopes = self._scaled(whole, np.ones_like(whole.value), calibration)
+        half, *half_slopes = self._scaled(torques.half, np.ones_like(whole.value), calibration)
+        counts = (self.rests.moved & (self.rests.creep == 0.0)).astype(float)
+        half, sigma = np.maximum(half, SMALLEST_BAND), self._band_sigma(calibration)
+        return RestBands(y, half, (y_slopes[0], y_slopes[1]), (half_slopes[0], half_slopes[1]), sigma, counts)
+
+    def _band_sigma(self, calibration: Calibration) -> Array:
+        gain = np.abs(self.model.drive_gain(calibration.values))
+        return np.hypot(self.edge * self.friction_scale, gain * self.rests.u_scatter)
+
+    def _encoders(self, x: Array, calibration: Calibration) -> list[Rows]:
         layout, rests = self.robot.layout, self.rests
         place = {int(column): k for k, column in enumerate(layout.positions)}
         found, sigmas = [], self.encoder_sigmas()
@@ -212,36 +237,7 @@ class RestSet:
             found.append(((x[:, own] + error.value - measured) / sigma, J, P))
         return found
 
-    def _links(self, torques: AtRest, calibration: Calibration) -> tuple[Array, Array, Array]:
-        sigma = EXACT * self.torque_scale[..., self.held]
-        return self._scaled(torques.links, 1.0 / np.broadcast_to(sigma, torques.links.value.shape), calibration)
-
-    def _bands(self, torques: AtRest, calibration: Calibration) -> tuple[tuple[Array, Array, Array], Array]:
-        """Rows that have the gradient and the information of what friction holds, and its cost, shape (m,)."""
-        y, half = torques.motors.value - torques.middle.value, np.maximum(torques.half.value, SMALLEST_BAND)
-        gain = np.abs(self.model.drive_gain(calibration.values))
-        sigma = np.hypot(self.edge * self.friction_scale, gain * self.rests.u_scatter)
-        found = band_cost(y, half, sigma)
-        creeps = self.rests.creep != 0.0
-        counts = (self.rests.moved & ~creeps).astype(float)
-        difference = WithSlopes(
-            y,
-            torques.motors.by_position - torques.middle.by_position,
-            torques.motors.by_parameter - torques.middle.by_parameter,
-        )
-        rows = []
-        for part, gradient, information in (
-            (difference, found.by_torque, found.torque_information),
-            (torques.half, found.by_half, found.half_information),
-        ):
-            weight = counts * np.sqrt(information)
-            _, J, P = self._scaled(part, weight, calibration)
-            rows.append((counts * gradient / np.sqrt(information), J, P))
-        sliding = self._scaled(torques.sliding, creeps / sigma, calibration)
-        r, J, P = (np.hstack([row[i] for row in (*rows, sliding)]) for i in range(3))
-        return (r, J, P), np.sum(counts * found.cost, axis=1) + 0.5 * np.sum(sliding[0] ** 2, axis=1)
-
-    def _scaled(self, part: WithSlopes, weight: Array, calibration: Calibration) -> tuple[Array, Array, Array]:
+    def _scaled(self, part: WithSlopes, weight: Array, calibration: Calibration) -> Rows:
         """Residuals with derivatives by positions and by the calibration's coordinates."""
         P = np.zeros((*part.value.shape, calibration.size))
         P[:, :, calibration.columns[DYNAMICS]] = part.by_parameter * calibration.value_by_coordinate

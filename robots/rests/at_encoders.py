@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What encoders read of robots at rest, and which commands act, with the effects that the robot has there.
 
-    reading = q + errors(q)           of motor encoders, owner JOINT, or of those on the links, JOINT.link
-    u_acting = law(u)                 of a command that has been held for long
+reading = q + errors(q)           of motor encoders, owner JOINT, or of those on the links, JOINT.link
+u_acting = law(u)                 of a command that has been held for long
 """
 
 from __future__ import annotations

@@ -16,7 +16,6 @@ from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from, other_kinds
-from jointscope.tools.writing.whole_file import write_json
 
 KIND = "rests"
 
@@ -97,7 +96,9 @@ def candidate_json(c: Any, measured: int) -> dict[str, Any]:
         "score": c.score,
         "dof": c.dof,
         "p_value": c.p_value,
-        "parameters": {n: {"value": value, "sigma": sigma, "unit": unit} for n, (value, sigma, unit) in c.sizes.items()},
+        "parameters": {
+            n: {"value": value, "sigma": sigma, "unit": unit} for n, (value, sigma, unit) in c.sizes.items()
+        },
         "gain": gain,
         "by_kind": judged,
         "shown_by": [KIND] if c.verdict == "missing" else [],
