@@ -53,7 +53,8 @@ class LinearRests:
             problem: the rests.
             x: states at the solution, shape (m, d).
             calibration: values there.
-            weight, pull: information and gradient of the priors, shape (p,).
+            weight: information of the priors, shape (p,).
+            pull: their gradient, shape (p,).
         """
         torques = problem.torques(x, calibration)
         r, J, P = problem.equations(x, torques, calibration)

@@ -153,7 +153,15 @@ class _Judge:
             return "possible"
         if not self._remains(score, after):
             return "stand_in"
-        return "missing" if score.label in {each.label for each in self.good} else "possible"
+        if score.label not in {each.label for each in self.good}:
+            return "possible"
+        return "stand_in" if self._is_better_alike(score) else "missing"
+
+    def _is_better_alike(self, score: RestScore) -> bool:
+        """Whether a good effect that explains the same to first order is worth more."""
+        own = self.gains(self.race.tried[score.label]).sum()
+        others = [each for each in self.good if each.label != score.label and self.gains(each).sum() > own]
+        return any(self.scores.alike(each.score, score) > ALIKE for each in others)
 
     def _look_alikes(self, score: RestScore, family: set[str]) -> tuple[str, ...]:
         """Equals of the leading effect's family; effects that explain the same to first order and were not fitted."""

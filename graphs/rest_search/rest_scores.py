@@ -66,7 +66,7 @@ class RestScore:
 
 @dataclass(frozen=True)
 class RestScores:
-    """All effects that were scored, most significant first; `joint` compares the spaces of those that are not silent."""
+    """All effects that were scored, most significant first; `joint` compares those that are not silent."""
 
     scores: tuple[RestScore, ...]
     joint: JointScores

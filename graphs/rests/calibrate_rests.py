@@ -180,8 +180,8 @@ def settled_rests(
         if edge == EDGE and agrees:
             break
         whole = replace(whole, repeatability=scale)
-    weights = {"repeatability": whole.repeatability, "edge": whole.edge}
-    return [replace(problem, **weights) for problem in problems], solution, iterations
+    weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
+    return weighed, solution, iterations
 
 
 def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, ...]:

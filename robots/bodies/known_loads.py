@@ -45,12 +45,12 @@ def known_loads(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) 
     frames = {link: tree.frame_id(link) for link in {link for link, some in zip(links, pulled, strict=True) if some}}
     own = q if coupling is None else coupling.positions(q)
     J = np.zeros((len(q), 6, tree.model.nv))
-    for i in np.flatnonzero(pulled):
+    for i in (i for i, some in enumerate(pulled) if some):
         # a model of one joint gives a vector
         J[i] = pin.computeFrameJacobian(tree.model, tree.data, own[i], frames[links[i]], axes).reshape(6, -1)
     linear, angular = J[:, :3], J[:, 3:]
     torque = np.einsum("mck,mc->mk", linear, forces)
-    # a column of the Jacobian turns with every joint k before its own: dJ_j / dq_k = w_k x J_j, and dJ_k / dq_j is the same
+    # a column turns with every joint k before its own: dJ_j / dq_k = w_k x J_j, and dJ_k / dq_j is the same
     turned = np.einsum("mjc,mkc->mjk", np.swapaxes(linear, 1, 2), np.cross(forces[:, None], np.swapaxes(angular, 1, 2)))
     by_q = np.tril(turned) + np.swapaxes(np.tril(turned, -1), 1, 2)
     if coupling is not None:

@@ -76,8 +76,9 @@ def at_rest(
     x = np.zeros((len(positions), layout.size))
     x[:, layout.positions] = positions
     q, still = x[:, layout.q_link], np.zeros((len(x), layout.n_link))
-    creeps = creep is not None and bool(np.any(creep))
-    speeds = [0.0, SLIPPING, -SLIPPING, *([creep] if creeps else [])]
+    speeds: list[Array | float] = [0.0, SLIPPING, -SLIPPING]
+    if creep is not None and np.any(creep):
+        speeds.append(creep)
     found = _at_speeds(model, x, u, parameters, loads.torque[:, layout.joint_link], speeds)
     terms, plain, *sliding = found[0], *(_rows(part, layout.motor_row, layout.positions) for part in found)
     assert terms.by_state is not None and terms.by_parameter is not None
@@ -95,7 +96,7 @@ def at_rest(
     half = _sum((backwards, 0.5), (forwards, -0.5))
     links, motors = (_rows(terms, rows, layout.positions) for rows in (held, layout.motor_row))
     # a rigid joint's motor carries the weight of its links as well
-    creeping = _sum((sliding[2], 1.0), (motors, 1.0), (plain, -1.0)) if creeps else motors
+    creeping = _sum((sliding[2], 1.0), (motors, 1.0), (plain, -1.0)) if len(sliding) > 2 else motors
     return AtRest(links, motors, middle, half, creeping)
 
 

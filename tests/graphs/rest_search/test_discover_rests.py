@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from jointscope.graphs.rest_search.discover_rests import diagnose_rests, discover_rests
-from jointscope.graphs.rest_search.rest_fits import folds_of
-from jointscope.robots.errors import RecordingError
+from jointscope.graphs.rest_search.discover_rests import discover_rests
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.rests.rests import Rests
 
