@@ -81,6 +81,6 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
 def _is_dry(effect: JointTorque, hypothesis: EffectHypothesis) -> bool:
     """Whether a torque of the link remains when its velocity goes to zero, but not at zero."""
     sizes = {p.name: p.start for p in hypothesis.sizes} | dict(hypothesis.shapes)
-    still = JointSignals(*np.zeros((5, 1)), 0.0, AT_ONCE)
+    still = replace(JointSignals(*np.zeros((6, 1))), sharpness=AT_ONCE)
     slow = replace(still, v_link=np.full(1, SLIPPING))
     return bool(abs(effect.law(slow, sizes)[0] - effect.law(still, sizes)[0]) > SLIPPING * FAST)

@@ -9,7 +9,7 @@ from html import escape
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery
 from jointscope.tools.report.page.page import Section, page, table
 from jointscope.tools.report.rests_report import rest_sections
-from jointscope.tools.terminal.rest_search_text import headline, ranking_table, step_table, untestable_said
+from jointscope.tools.terminal.searches.rest_search_text import headline, ranking_table, step_table, untestable_said
 
 
 def rest_search_report(found: RestDiscovery, more: Sequence[Section] = ()) -> str:

@@ -39,7 +39,7 @@ def run_rest_search(
     """
     from jointscope.graphs.rest_search.discover_rests import diagnose_rests, discover_rests
     from jointscope.tools.report.rest_search_report import rest_search_report
-    from jointscope.tools.terminal.rest_search_text import rest_search_text
+    from jointscope.tools.terminal.searches.rest_search_text import rest_search_text
 
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
