@@ -99,20 +99,23 @@ class RestCalibration:
 
 
 @in_solver_context
-def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None) -> RestCalibration:
+def calibrate_rests(
+    robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None, near: RestSet | None = None
+) -> RestCalibration:
     """Calibrates a robot from rests.
 
     Args:
         robot: with start values and priors.
         recordings: rests of each.
         progress: called with a text and the share done.
+        near: rests with the weights to begin with, where the values of the robot are near the end.
 
     Raises:
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    problems, solution, iterations = settled_rests(robot, recordings, report)
-    _, covariance = posteriors(list(problems), solution)
+    problems, solution, iterations = settled_rests(robot, recordings, report, near)
+    _, covariance = posteriors([RestSet.joined(problems)], solution)
     calibration = solution.estimate.calibrations[0]
     index = calibration.columns[DYNAMICS]
     sigmas, scale = np.sqrt(np.diag(covariance)[index]), calibration.value_by_coordinate
@@ -131,7 +134,7 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
         robot=found,
         start=robot,
         problems=tuple(problems),
-        states=tuple(solution.estimate.states),
+        states=states_of(problems, solution),
         parameters=tuple(told),
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
@@ -144,32 +147,51 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
     )
 
 
-def settled_rests(robot: Robot, recordings: Sequence[Rests], report: Progress) -> tuple[list[RestSet], Solution, int]:
-    """Rests with the weights that they deserve, their solution, and the iterations that it took."""
+def settled_rests(
+    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None = None
+) -> tuple[list[RestSet], Solution, int]:
+    """Rests with the weights that they deserve, the solution of all as one set, and the iterations that it took.
+
+    Args:
+        robot: with start values and priors.
+        recordings: rests of each.
+        report: called with a text and the share done.
+        near: rests with the weights to begin with, where the values of the robot are near the end.
+    """
     problems = [RestSet.of(robot, rests) for rests in recordings]
-    starts = [problem.start(Calibration.of(robot)) for problem in problems]
-    estimate, iterations = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts)), 0
-    for k, edge in enumerate((*EDGES, *[EDGE] * PASSES)):
-        problems = [replace(problem, edge=edge) for problem in problems]
-        solution = solve(problems, estimate, max_iterations=MOST_ITERATIONS)
+    if near is not None:
+        problems = [replace(problem, repeatability=near.repeatability) for problem in problems]
+    whole, edges = RestSet.joined(problems), EDGES if near is None else EDGES[-1:]
+    x, calibration = whole.start(Calibration.of(robot))
+    estimate, iterations = Estimate((x,), (calibration,)), 0
+    for k, edge in enumerate((*edges, *[EDGE] * PASSES)):
+        whole = replace(whole, edge=edge)
+        solution = solve([whole], estimate, max_iterations=MOST_ITERATIONS)
         estimate, iterations = solution.estimate, iterations + len(solution.iterations)
         report(f"rests, pass {k + 1}, cost {solution.cost:.6g}", min((k + 1) / 6.0, 0.95))
         if not (solution.converged or solution.flat):
             raise SolveError(
                 f"no convergence after {len(solution.iterations)} iterations over "
-                f"{sum(len(problem.rests) for problem in problems)} rests; loads, units, signs or names may be wrong: "
+                f"{len(whole.rests)} rests; loads, units, signs or names may be wrong: "
                 "look at what `jointscope compare ROBOT --rests BAG` says"
             )
-        scale = _repeatability(problems, solution)
-        agrees = np.all(np.abs(np.log(scale / problems[0].repeatability)) < AGREES)
+        scale = repeatability_of(whole, solution)
+        agrees = np.all(np.abs(np.log(scale / whole.repeatability)) < AGREES)
         if edge == EDGE and agrees:
             break
-        problems = [replace(problem, repeatability=scale) for problem in problems]
-    return problems, solution, iterations
+        whole = replace(whole, repeatability=scale)
+    weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
+    return weighed, solution, iterations
 
 
-def _repeatability(problems: Sequence[RestSet], solution: Solution) -> Array:
+def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, ...]:
+    """The states of each recording in the solution of all as one set."""
+    ends = np.cumsum([len(problem.rests) for problem in problems])[:-1]
+    return tuple(np.split(solution.estimate.states[0], ends))
+
+
+def repeatability_of(whole: RestSet, solution: Solution) -> Array:
     """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
-    residuals = np.concatenate([p.residuals(x) for p, x in zip(problems, solution.estimate.states, strict=True)])
-    size = np.sqrt(np.mean(residuals**2, axis=0))
-    return np.maximum(problems[0].repeatability * size, 1.0)
+    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
+    size = np.sqrt(np.mean(whole.residuals(x, whole.model.named(calibration.values)) ** 2, axis=0))
+    return np.maximum(whole.repeatability * size, 1.0)

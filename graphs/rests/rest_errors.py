@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.rests.at_encoders import encoder_errors
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,10 @@ def _of(problem: RestSet) -> tuple[Array, Array, Array, Array]:
     measured, calibration = problem.start(Calibration.of(robot))
     predicted = problem.predicted()
     columns = robot.layout.joint_link
-    seen = np.zeros_like(rests.q_motor) if rests.q_link is None else rests.q_link - predicted[:, columns]
+    seen = np.zeros_like(rests.q_motor)
+    if rests.q_link is not None:
+        values, q = {name: p.value for name, p in robot.parameters.items()}, predicted[:, columns]
+        seen = rests.q_link - q - encoder_errors(robot, q, values, on_links=True).value
     torques = problem.torques(measured, calibration)
     missing = np.zeros((len(rests), robot.layout.n_link))
     missing[:, problem.held] = torques.links.value

@@ -67,7 +67,7 @@ def _better_integrated(robot: Robot) -> Robot:
 
 
 def remove_effect(robot: Robot, label: str) -> Robot:
-    """A robot without one of its effects.
+    """A robot without one of its effects, and without the derived results that follow from it.
 
     Raises:
         EffectError: the robot does not have it, another effect needs it, or it is a choice of the model and no entry.
@@ -90,7 +90,11 @@ def remove_effect(robot: Robot, label: str) -> Robot:
         if name.startswith(start) and name in document["parameters"]:
             _take_out_parameter(document, name)
     effects = tuple(here for here in robot.effects if here.label != label)
-    new = replace(robot, parameters=parameters, effects=effects, document=document)
+    follows = [result for result in robot.derived if set(result.of) - parameters.keys()]
+    for result in follows:
+        remove_at(document, "derived", result.name)
+    derived = tuple(result for result in robot.derived if result not in follows)
+    new = replace(robot, parameters=parameters, effects=effects, derived=derived, document=document)
     by_name = set(new.layout.links) - set(new.layout.joints) | set(new.memories)
     if not by_name and "effects" in document.get("noise", {}):
         remove_at(document, "noise", "effects")

@@ -25,6 +25,7 @@ from jointscope.robots.rests.load_history import LoadHistory
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
 SWINGING = 12.0  # [sigma] of a link encoder that the means of parts may differ by
+ARRAYS = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved", "creep")
 FEWEST = 3  # rests; fewer, where motors do not stand often, are motion
 
 
@@ -65,10 +66,20 @@ class Rests:
 
     def only(self, kept: NDArray[np.bool_]) -> Rests:
         """Some of the rests."""
-        arrays = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved", "creep")
-        some = {name: getattr(self, name)[kept] for name in arrays}
+        some = {name: getattr(self, name)[kept] for name in ARRAYS}
         links = tuple(link for link, keep in zip(self.links, kept.tolist(), strict=True) if keep)
         return replace(self, q_link=None if self.q_link is None else self.q_link[kept], links=links, **some)
+
+
+def joined_rests(recordings: Sequence[Rests]) -> Rests:
+    """The rests of some recordings of one robot, one after the other."""
+    if len(recordings) == 1:
+        return recordings[0]
+    together = {name: np.concatenate([getattr(rests, name) for rests in recordings]) for name in ARRAYS}
+    seen = [rests.q_link for rests in recordings if rests.q_link is not None]
+    links, notices = (sum((getattr(rests, name) for rests in recordings), ()) for name in ("links", "notices"))
+    paths = ", ".join(rests.path for rests in recordings)
+    return Rests(paths, "", q_link=np.concatenate(seen) if seen else None, links=links, notices=notices, **together)
 
 
 def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:

@@ -13,6 +13,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.rests.rests import Rests
 from jointscope.tools.terminal.rests_text import verdict
@@ -170,3 +171,49 @@ def test_rests_of_a_rigid_joint_tell_its_friction(tmp_path):
     result = calibrate_rests(robot, [hanging(80, 5, rigid=True)])
     (found,) = result.parameters
     assert found.name == "swing.coulomb_torque" and abs(found.value - C0) < 3.0 * found.sigma < 0.1 * C0
+
+
+def test_rigid_joints_that_creep_carry_their_weight(tmp_path):
+    robot = lever(tmp_path, rigid=True)
+    result = calibrate_rests(robot, [hanging(40, 6, rigid=True, creeping=30)])
+    (found,) = result.parameters
+    assert found.value == pytest.approx(C0, rel=0.01) and abs(found.value - C0) < 3.0 * found.sigma
+
+
+def test_recordings_as_one_set_cost_what_they_cost_one_by_one(tmp_path):
+    robot = lever(tmp_path)
+    problems = [RestSet.of(robot, hanging(count, count, creeping=2)) for count in (6, 9)]
+    starts = [problem.start(Calibration.of(robot)) for problem in problems]
+    whole = RestSet.joined(problems)
+    x, calibration = whole.start(Calibration.of(robot))
+    together = whole.linearize(x, calibration)
+    apart = [problem.linearize(*start) for problem, start in zip(problems, starts, strict=True)]
+    np.testing.assert_allclose(together.costs, np.concatenate([each.costs for each in apart]))
+    np.testing.assert_allclose(together.g_p, sum(each.g_p for each in apart))
+    kept = np.arange(15) >= 6
+    np.testing.assert_allclose(whole.only(kept).linearize(x[kept], calibration).costs, apart[1].costs)
+
+
+@pytest.mark.parametrize(
+    ("label", "start"),
+    [
+        ("encoder_offset@swing", {"offset": 0.01}),
+        ("encoder_offset@swing.link", {"offset": -0.02}),
+        ("encoder_eccentricity@swing.link", {"cos": 0.01, "sin": 0.02, "cos2": 0.005, "sin2": -0.01}),
+        ("encoder_scale@swing", {"scale": 0.02}),
+        ("torque_constant_error@swing", {"share": 0.1}),
+        ("pwm_deadband@swing", {"width": 0.3}),
+    ],
+)
+def test_effects_of_encoders_and_commands_act_at_rest_with_the_gradients_of_differences(tmp_path, label, start):
+    robot = add_effect(lever(tmp_path), label, start)
+    problem = RestSet.of(robot, hanging(8, 3, creeping=3))
+    x, calibration = problem.start(Calibration.of(robot))
+    system, h = problem.linearize(x + 1e-3, calibration), 1e-7
+    plain = RestSet.of(lever(tmp_path), hanging(8, 3, creeping=3))
+    assert system.cost != pytest.approx(plain.linearize(x + 1e-3, Calibration.of(plain.robot).only([DYNAMICS])).cost)
+    for i, name in enumerate(calibration.names):
+        step = h * np.eye(len(calibration.names))[i]
+        there = [calibration.with_points({DYNAMICS: calibration.dynamics + side * step}) for side in (1.0, -1.0)]
+        up, down = (problem.linearize(x + 1e-3, point).cost for point in there)
+        assert system.g_p[i] == pytest.approx((up - down) / (2.0 * h), rel=1e-4, abs=0.2), name

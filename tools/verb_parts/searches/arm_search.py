@@ -50,7 +50,7 @@ def run_arm_search(
         discover_arm,
     )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
-    from jointscope.tools.terminal.arm_discovery_text import (
+    from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
         ranking_text,
         recordings_said,
