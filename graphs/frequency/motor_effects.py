@@ -79,7 +79,7 @@ def motor_effects(
         laws = list(_laws(joint, values))
         if not laws:
             continue
-        motion, s = _Motion.of(arm, pose, values, x, i, sharpness[i]), _rates(pose)
+        motion, s = _Motion.of(arm, pose, values, x, i, sharpness[i]), _rates(pose, pose.motions.shape[1])
         rotor = s * s * values[f"{joint}.inertia"] + s * values.get(f"{joint}.{VISCOUS}", 0.0)
         for part in laws:
             u, p = motion.does(part, joint, values)
@@ -128,9 +128,9 @@ def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
             yield part
 
 
-def _rates(pose: ShakenPose) -> Complex:
-    """J w of all lines, shape (K,) [rad/s]."""
-    return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(pose.motions.shape[1]))
+def _rates(pose: ShakenPose, count: int) -> Complex:
+    """J w of the first lines, shape (count,) [rad/s]."""
+    return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(count))
 
 
 @dataclass(frozen=True)
@@ -150,13 +150,13 @@ class _Motion:
         arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex, i: int, sharpness: float
     ) -> _Motion:
         m, spring = pose.motions[:, :, i], arm.springs[arm.driven[i]]
-        K = m.shape[1]
-        count = next_fast_len(FINER * K, real=True)
-        s = _rates(pose)
+        fast = pose.whole_motions[:, :, i]
+        count = next_fast_len(FINER * fast.shape[1], real=True)
+        s, every = _rates(pose, m.shape[1]), _rates(pose, fast.shape[1])
         d = x[:, :, arm.driven[i]] - m
         kappa = arm.dynamic(np.asarray(s.imag, dtype=np.float64), values)[:, arm.driven[i]]
-        q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, s * m, d, -kappa * d))
-        return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, K)
+        q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, every * fast, d, -kappa * d))
+        return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, m.shape[1])
 
     def lines(self, wave: Array) -> Complex:
         return np.asarray(np.fft.rfft(wave, axis=1)[:, : self.kept] / wave.shape[1])

@@ -91,10 +91,18 @@ class ShakenPose:
     @cached_property
     def motions(self) -> Complex:
         """The same in every experiment as it was, each sign by itself, shape (b, K, nu) [rad]."""
-        common = self.found.common
-        K, signs = self.motion.shape[1], self._signs[:, :, None, None]
-        both = 0.0 if common is None else common[:, :, :K].mean(axis=1)
-        return np.asarray((both + signs * self.motion).reshape(-1, *self.motion.shape[1:]))
+        return self._each_sign(self.motion.shape[1])
+
+    @cached_property
+    def whole_motions(self) -> Complex:
+        """The same at all lines of the band of the velocities, shape (b, K', nu) [rad]."""
+        return self._each_sign(1 + int(VELOCITY_BAND * (self.found.Y.shape[2] - 1)))
+
+    def _each_sign(self, count: int) -> Complex:
+        """Positions at the first lines in every experiment as it was, shape (b, count, nu) [rad]."""
+        odd, common = self.found.Y[:, :, :count].mean(axis=1), self.found.common
+        both = 0.0 if common is None else common[:, :, :count].mean(axis=1)
+        return np.asarray((both + self._signs[:, :, None, None] * odd).reshape(-1, *odd.shape[1:]))
 
     def both_signs(self, each: Complex) -> Complex:
         """What every experiment has by itself, shape (b, ...), as spectra of this pose have it, shape (e, ...)."""
