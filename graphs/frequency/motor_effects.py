@@ -5,7 +5,7 @@ A wave of a gear and a spring that hardens are an offset u between motor and lin
 spring turned by it; a wave also levers the torque that is passed on. One of an encoder (o = 1) moves the rotor, too:
 a scale of the angle of 1 + 1e-4, which is as large as sigmas of drives. Friction laws are torques p of the motor:
 
-    u = c cos(o q) + s sin(o q),    -k3 d^3 / k
+    u = c cos(o q) + s sin(o q),    -k3 d^3 / (k + j w d)
     p = pull u'(q),      J u'' + f u',      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
 
 with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
@@ -15,7 +15,7 @@ parameter, along the motion of the stage before; measured torques that are late 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,14 +80,13 @@ def motor_effects(
         if not laws:
             continue
         motion, s = _Motion.of(arm, pose, values, x, i, sharpness[i]), _rates(pose, pose.motions.shape[1])
+        own = {f"{joint}.{part}": wave for part in laws if (wave := motion.offset(part, joint, values)) is not None}
+        motion = motion.passing(sum(values[name] * wave for name, wave in own.items()))
+        beside = {f"{joint}.{part}": p for part in laws if (p := motion.torque(part, joint, values)) is not None}
         rotor = s * s * values[f"{joint}.inertia"] + s * values.get(f"{joint}.{VISCOUS}", 0.0)
-        for part in laws:
-            u, p = motion.does(part, joint, values)
-            for found, wave in ((offsets, u), (torques, p)):
-                if wave is not None:
-                    found[f"{joint}.{part}"] = i, motion.lines(wave)
-            if part in WAVES:
-                torques[f"{joint}.{part}"] = i, rotor * offsets[f"{joint}.{part}"][1]
+        beside |= {f"{joint}.{part}": rotor * own[f"{joint}.{part}"] for part in WAVES if part in laws}
+        offsets |= {name: (i, wave) for name, wave in own.items()}
+        torques |= {name: (i, wave) for name, wave in beside.items()}
     return MotorEffects(offsets, torques)
 
 
@@ -135,45 +134,56 @@ def _rates(pose: ShakenPose, count: int) -> Complex:
 
 @dataclass(frozen=True)
 class _Motion:
-    """A motor and its drive in time, shape (b, N) each."""
+    """A motor and its drive in time, shape (b, N) each; deflection, shape (b, K), and spring, shape (K,), by lines."""
 
     q: Array
     v: Array
-    d: Array
     pull: Array
-    stiffness: float
+    d: Complex
+    spring: Complex
     sharpness: float
-    kept: int
 
     @staticmethod
     def of(
         arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex, i: int, sharpness: float
     ) -> _Motion:
-        m, spring = pose.motions[:, :, i], arm.springs[arm.driven[i]]
-        fast = pose.whole_motions[:, :, i]
+        m, fast = pose.motions[:, :, i], pose.whole_motions[:, :, i]
         count = next_fast_len(FINER * fast.shape[1], real=True)
-        s, every = _rates(pose, m.shape[1]), _rates(pose, fast.shape[1])
-        d = x[:, :, arm.driven[i]] - m
-        kappa = arm.dynamic(np.asarray(s.imag, dtype=np.float64), values)[:, arm.driven[i]]
-        q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, every * fast, d, -kappa * d))
-        return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, m.shape[1])
+        w = np.asarray(_rates(pose, m.shape[1]).imag, dtype=np.float64)
+        q, v = (np.fft.irfft(X * count, count, axis=1) for X in (m, _rates(pose, fast.shape[1]) * fast))
+        kappa = arm.dynamic(w, values)[:, arm.driven[i]]
+        return _Motion(q, v, np.zeros_like(q), x[:, :, arm.driven[i]] - m, kappa, sharpness)
 
-    def lines(self, wave: Array) -> Complex:
-        return np.asarray(np.fft.rfft(wave, axis=1)[:, : self.kept] / wave.shape[1])
+    def passing(self, offset: Complex | float) -> _Motion:
+        """With what the drive takes from the motor when it is off by some turns."""
+        return replace(self, pull=self._in_time(-self.spring * (self.d - offset)))
 
-    def does(self, part: str, joint: str, values: Mapping[str, float]) -> tuple[Array | None, Array | None]:
-        """Offset and torque of unit size."""
-        if part in (*WAVES, *RIPPLE[:2]):
-            order = 1.0 if part in WAVES else values[f"{joint}.{RIPPLE[2]}"]
-            c, s = np.cos(order * self.q), np.sin(order * self.q)
-            wave, slope = (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
-            return wave, None if part in WAVES else self.pull * slope
+    def offset(self, part: str, joint: str, values: Mapping[str, float]) -> Complex | None:
+        """By which an effect of unit size turns the drive, shape (b, K) [rad]."""
         if part == CUBIC:
-            return -(self.d**3) / self.stiffness, None
+            return -self._lines(self._in_time(self.d) ** 3) / self.spring  # the damper has no part in its torque
+        return self._lines(self._wave(part, joint, values)[0]) if part in (*WAVES, *RIPPLE[:2]) else None
+
+    def torque(self, part: str, joint: str, values: Mapping[str, float]) -> Complex | None:
+        """That the motor needs for an effect of unit size, shape (b, K) [N m]."""
         turn = np.tanh(self.sharpness * self.v)
         if part == STRIBECK:
-            return None, np.exp(-((self.v / BREAKAWAY) ** 2)) * turn
-        return None, np.abs(self.pull) * turn
+            return self._lines(np.exp(-((self.v / BREAKAWAY) ** 2)) * turn)
+        if part == LOAD_FRICTION:
+            return self._lines(np.abs(self.pull) * turn)
+        return self._lines(self.pull * self._wave(part, joint, values)[1]) if part in RIPPLE[:2] else None
+
+    def _wave(self, part: str, joint: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """A wave of the gear or of the encoder, and its slope."""
+        order = 1.0 if part in WAVES else values[f"{joint}.{RIPPLE[2]}"]
+        c, s = np.cos(order * self.q), np.sin(order * self.q)
+        return (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
+
+    def _in_time(self, lines: Complex) -> Array:
+        return np.asarray(np.fft.irfft(lines * self.q.shape[1], self.q.shape[1], axis=1))
+
+    def _lines(self, wave: Array) -> Complex:
+        return np.asarray(np.fft.rfft(wave, axis=1)[:, : len(self.spring)] / wave.shape[1])
 
 
 def _summed(parts: Mapping[str, tuple[int, Complex]], values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
