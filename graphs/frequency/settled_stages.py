@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.graphs.frequency.rattling import dwellings
 from jointscope.graphs.frequency.stages import next_stage
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
@@ -108,9 +109,23 @@ def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
         share = float(np.linalg.norm(left) / np.linalg.norm(problem.pose.torques))
         if share > UNEXPLAINED:
             raise SolveError(
-                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; their sign, "
-                "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; {_why(problem)}"
             )
+
+
+def _why(problem: FrequencySet) -> str:
+    """What makes a balance explain nothing: a gap that a drive rattles in, or what the robot file says."""
+    values = {name: p.value for name, p in problem.robot.parameters.items()}
+    each = dwellings(problem.pose, problem.arm.joints, values, problem.sharpness(values))
+    rattling = [one for one in each if one.rattles]
+    if rattling:
+        return (
+            f"{max(rattling, key=lambda one: one.share / one.smooth)}, which no model of frequency responses has; shake "
+            "where its load keeps it on one side, and take the gap from --poses"
+        )
+    return (
+        "their sign, units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+    )
 
 
 def _ahead(step: Array, before: Array | None) -> Array:

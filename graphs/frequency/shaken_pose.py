@@ -98,11 +98,20 @@ class ShakenPose:
         """The same at all lines of the band of the velocities, shape (b, K', nu) [rad]."""
         return self._each_sign(1 + int(VELOCITY_BAND * (self.found.Y.shape[2] - 1)))
 
+    @cached_property
+    def whole_torques(self) -> Complex:
+        """Torques of the motors at all lines in every experiment as it was, shape (b, K, nu) [N m]."""
+        return self._of_signs(*steady_spectra(self.signals.inputs, self.found.excitation, self.path))
+
     def _each_sign(self, count: int) -> Complex:
         """Positions at the first lines in every experiment as it was, shape (b, count, nu) [rad]."""
-        odd, common = self.found.Y[:, :, :count].mean(axis=1), self.found.common
-        both = 0.0 if common is None else common[:, :, :count].mean(axis=1)
-        return np.asarray((both + self._signs[:, :, None, None] * odd).reshape(-1, *odd.shape[1:]))
+        common = self.found.common
+        return self._of_signs(self.found.Y[:, :, :count], None if common is None else common[:, :, :count])
+
+    def _of_signs(self, odd: Complex, common: Complex | None) -> Complex:
+        """What both signs have, shape (b, K, nu), of the half of their difference and of their sum."""
+        half, both = odd.mean(axis=1), 0.0 if common is None else common.mean(axis=1)
+        return np.asarray((both + self._signs[:, :, None, None] * half).reshape(-1, *half.shape[1:]))
 
     def both_signs(self, each: Complex) -> Complex:
         """What every experiment has by itself, shape (b, ...), as spectra of this pose have it, shape (e, ...)."""
