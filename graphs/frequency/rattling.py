@@ -52,9 +52,7 @@ class Dwelling:
         )
 
 
-def dwellings(
-    pose: ShakenPose, joints: Sequence[str], values: Mapping[str, float], sharpness: Array
-) -> list[Dwelling]:
+def dwellings(pose: ShakenPose, joints: Sequence[str], values: Mapping[str, float], sharpness: Array) -> list[Dwelling]:
     """Each drive of a pose that swings through zero.
 
     Args:
@@ -78,6 +76,8 @@ def _passed(pose: ShakenPose, joints: Sequence[str], values: Mapping[str, float]
     s = 2j * np.pi * pose.found.excitation.f0 * np.arange(fast.shape[1])[:, None]
     v = np.fft.irfft(s * fast * count, count, axis=1)
     dry = np.fft.rfft(np.tanh(sharpness * v), axis=1)[:, :K] / count
-    J, mu, f = (np.array([values.get(f"{joint}.{part}", 0.0) for joint in joints]) for part in (INERTIA, COULOMB, VISCOUS))
+    J, mu, f = (
+        np.array([values.get(f"{joint}.{part}", 0.0) for joint in joints]) for part in (INERTIA, COULOMB, VISCOUS)
+    )
     lines = pose.whole_torques[:, :K] - (J * s[:K] ** 2 + f * s[:K]) * m - mu * dry
     return np.asarray(np.fft.irfft(lines * count, count, axis=1).reshape(-1, len(joints)))

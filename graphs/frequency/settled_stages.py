@@ -119,10 +119,8 @@ def _why(problem: FrequencySet) -> str:
     each = dwellings(problem.pose, problem.arm.joints, values, problem.sharpness(values))
     rattling = [one for one in each if one.rattles]
     if rattling:
-        return (
-            f"{max(rattling, key=lambda one: one.share / one.smooth)}, which no model of frequency responses has; shake "
-            "where its load keeps it on one side, and take the gap from --poses"
-        )
+        worst = max(rattling, key=lambda one: one.share / one.smooth)
+        return f"{worst}; shake it where its load keeps it on one side, and take the gap from --poses"
     return (
         "their sign, units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
     )

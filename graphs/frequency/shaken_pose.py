@@ -32,6 +32,7 @@ class ShakenPose:
         matrix: response from torques to positions.
         lines: that are used, in multiples of f0, shape (l,).
         carrier: complex amplitude of the motion that goes on beside the excitation, of each motor, shape (nu,) [rad].
+        reach: how far beyond the highest line motion counts: up to so many times its frequency.
     """
 
     signals: Signals
@@ -41,6 +42,7 @@ class ShakenPose:
     matrix: ResponseMatrix
     lines: NDArray[np.intp]
     carrier: Complex
+    reach: int = 1
 
     @staticmethod
     def of(signals: Signals, excitation: Excitation) -> ShakenPose:
@@ -85,7 +87,7 @@ class ShakenPose:
     @cached_property
     def motion(self) -> Complex:
         """Positions of the motors at all lines up to some beyond the highest one, shape (e, K, nu) [rad]."""
-        K = min(int(self.lines.max()) + 1 + 7 * max(self.step, 1), self.found.Y.shape[2])
+        K = min(self.reach * int(self.lines.max()) + 1 + 7 * max(self.step, 1), self.found.Y.shape[2])
         return np.asarray(self.found.Y[:, :, :K].mean(axis=1))
 
     @cached_property
