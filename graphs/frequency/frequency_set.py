@@ -63,7 +63,6 @@ class Stage:
         slopes: of the arm by its geometry.
         unlikely: minus twice the logarithm of the likelihood of the residuals at `values`, but for a constant.
         x: motion of the arm behind its springs, shape (b, K, n) [rad]; None with logarithms.
-        stiffer: what drives that harden are stiffer by where they work, shape (nu,) [N m/rad].
         sharper: derivative by log k of torques that effects of friction have at `values`, shape (e, l, nu) [N m].
     """
 
@@ -79,7 +78,6 @@ class Stage:
     slopes: GeometrySlopes
     unlikely: float = 0.0
     x: Complex | None = None
-    stiffer: Array | float = 0.0
     sharper: Complex | float = 0.0
 
 
@@ -178,7 +176,7 @@ class FrequencySet:
 
     def stiffness(self, values: Mapping[str, float]) -> MotorStiffness:
         """Dynamic stiffness of the motors without friction."""
-        return motor_stiffness(self.arm, self.stage.parts, self.pose.w, values, self.stage.stiffer)
+        return motor_stiffness(self.arm, self.stage.parts, self.pose.w, values)
 
     def with_friction(self, Z: Complex, values: Mapping[str, float], dry: bool = False) -> Complex:
         """The same with viscous friction of the motors, and with the dry one as the carrying motion makes it seem."""

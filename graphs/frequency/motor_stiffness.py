@@ -56,11 +56,7 @@ class MotorStiffness:
 
 
 def motor_stiffness(
-    arm: FlexibleArm,
-    parts: tuple[Array, Array, Array],
-    w: Array,
-    values: Mapping[str, float],
-    stiffer: Array | float = 0.0,
+    arm: FlexibleArm, parts: tuple[Array, Array, Array], w: Array, values: Mapping[str, float]
 ) -> MotorStiffness:
     """The stiffness of an arm that stands.
 
@@ -69,12 +65,10 @@ def motor_stiffness(
         parts: M, C and G.
         w: of the lines, shape (l,) [rad/s].
         values: of all parameters by name.
-        stiffer: what drives that harden are stiffer by where they work, shape (nu,) [N m/rad].
     """
     M, C, G = parts
     s, kappa = 1j * w[:, None], arm.dynamic(w, values)
     n, E = len(M), arm.driven
-    kappa[:, E] += stiffer
     A = -(w**2)[:, None, None] * M + s[:, :, None] * C + G + kappa[:, :, None] * np.eye(n)
     own = kappa[:, E]
     inverse = np.linalg.inv(A)

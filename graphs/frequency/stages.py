@@ -28,7 +28,6 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
-FIRST_ROUNDS = 6  # to the deflections of drives that harden, from those that do not
 HARDENED = 2  # times the highest line: what a drive that hardens makes of two lines, and where it resonates under load
 NARROWER = 4  # times fewer lines from stage to stage
 STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [rad], [kg], [kg m2] of differences
@@ -54,10 +53,7 @@ def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
         len(pose.lines),
         geometry_slopes(arm, robot, pose),
     )
-    first = FrequencySet(robot, pose, stage)
-    if not hardens:
-        return first
-    return replace(first, stage=replace(stage, stiffer=_moving(first, values, sharpness)[2].stiffer))
+    return FrequencySet(robot, pose, stage)
 
 
 def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
@@ -68,7 +64,7 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     slopes = before.stage.slopes
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
     x, needed, effects = _moving(before, values, sharpness)
-    k = motor_stiffness(arm, parts, pose.w, values, effects.stiffer)
+    k = motor_stiffness(arm, parts, pose.w, values)
     true, columns = measured_torques(arm.joints, pose.torques, pose.w, values)
     standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, pose.lines])
     shift = np.asarray(needed[:, pose.lines] - standing - (true - pose.torques))
@@ -76,7 +72,7 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     columns |= _of_effects(before, values, k, effects)
     columns |= dict(zip(slopes.names, k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines]), strict=True))
     stage = Stage(parts, eye, shift, pose.friction(sharpness), sharpness, columns, values, False, width, slopes)
-    stage = replace(stage, x=x, stiffer=effects.stiffer, sharper=sharper)
+    stage = replace(stage, x=x, sharper=sharper)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
     root = np.linalg.cholesky(_covariance(r, width))
@@ -92,7 +88,7 @@ def with_columns(problem: FrequencySet, robot: Robot) -> FrequencySet:
     other = FrequencySet(robot, pose, old)
     values = {name: p.value for name, p in robot.parameters.items()}
     parts, sharpness = other.arm.linearised(pose.q, values).mean, other.sharpness(values)
-    k = motor_stiffness(other.arm, parts, pose.w, values, old.stiffer)
+    k = motor_stiffness(other.arm, parts, pose.w, values)
     slopes = geometry_slopes(other.arm, robot, pose, set(problem.robot.parameters))
     more = k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines])
     columns = dict(old.geometry) | dict(zip(slopes.names, more, strict=True))
@@ -107,17 +103,13 @@ def _moving(
 ) -> tuple[Complex, Complex, MotorEffects]:
     """The arm's motion, torques that it needs, shape (e, K, nu), and effects on the motors."""
     pose, arm, x = before.pose, before.arm, before.stage.x
-    moving, rounds = None, 1
     if x is None:
-        moving, rounds = moving_arm(arm, pose, values), FIRST_ROUNDS
-        x = moving.x
-    effects = motor_effects(arm, pose, values, sharpness, x)
-    for _ in range(rounds if before.stage.x is not None or np.any(effects.offset) else 0):
-        moving = moving_arm(arm, pose, values, x, effects.offset, effects.stiffer)
-        x = moving.x
-        effects = motor_effects(arm, pose, values, sharpness, x)
-    assert moving is not None
-    return x, moving.torques + pose.both_signs(effects.torque), effects
+        moving = moving_arm(arm, pose, values)
+    else:
+        known = motor_effects(arm, pose, values, sharpness, x)
+        moving = moving_arm(arm, pose, values, x, known.offset, known.stiffer)
+    effects = motor_effects(arm, pose, values, sharpness, moving.x)
+    return moving.x, moving.torques + pose.both_signs(effects.torque), effects
 
 
 def _of_effects(
