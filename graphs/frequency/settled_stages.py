@@ -6,8 +6,8 @@ The begin is the likeliest one of some, for a resonance that is looked for at th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.error_parameters import STIFFNESS
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 
 Array = NDArray[np.float64]
 MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
@@ -44,6 +46,7 @@ class Settled:
         iterations: of all stages.
         stages: how many there were.
         settled: whether nothing moved any more.
+        last: how far each value moved in the last stage, by name, in the unit of the value.
     """
 
     problems: list[FrequencySet]
@@ -51,6 +54,16 @@ class Settled:
     iterations: int
     stages: int
     settled: bool
+    last: Mapping[str, float]
+
+    def told(self, robot: Robot) -> Robot:
+        """The robot with sigmas that hold what stages may add that were not made: steps fall as slowly as they may."""
+        if self.settled:
+            return robot
+        sigmas = {name: robot.parameters[name].sigma for name in self.last if name in robot.parameters}
+        still = 1.0 / (1.0 - MOST_RATIO)
+        wider = {n: float(np.hypot(s, still * self.last[n])) for n, s in sigmas.items() if s is not None}
+        return replace(robot, parameters=with_sigmas(robot.parameters, wider))
 
 
 def settled_stages(
@@ -87,14 +100,17 @@ def settled_stages(
         moved, narrow = (known.dynamics - at) / sigmas, problems[0].stage.width == NEIGHBOURS
         if narrow and np.max(np.abs(moved)) < AGREES:
             _check_left(problems, known)
-            return Settled(problems, solution, iterations, stage + 1, True)
+            return Settled(problems, solution, iterations, stage + 1, True, {})
         ahead = _ahead(moved, None if step is None else step / sigmas)
         at, step = known.dynamics + ahead * sigmas, known.dynamics - at if narrow and not np.any(ahead) else None
         known = known.with_points({DYNAMICS: at})
         common = known.carried_to(common)
         problems = [next_stage(problem, known) for problem in problems]
-    _check_left(problems, solution.estimate.calibrations[0])
-    return Settled(problems, solution, iterations, stage + 1, False)
+    known = solution.estimate.calibrations[0]
+    _check_left(problems, known)
+    steps = np.abs(known.dynamics - at) * known.value_by_coordinate
+    last = dict(zip(known.names, steps.tolist(), strict=True))
+    return Settled(problems, solution, iterations, stage + 1, False, last)
 
 
 def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
