@@ -29,6 +29,7 @@ tools.presentation tools.verdicts tools.terminal tools.terminal.searches tools.r
 tools.report.sections.calibration
 tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
+tools.report.searches
 tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verb_parts.simulations tools.verb_parts.searches
 tools.notebook tools.verbs tools
 """.split()

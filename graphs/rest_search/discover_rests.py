@@ -131,7 +131,8 @@ def diagnosed(
     report("looking for effects", 0.5)
     # scales of torques are those of the values found, not of the start
     problems = [RestSet.of(result.robot, rests) for rests in recordings]
-    whole = replace(RestSet.joined(problems), repeatability=result.problems[0].repeatability)
+    weight = result.problems[0].repeatability
+    whole = replace(RestSet.joined(problems), repeatability=weight, per_command=True)
     values = Calibration.of(result.robot).only([DYNAMICS])
     base = fit_rests(whole, np.concatenate(result.states), values)
     return RestStep(added, result, judge_rests(base, folds_of(recordings)))

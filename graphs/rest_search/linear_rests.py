@@ -66,7 +66,9 @@ class LinearRests:
         rows = P.reshape(-1, P.shape[2])
         A = rows.T @ rows + np.einsum("mdp,mdq->pq", cross, x_by) + np.diag(weight)
         b = rows.T @ r.reshape(-1) + np.einsum("mdp,md->p", cross, moved[:, :, 0]) + pull
-        kept = bands.counts > 0.0
+        kept, counts = bands.counts > 0.0, bands.counts.sum(axis=0)
+        A += (bands.log_gain_slopes.T * counts) @ bands.log_gain_slopes
+        b -= bands.log_gain_slopes.T @ counts
         (by_x, by_p), (half_by_x, half_by_p) = bands.y_slopes, bands.half_slopes
         y, Y = bands.y + (by_x @ moved)[:, :, 0], by_p + by_x @ x_by
         half, H = bands.half + (half_by_x @ moved)[:, :, 0], half_by_p + half_by_x @ x_by

@@ -160,7 +160,8 @@ def settled_rests(
     """
     problems = [RestSet.of(robot, rests) for rests in recordings]
     if near is not None:
-        problems = [replace(problem, repeatability=near.repeatability) for problem in problems]
+        weights = near.repeatability, near.per_command
+        problems = [replace(problem, repeatability=weights[0], per_command=weights[1]) for problem in problems]
     whole, edges = RestSet.joined(problems), EDGES if near is None else EDGES[-1:]
     x, calibration = whole.start(Calibration.of(robot))
     estimate, iterations = Estimate((x,), (calibration,)), 0

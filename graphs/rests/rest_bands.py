@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What dry friction holds at each rest, beside its band: values with slopes, and rows for normal equations."""
+"""What dry friction holds at each rest, beside its band: values with slopes, and rows for normal equations.
+
+What was recorded is the command u, not the torque y = G u + ... that friction holds: its likelihood is that of y times
+G. Without this factor a drive that makes less torque would always be likelier, since its band is narrower.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +28,8 @@ class RestBands:
         y_slopes, half_slopes: their derivatives by positions, (m, n, d), and by shared coordinates, (m, n, p).
         sigma: noise of y and of the band's edges, shape (m, n) [N m].
         counts: 1 where a motor stands after it has moved, 0 where its friction says nothing, shape (m, n).
+        log_gain: logarithm of G relative to its prior, shape (n,).
+        log_gain_slopes: its derivative by shared coordinates, shape (n, p).
     """
 
     y: Array
@@ -32,6 +38,8 @@ class RestBands:
     half_slopes: tuple[Array, Array]
     sigma: Array
     counts: Array
+    log_gain: Array
+    log_gain_slopes: Array
 
     def rows(self) -> tuple[Rows, Array]:
         """Rows that have the gradient and the information of the likelihood, and its cost, shape (m,)."""
@@ -43,5 +51,6 @@ class RestBands:
         ):
             J, P = ((counts * np.sqrt(information))[:, :, None] * slope for slope in slopes)
             rows.append((counts * gradient / np.sqrt(information), J, P))
+        rows.append((-counts, 0.0 * self.y_slopes[0], counts[:, :, None] * self.log_gain_slopes))
         r, J, P = (np.hstack(part) for part in zip(*rows, strict=True))
-        return (r, J, P), np.sum(counts * found.cost, axis=1)
+        return (r, J, P), np.sum(counts * (found.cost - self.log_gain), axis=1)

@@ -35,6 +35,7 @@ from jointscope.robots.rests.rests import Rests, joined_rests
 Array = NDArray[np.float64]
 EXACT = 1e-4  # of the largest torque that a coordinate carries: how well equilibrium holds
 EDGE = 0.02  # no friction repeats better
+SMALLEST_SLOPE = 1e-3  # of the commands that act over those that were recorded
 SMALLEST_BAND = 1e-6  # [N m] half width at which a band is a line
 
 
@@ -49,6 +50,9 @@ class RestSet:
         torque_scale: what torques on links are compared with, shape (n_link,), or (m, n_link) of each rest [N m].
         friction_scale: the same for what friction holds, shape (n,) or (m, n) [N m].
         edge: of its friction, what the edges of a motor's band are blurred by.
+        per_command: whether what friction holds is judged by the likelihood of the commands, which were recorded, and
+            not by that of the torque: models that make different torques of them can be compared then. A calibration
+            that begins far off is better off without.
         owner: number of the recording; None for a whole one.
     """
 
@@ -58,6 +62,7 @@ class RestSet:
     torque_scale: Array
     friction_scale: Array
     edge: float = EDGE
+    per_command: bool = False
     owner: int | None = None
 
     kind: str = field(default="rests", init=False)
@@ -209,7 +214,32 @@ class RestSet:
         half, *half_slopes = self._scaled(torques.half, np.ones_like(whole.value), calibration)
         counts = (self.rests.moved & (self.rests.creep == 0.0)).astype(float)
         half, sigma = np.maximum(half, SMALLEST_BAND), self._band_sigma(calibration)
-        return RestBands(y, half, (y_slopes[0], y_slopes[1]), (half_slopes[0], half_slopes[1]), sigma, counts)
+        slopes = (y_slopes[0], y_slopes[1]), (half_slopes[0], half_slopes[1])
+        return RestBands(y, half, *slopes, sigma, counts, *self._log_gain(calibration))
+
+    def _log_gain(self, calibration: Calibration) -> tuple[Array, Array]:
+        """Logarithm of the torque per command of each motor, relative to its prior, and its derivative by coordinates.
+
+        Of effects on commands the mean slope counts.
+        """
+        if not self.per_command:
+            return np.zeros(self.robot.n), np.zeros((self.robot.n, calibration.size))
+        model, u, parameters = self.model, self.rests.u, self.robot.parameters
+        acting, by = acting_commands(self.robot, u, model.named(calibration.values))
+        size = np.maximum(np.sum(u**2, axis=0), 1e-300)
+        slope = np.maximum(np.sum(u * acting, axis=0) / size, SMALLEST_SLOPE)
+        priors = np.array([parameters[name].prior for name in model.names])
+        own, by_value = model.drive_gain(calibration.values), np.zeros((self.robot.n, len(model.names)))
+        gain = slope * own / model.drive_gain(priors)
+        for k, name in enumerate(model.names):
+            if name in by:
+                by_value[:, k] += np.sum(u * by[name], axis=0) / size / slope
+            if name.rpartition(".")[2] == self.robot.drive_gain:
+                twice = np.where(np.arange(len(model.names)) == k, 2.0, 1.0) * calibration.values
+                by_value[:, k] += (model.drive_gain(twice) / own - 1.0) / calibration.values[k]
+        P = np.zeros((self.robot.n, calibration.size))
+        P[:, calibration.columns[DYNAMICS]] = by_value * calibration.value_by_coordinate
+        return np.log(np.maximum(np.abs(gain), 1e-12)), P
 
     def _band_sigma(self, calibration: Calibration) -> Array:
         gain = np.abs(self.model.drive_gain(calibration.values))

@@ -180,6 +180,23 @@ def test_rigid_joints_that_creep_carry_their_weight(tmp_path):
     assert found.value == pytest.approx(C0, rel=0.01) and abs(found.value - C0) < 3.0 * found.sigma
 
 
+def test_less_torque_per_command_is_no_likelier_where_commands_are_judged(tmp_path):
+    robot = add_effect(lever(tmp_path), "torque_constant_error@swing", {"share": 0.0})
+    # commands that friction alone holds: half of their torque fits into half of the band
+    rests = replace(hanging(30, 8), forces=np.zeros((30, 3)), q_motor=np.zeros((30, 1)), q_link=np.zeros((30, 1)))
+    rests = replace(rests, u=np.linspace(-0.3, 0.3, 30)[:, None])
+    costs = {}
+    for per_command in (False, True):
+        for share in (0.0, -0.5):
+            values = {"swing.torque_constant_error.share": share, "swing.coulomb_torque": 0.31 * (1.0 + share)}
+            values["swing.weight_dependent_friction.coefficient"] = 1e-9
+            problem = replace(RestSet.of(robot, rests).of_robot(robot.with_values(values)), per_command=per_command)
+            x, calibration = problem.start(Calibration.of(problem.robot))
+            costs[per_command, share] = problem.linearize(x, calibration).cost
+    assert costs[False, -0.5] < costs[False, 0.0] - 0.9 * 30 * np.log(2.0)
+    assert costs[True, -0.5] == pytest.approx(costs[True, 0.0], abs=0.1 * 30)
+
+
 def test_recordings_as_one_set_cost_what_they_cost_one_by_one(tmp_path):
     robot = lever(tmp_path)
     problems = [RestSet.of(robot, hanging(count, count, creeping=2)) for count in (6, 9)]
@@ -207,7 +224,7 @@ def test_recordings_as_one_set_cost_what_they_cost_one_by_one(tmp_path):
 )
 def test_effects_of_encoders_and_commands_act_at_rest_with_the_gradients_of_differences(tmp_path, label, start):
     robot = add_effect(lever(tmp_path), label, start)
-    problem = RestSet.of(robot, hanging(8, 3, creeping=3))
+    problem = replace(RestSet.of(robot, hanging(8, 3, creeping=3)), per_command=True)
     x, calibration = problem.start(Calibration.of(robot))
     system, h = problem.linearize(x + 1e-3, calibration), 1e-7
     plain = RestSet.of(lever(tmp_path), hanging(8, 3, creeping=3))

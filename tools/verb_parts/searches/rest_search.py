@@ -38,7 +38,7 @@ def run_rest_search(
         JointscopeError: the rests cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.rest_search.discover_rests import diagnose_rests, discover_rests
-    from jointscope.tools.report.rest_search_report import rest_search_report
+    from jointscope.tools.report.searches.rest_search_report import rest_search_report
     from jointscope.tools.terminal.searches.rest_search_text import rest_search_text
 
     if files.rrd is not None:
