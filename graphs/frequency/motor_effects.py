@@ -84,15 +84,15 @@ def motor_effects(
         motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
         order = values.get(f"{joint}.{RIPPLE[2]}", 0.0)
         own = {part: motion.offset(part, order) for part in laws}
-        offset[:, :, i] = sum(size * own[part] for part, size in laws.items() if own[part] is not None)
+        offset[:, :, i] = _summed(laws, own)
         motion = motion.passing(offset[:, :, i])
         beside = {part: motion.torque(part, order) for part in laws}
         s = _rates(pose, pose.motions.shape[1])
         rotor = s * s * values[f"{joint}.inertia"] + s * values.get(f"{joint}.{VISCOUS}", 0.0)
-        beside |= {part: rotor * own[part] for part in WAVES if part in laws}
-        torque[:, :, i] = sum(size * beside[part] for part, size in laws.items() if beside[part] is not None)
+        beside |= {part: rotor * wave for part, wave in own.items() if part in WAVES and wave is not None}
+        torque[:, :, i] = _summed(laws, beside)
         turning = motion.sharper()
-        sharper[:, :, i] = sum(laws[part] * turning.torque(part, order) for part in DRY if part in laws)
+        sharper[:, :, i] = _summed(laws, {part: turning.torque(part, order) for part in DRY if part in laws})
         stiffer[i] = 3.0 * max(laws.get(CUBIC, 0.0), 0.0) * motion.square
         waves |= {f"{joint}.{part}": (i, own[part], beside[part]) for part in laws}
         if order:
@@ -120,6 +120,11 @@ def measured_torques(
     }
     columns[TORQUE_DELAY] = -1j * w[:, None] * true
     return true, {name: column for name, column in columns.items() if name in values}
+
+
+def _summed(sizes: Mapping[str, float], waves: Mapping[str, Complex | None]) -> Complex | float:
+    """Sum of waves at some sizes, shape (b, K)."""
+    return sum((sizes[part] * wave for part, wave in waves.items() if wave is not None), 0.0)
 
 
 def _rates(pose: ShakenPose, count: int) -> Complex:
