@@ -20,6 +20,7 @@ from jointscope.tools.simulator.frequency_simulation import Shaking, simulate_fr
 from jointscope.tools.simulator.pose_simulation import PoseConditions
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+pytestmark = pytest.mark.slow
 
 LOADED = np.array([0.1, 0.72, 0.62, 1.2, 1.0, 0.3])
 LIGHT = np.array([-1.0, -0.69, 0.94, 1.36, 0.18, -1.53])  # the weight hardly loads drive 3
