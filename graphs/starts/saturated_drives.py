@@ -57,7 +57,9 @@ def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Noti
     except RecordingError:  # streams that do not overlap: others say so
         return []
     unknown = [joint for joint in robot.joints if not robot.has_effect(LIMIT, joint)]
-    uneven = {joint: uneven_limit(windows[WIDTH], robot.joints.index(joint)) for joint in unknown}
+    # three numbers for each joint explain much that a spring does
+    rigid = [joint for joint in unknown if joint not in robot.layout.motors]
+    uneven = {joint: uneven_limit(windows[WIDTH], robot.joints.index(joint)) for joint in rigid}
     told_uneven = {joint: limit for joint, limit in uneven.items() if limit is not None}
     if told_uneven:
         shares = sum(limit.share for limit in told_uneven.values())
