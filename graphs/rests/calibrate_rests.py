@@ -34,6 +34,8 @@ EDGES = (1.0, 0.2, EDGE)  # of the friction: blur of the bands' edges, stage by 
 PASSES = 6  # of the repeatability
 AGREES = 0.05  # relative change of it that asks for no further pass
 MOST_ITERATIONS = 150
+RAN_AWAY = 10.0  # times what a band has held at most, from which it is no band of these rests
+FEWEST_HELD = 4  # rests of a motor that had moved, for this
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
 
@@ -181,8 +183,30 @@ def settled_rests(
         if edge == EDGE and agrees:
             break
         whole = replace(whole, repeatability=scale)
+    _check_bands(whole, solution)
     weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
     return weighed, solution, iterations
+
+
+def _check_bands(whole: RestSet, solution: Solution) -> None:
+    """Bands that are far wider than all that they ever held: there the likelihood hardly falls and nothing leads back.
+
+    Raises:
+        SolveError: the friction of a joint ran away.
+    """
+    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
+    torques = whole.torques(x, calibration)
+    y = np.abs(torques.motors.value - torques.middle.value)
+    held = np.where(whole.rests.moved, y, 0.0).max(axis=0, initial=0.0)
+    narrowest = torques.half.value.min(axis=0, initial=np.inf)
+    away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (narrowest > RAN_AWAY * held)
+    if away.any():
+        j = int(np.argmax(away))
+        raise SolveError(
+            f"the friction of {whole.robot.joints[j]} ran away: it could hold {narrowest[j]:.3g} N m, and had to hold "
+            f"{held[j]:.3g} N m at the most; gains or start values are far off: hold the gain of the drive if you know "
+            "it (`fixed: true` with the value of the data sheet), else begin nearer"
+        )
 
 
 def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, ...]:

@@ -13,6 +13,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.errors import SolveError
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.rests.rests import Rests
@@ -127,6 +128,26 @@ def test_motors_that_creep_tell_their_friction_better_than_those_that_stand(tmp_
         assert after[name].sigma < 0.5 * before[name].sigma, name
     assert after["swing.coulomb_torque"].value == pytest.approx(C0, rel=0.02)
     assert abs(after["swing.stiffness"].value - K) < 3.0 * after["swing.stiffness"].sigma
+
+
+def test_a_drive_gain_is_found_or_friction_that_runs_away_is_told(tmp_path):
+    robot = lever(tmp_path)
+    text = (
+        (tmp_path / "lever.yaml")
+        .read_text(encoding="utf-8")
+        .replace("field: effort, unit: N m}", "field: effort, unit: A}")
+    )
+    rests = hanging(60, 1)
+    rests = replace(rests, u=rests.u / 2.0)
+    for start in (1.0, 2.2):
+        gain = f"parameters:\n  swing.torque_constant: {{value: {start}, unit: N m/A, prior_sigma: 3.0}}\n"
+        robot.path.write_text(text.replace("parameters:\n", gain, 1), encoding="utf-8")
+        found = {p.name: p for p in calibrate_rests(load_robot(robot.path), [rests]).parameters}
+        assert abs(found["swing.torque_constant"].value - 2.0) < 3.0 * found["swing.torque_constant"].sigma < 0.1
+    far = "parameters:\n  swing.torque_constant: {value: 3.0, unit: N m/A, prior_sigma: 3.0}\n"
+    robot.path.write_text(text.replace("parameters:\n", far, 1), encoding="utf-8")
+    with pytest.raises(SolveError, match="friction of swing ran away: it could hold"):
+        calibrate_rests(load_robot(robot.path), [rests])
 
 
 def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
