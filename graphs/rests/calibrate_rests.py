@@ -159,7 +159,20 @@ def settled_rests(
         recordings: rests of each.
         report: called with a text and the share done.
         near: rests with the weights to begin with, where the values of the robot are near the end.
+
+    Raises:
+        SolveError: no convergence, or a friction that ran away.
     """
+    try:
+        return _settled(robot, recordings, report, near)
+    except SolveError:  # springs that are far off make bands wide, which never come back
+        return _settled(robot, recordings, report, near, links_first=True)
+
+
+def _settled(
+    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None, links_first: bool = False
+) -> tuple[list[RestSet], Solution, int]:
+    """The same from one beginning: bands at once, or links in equilibrium before them."""
     problems = [RestSet.of(robot, rests) for rests in recordings]
     if near is not None:
         weights = near.repeatability, near.per_command
@@ -167,6 +180,11 @@ def settled_rests(
     whole, edges = RestSet.joined(problems), EDGES if near is None else EDGES[-1:]
     x, calibration = whole.start(Calibration.of(robot))
     estimate, iterations = Estimate((x,), (calibration,)), 0
+    if links_first:
+        nothing = np.zeros_like(whole.rests.creep)
+        links = replace(whole, rests=replace(whole.rests, moved=nothing.astype(bool), creep=nothing))
+        solution = solve([links], estimate, max_iterations=MOST_ITERATIONS)
+        estimate, iterations = solution.estimate, len(solution.iterations)
     for k, edge in enumerate((*edges, *[EDGE] * PASSES)):
         whole = replace(whole, edge=edge)
         solution = solve([whole], estimate, max_iterations=MOST_ITERATIONS)
@@ -183,27 +201,31 @@ def settled_rests(
         if edge == EDGE and agrees:
             break
         whole = replace(whole, repeatability=scale)
-    _check_bands(whole, solution)
+    check_bands(whole, solution.estimate.states[0], solution.estimate.calibrations[0])
     weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
     return weighed, solution, iterations
 
 
-def _check_bands(whole: RestSet, solution: Solution) -> None:
+def check_bands(whole: RestSet, x: Array, calibration: Calibration) -> None:
     """Bands that are far wider than all that they ever held: there the likelihood hardly falls and nothing leads back.
+
+    Args:
+        whole: the rests.
+        x: where links and motors stand, shape (m, d).
+        calibration: values.
 
     Raises:
         SolveError: the friction of a joint ran away.
     """
-    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
     torques = whole.torques(x, calibration)
     y = np.abs(torques.motors.value - torques.middle.value)
     held = np.where(whole.rests.moved, y, 0.0).max(axis=0, initial=0.0)
-    narrowest = torques.half.value.min(axis=0, initial=np.inf)
-    away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (narrowest > RAN_AWAY * held)
+    usual = np.median(torques.half.value, axis=0)
+    away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (usual > RAN_AWAY * held)
     if away.any():
         j = int(np.argmax(away))
         raise SolveError(
-            f"the friction of {whole.robot.joints[j]} ran away: it could hold {narrowest[j]:.3g} N m, and had to hold "
+            f"the friction of {whole.robot.joints[j]} ran away: it could hold {usual[j]:.3g} N m, and had to hold "
             f"{held[j]:.3g} N m at the most; gains or start values are far off: hold the gain of the drive if you know "
             "it (`fixed: true` with the value of the data sheet), else begin nearer"
         )

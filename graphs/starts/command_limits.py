@@ -40,6 +40,7 @@ FEWEST_ROWS = 60  # windows in which a joint moves; fewer are explained by anyth
 SEVERAL, GOOD_PART = 3, 0.02  # blocks of the recording with such a part of the excess, mean square
 FAR_BETTER = 20.0  # times less must be left open where there are fewer: a push may look alike
 DRY_COLUMN = SIGNALS.index("dry") - 1  # of the motion: all signals but the command
+MOVES = 0.7  # of a limit that dry friction may take: a drive that gives hardly more moves nothing
 PIECES = 6  # of the windows with excess that are left out one by one
 
 
@@ -151,6 +152,8 @@ def _limit(joint: int, by_width: dict[float, list[DrivenWindows]]) -> CommandLim
         whole = _left_open(windows, joint, np.inf)
     if whole < BETTER * left or left > OPEN or np.count_nonzero(sizes > level) < FEWEST:
         return None
+    if dry_friction(windows, joint, [_clipped(some, joint, level) for some in windows]) > MOVES * level:
+        return None
     lost, sigma, several = _lost(windows, joint, level)
     believed = lost > LOST and sigma < SURE and (several or whole > FAR_BETTER * left)
     return CommandLimit(level, float(np.mean(sizes > level)), lost) if believed else None
@@ -211,6 +214,14 @@ def left_open(windows: Sequence[DrivenWindows], joint: int, given: Sequence[Arra
     dry = X[:, DRY_COLUMN]
     beyond = y - dry * (dry @ y) / max(float(dry @ dry), 1e-300)
     return float(rest @ rest / max(float(beyond @ beyond), 1e-300))
+
+
+def dry_friction(windows: Sequence[DrivenWindows], joint: int, given: Sequence[Array]) -> float:
+    """Dry friction that the motion asks for, in the unit of the command; arguments as of `left_open`."""
+    y = np.concatenate([some.of_command(joint, values) for some, values in zip(windows, given, strict=True)])
+    X = np.concatenate([some.motion[joint] for some in windows])
+    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    return float(np.linalg.lstsq(X / size, y, rcond=1e-10)[0][DRY_COLUMN] / size[DRY_COLUMN])
 
 
 def _lost(windows: list[DrivenWindows], joint: int, level: float) -> tuple[float, float, bool]:

@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.command_limits import (
+    MOVES,
     OPEN,
     CommandLimit,
     DrivenWindows,
     command_limits,
+    dry_friction,
     left_open,
     windows_of_drives,
 )
@@ -92,6 +94,12 @@ def uneven_limit(windows: Sequence[DrivenWindows], joint: int) -> UnevenLimit | 
     beyond = [part.u != part.limited(*best) for part in parts]
     count = sum(int(np.count_nonzero(flags)) for flags in beyond)
     if BETTER * left > whole or THAN_ONE * left > even or left > OPEN or count < FEWEST:
+        return None
+    levels = [
+        level for level, sign in zip(best[:2], (-1, 1), strict=True) if np.isfinite(level) and np.any(sign * u > 0.0)
+    ]
+    dry = dry_friction(windows, joint, [part.limited(*best) for part in parts])
+    if not levels or dry > MOVES * min(levels):
         return None
     stretches = tuple(_stretches(part.times, flags) for part, flags in zip(parts, beyond, strict=True))
     lower, upper = (level if np.any(sign * u > 0.0) else np.inf for level, sign in zip(best[:2], (-1, 1), strict=True))

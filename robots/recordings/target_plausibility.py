@@ -194,8 +194,9 @@ def _check_hand(target: PositionTarget, points: Array, seen: Array) -> None:
     flip = "no `left_handed`" if target.source.scale else "`left_handed: true`"
     raise RecordingError(
         f"{target.name}: only a mirror image of its positions fits the motion of {target.body} ({mirrored:.3g} m "
-        f"instead of {left:.3g} m are left, rms): the axes of its tracker are left-handed, or two of its columns are "
-        f"exchanged; set {flip} of sensors.{target.name} in the robot file (x is turned over when it is read) and "
+        f"instead of {left:.3g} m are left, rms): the axes of its tracker are left-handed, two of its columns are "
+        "exchanged, or a joint before it counts the other way round than the URDF. For the first, "
+        f"set {flip} of sensors.{target.name} in the robot file (x is turned over when it is read) and "
         f"tracker_pose: {pose}, or mend the columns"
     )
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.graphs.rests.calibrate_rests import calibrate_rests, check_bands
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.errors import SolveError
@@ -130,24 +130,36 @@ def test_motors_that_creep_tell_their_friction_better_than_those_that_stand(tmp_
     assert abs(after["swing.stiffness"].value - K) < 3.0 * after["swing.stiffness"].sigma
 
 
-def test_a_drive_gain_is_found_or_friction_that_runs_away_is_told(tmp_path):
-    robot = lever(tmp_path)
-    text = (
-        (tmp_path / "lever.yaml")
-        .read_text(encoding="utf-8")
-        .replace("field: effort, unit: N m}", "field: effort, unit: A}")
-    )
+@pytest.mark.parametrize("start", (1.0, 2.2, 3.0))
+def test_a_drive_gain_is_found_from_starts_that_are_far_off(tmp_path, start):
+    # from 3.0 bands first become so wide that nothing leads back: then links find their springs before them
+    path = lever(tmp_path).path
+    text = path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
+    gain = f"parameters:\n  swing.torque_constant: {{value: {start}, unit: N m/A, prior_sigma: 3.0}}\n"
+    path.write_text(text.replace("parameters:\n", gain, 1), encoding="utf-8")
     rests = hanging(60, 1)
-    rests = replace(rests, u=rests.u / 2.0)
-    for start in (1.0, 2.2):
-        gain = f"parameters:\n  swing.torque_constant: {{value: {start}, unit: N m/A, prior_sigma: 3.0}}\n"
-        robot.path.write_text(text.replace("parameters:\n", gain, 1), encoding="utf-8")
-        found = {p.name: p for p in calibrate_rests(load_robot(robot.path), [rests]).parameters}
-        assert abs(found["swing.torque_constant"].value - 2.0) < 3.0 * found["swing.torque_constant"].sigma < 0.1
-    far = "parameters:\n  swing.torque_constant: {value: 3.0, unit: N m/A, prior_sigma: 3.0}\n"
-    robot.path.write_text(text.replace("parameters:\n", far, 1), encoding="utf-8")
-    with pytest.raises(SolveError, match="friction of swing ran away: it could hold"):
-        calibrate_rests(load_robot(robot.path), [rests])
+    result = calibrate_rests(load_robot(path), [replace(rests, u=rests.u / 2.0)])
+    found = {p.name: p for p in result.parameters}
+    assert abs(found["swing.torque_constant"].value - 2.0) < 3.0 * found["swing.torque_constant"].sigma < 0.1
+    assert abs(found["swing.coulomb_torque"].value - C0) < 3.0 * found["swing.coulomb_torque"].sigma < 0.5 * C0
+
+
+def test_friction_that_ran_away_is_no_result(tmp_path):
+    far = lever(tmp_path).with_values({"swing.coulomb_torque": 300.0})
+    whole = RestSet.of(far, hanging(20, 1))
+    x, calibration = whole.start(Calibration.of(far))
+    with pytest.raises(SolveError, match=r"friction of swing ran away: it could hold 3\d\d N m"):
+        check_bands(whole, x, calibration)
+
+
+def test_friction_far_beyond_its_band_and_sigmas_that_were_widened_are_no_yes(tmp_path):
+    good = calibrate_rests(lever(tmp_path), [hanging(60, 1)])
+    assert verdict(good).startswith("Yes")
+    narrow = good.robot.with_values({"swing.coulomb_torque": 0.1, "swing.weight_dependent_friction.coefficient": 0.01})
+    said = verdict(replace(good, errors=rest_errors([p.of_robot(narrow) for p in good.problems])))
+    assert said.startswith("No") and "friction of swing would have to hold" in said and "diagnose" in said
+    wide = tuple(replace(p, repeatability=np.array([20.0])) for p in good.problems)
+    assert "swing rests 20 sigmas of its encoder away" in verdict(replace(good, problems=wide))
 
 
 def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
