@@ -20,7 +20,7 @@ from jointscope.tools.terminal.text_table import text_table
 LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
 WIDENED, FAR = 1.5, 3.0  # times that sigmas of link encoders were widened: more than they may repeat, and no noise
-BEYOND = 0.3  # of its band, that friction may have to hold beyond it
+BEYOND = 0.1  # of its band, that friction may have to hold beyond it
 
 
 def rest_calibration_text(result: RestCalibration) -> str:
