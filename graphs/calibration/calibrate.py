@@ -37,6 +37,7 @@ from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
@@ -212,10 +213,13 @@ def _asked_by_regression(
         return result
     # noise of encoders as it was before a model that lacks something took a part of it
     robot = replace(result.robot, sensors=result.start.sensors)
-    changed = changed_load(robot, recordings)
-    causes = confirmed(regressed_causes(robot, recordings), test) if changed is None else ()
-    growing = load_frictions(robot, recordings) if changed is None and not causes else ()
-    return replace(result, changed=changed, causes=causes, load_frictions=growing)
+    rows = joint_rows(robot, recordings)
+    if rows is None:
+        return result
+    if changed := changed_load(rows, [recording.path for recording in recordings]):
+        return replace(result, changed=changed)
+    causes = confirmed(regressed_causes(rows), test)
+    return replace(result, causes=causes, load_frictions=() if causes else load_frictions(rows))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

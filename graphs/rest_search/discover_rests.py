@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,14 @@ class RestDiscovery:
     def adequate(self) -> bool:
         """Whether nothing is missing any more."""
         return not any(c.verdict == "missing" for c in self.candidates)
+
+    @cached_property
+    def errors_of_steps(self) -> tuple[tuple[RestErrors, RestErrors | None], ...]:
+        """Errors of each step on rests for training, and on those held out; None without."""
+        return tuple(
+            (self.errors(step, self.recordings), self.errors(step, self.holdout) if self.holdout else None)
+            for step in self.steps
+        )
 
     def errors(self, step: RestStep, recordings: Sequence[Rests]) -> RestErrors:
         """Errors of a step's model on rests, in the sigmas of the last model, so that steps can be compared."""

@@ -132,12 +132,11 @@ def with_score(robot: Robot, score: RestScore) -> Robot:
 
 
 def _sigmas(fit: RestFit, score: RestScore) -> dict[str, float]:
-    H, _ = reduced(fit.rests, fit.x, fit.calibration)
+    H, _ = reduced(fit.rests.linearize(fit.x, fit.calibration))
+    own = fit.calibration.columns[DYNAMICS]
     parameters = fit.rests.robot.parameters
     weight = [1.0 / parameters[name].coordinate_sigma ** 2 for name in fit.calibration.names]
-    covariance = np.linalg.inv(
-        H[fit.calibration.columns[DYNAMICS]][:, fit.calibration.columns[DYNAMICS]] + np.diag(weight)
-    )
+    covariance = np.linalg.inv(H[own, own] + np.diag(weight))
     sigmas = dict(
         zip(fit.calibration.names, np.sqrt(np.diag(covariance)) * fit.calibration.value_by_coordinate, strict=True)
     )

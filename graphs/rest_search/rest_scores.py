@@ -24,6 +24,7 @@ from jointscope.graphs.rest_search.rest_hypotheses import at_null, batches
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
+from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.dynamics.at_rest import SLIPPING
 from jointscope.robots.model.robot import Robot
 
@@ -135,12 +136,13 @@ class _Linear:
         wide = at_null(robot, hypotheses)
         calibration = Calibration.of(wide).only([DYNAMICS])
         problem = whole.of_robot(wide)
-        H, g = reduced(problem, x, calibration)
+        system = problem.linearize(x, calibration)
+        H, g = reduced(system)
         free = [wide.parameters[name] for name in calibration.names]
         weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
         prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
         # sizes of effects stand behind the values of the base model, in whose order they were added
-        n, raw = len(Calibration.of(robot).names), np.diag(problem.linearize(x, calibration).C)
+        n, raw = len(Calibration.of(robot).names), np.diag(system.C)
         creep = np.sign(whole.rests.creep) * SLIPPING
         slow = replace(problem, rests=replace(problem.rests, creep=creep)).linearize(x, calibration).C
         alone, pull = np.diag(H)[n:], weight * (calibration.dynamics - prior)
@@ -230,9 +232,8 @@ def _score_of(hypothesis: EffectHypothesis, S: Array, s: Array, c: NDArray[np.in
     return HypothesisScore(hypothesis, float(s @ covariance @ s), -covariance @ s, sigma, S, s)
 
 
-def reduced(problem: RestSet, x: Array, calibration: Calibration) -> tuple[Array, Array]:
+def reduced(system: NormalEquations) -> tuple[Array, Array]:
     """Hessian and gradient of all rests in the shared values, states eliminated, without priors."""
-    system = problem.linearize(x, calibration)
     solved = np.linalg.solve(system.D, np.concatenate([system.B, system.g_x[:, :, None]], axis=2))
     B = system.B
     H = system.C - np.einsum("mdp,mdq->pq", B, solved[:, :, :-1])

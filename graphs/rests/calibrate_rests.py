@@ -218,8 +218,7 @@ def check_bands(whole: RestSet, x: Array, calibration: Calibration) -> None:
         SolveError: the friction of a joint ran away.
     """
     torques = whole.torques(x, calibration)
-    y = np.abs(torques.motors.value - torques.middle.value)
-    held = np.where(whole.rests.moved, y, 0.0).max(axis=0, initial=0.0)
+    held = np.where(whole.rests.moved, np.abs(torques.held.value), 0.0).max(axis=0, initial=0.0)
     usual = np.median(torques.half.value, axis=0)
     away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (usual > RAN_AWAY * held)
     if away.any():

@@ -91,7 +91,7 @@ def friction_curves(problems: Sequence[RestSet], covariance: Array) -> list[Meas
         states = problem.start(calibration)[0]
         torques = problem.torques(states, calibration)
         carried = _carried(problem, _states(problem), values)
-        drive = torques.motors.value - torques.middle.value
+        drive = torques.held.value
         acting, _ = acting_commands(robot, problem.rests.u, values)
         if problem.rests.q_link is None:
             return []

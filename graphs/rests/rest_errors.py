@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.robots.dynamics.at_rest import AtRest
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.at_encoders import encoder_errors
 
@@ -85,25 +84,23 @@ def _of(problem: RestSet) -> tuple[Array, ...]:
     torques = problem.torques(measured, calibration)
     missing = np.zeros((len(rests), robot.layout.n_link))
     missing[:, problem.held] = torques.links.value
-    beyond = np.abs(torques.motors.value - torques.middle.value) - torques.half.value
+    held = torques.held
+    beyond = np.abs(held.value) - torques.half.value
     friction = np.where(rests.moved, np.maximum(beyond, 0.0), 0.0)
     # how far motors are off moves the links as well
     motor, link = problem.encoder_sigmas()
-    certain = np.maximum(friction - SURELY * _noise(problem, torques, motor, link), 0.0)
+    certain = np.maximum(friction - SURELY * _noise(problem, held.by_position, motor, link), 0.0)
     sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
     return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value
 
 
-def _noise(problem: RestSet, torques: AtRest, motor: Array, link: Array) -> Array:
-    """Sigma of the torques on motors that encoders leave, shape (m, n) [N m]."""
+def _noise(problem: RestSet, slopes: Array, motor: Array, link: Array) -> Array:
+    """Sigma of torques with derivatives by positions, shape (m, n, d), that encoders leave, shape (m, n) [N m]."""
     layout = problem.robot.layout
-    place = {int(column): k for k, column in enumerate(layout.positions)}
-    slopes = torques.motors.by_position - torques.middle.by_position
     squares = np.zeros(slopes.shape[:2])
     for columns, sigma in ((layout.motor_q, motor), (layout.joint_q, link)):
-        own = [place[int(column)] for column in columns]
         if np.all(np.isfinite(sigma)):
-            squares += np.sum((slopes[:, :, own] * sigma[:, None, :]) ** 2, axis=2)
+            squares += np.sum((slopes[:, :, problem.places(columns)] * sigma[:, None, :]) ** 2, axis=2)
     return np.sqrt(squares)
 
 

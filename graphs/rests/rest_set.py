@@ -205,13 +205,9 @@ class RestSet:
 
     def bands(self, torques: AtRest, calibration: Calibration) -> RestBands:
         """What friction holds where motors stand."""
-        whole = WithSlopes(
-            torques.motors.value - torques.middle.value,
-            torques.motors.by_position - torques.middle.by_position,
-            torques.motors.by_parameter - torques.middle.by_parameter,
-        )
-        y, *y_slopes = self._scaled(whole, np.ones_like(whole.value), calibration)
-        half, *half_slopes = self._scaled(torques.half, np.ones_like(whole.value), calibration)
+        plain = np.ones_like(torques.half.value)
+        y, *y_slopes = self._scaled(torques.held, plain, calibration)
+        half, *half_slopes = self._scaled(torques.half, plain, calibration)
         counts = (self.rests.moved & (self.rests.creep == 0.0)).astype(float)
         half, sigma = np.maximum(half, SMALLEST_BAND), self._band_sigma(calibration)
         slopes = (y_slopes[0], y_slopes[1]), (half_slopes[0], half_slopes[1])
@@ -245,16 +241,20 @@ class RestSet:
         gain = np.abs(self.model.drive_gain(calibration.values))
         return np.hypot(self.edge * self.friction_scale, gain * self.rests.u_scatter)
 
+    def places(self, columns: NDArray[np.intp]) -> list[int]:
+        """Where columns of the state stand among the positions."""
+        place = {int(column): k for k, column in enumerate(self.robot.layout.positions)}
+        return [place[int(column)] for column in columns]
+
     def _encoders(self, x: Array, calibration: Calibration) -> list[Rows]:
         layout, rests = self.robot.layout, self.rests
-        place = {int(column): k for k, column in enumerate(layout.positions)}
         found, sigmas = [], self.encoder_sigmas()
         values, names = self.model.named(calibration.values), calibration.names
         sides = [(rests.q_motor, layout.motor_q, sigmas[0], False)]
         if rests.q_link is not None:
             sides.append((rests.q_link, layout.joint_q, sigmas[1], True))
         for measured, columns, sigma, on_links in sides:
-            own = [place[int(column)] for column in columns]
+            own = self.places(columns)
             error = encoder_errors(self.robot, x[:, own], values, on_links)
             J = np.eye(x.shape[1])[own] * ((1.0 + error.by_position) / sigma)[:, :, None]
             P = np.zeros((*sigma.shape, calibration.size))

@@ -14,13 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.joint_regression import JointRows, Since, applies, fit
+from jointscope.graphs.scoring.joint_regression import JointRows, Since, fit
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
 
 WIDTH = 0.24  # [s] of windows
 TRIED = 17  # times of each recording, first
@@ -50,28 +47,23 @@ class ChangedLoad:
     size: float
 
 
-def changed_load(robot: Robot, recordings: Sequence[Recording]) -> ChangedLoad | None:
+def changed_load(rows: JointRows, paths: Sequence[str]) -> ChangedLoad | None:
     """The change of load that explains most; None where none explains nearly all that is missing somewhere.
 
     Args:
-        robot: a model of rigid joints.
-        recordings: of it.
+        rows: of the regression.
+        paths: of its recordings.
     """
-    effect = catalogue()[EFFECT]
+    robot, effect = rows.robot, catalogue()[EFFECT]
     owners = effect.owners_of(robot)  # none where no link has a mass
-    if not applies(robot) or not np.any(robot.tree.gravity) or not owners:
-        return None
-    robot = robot.in_posture(recordings[0].posture)
-    try:
-        rows = JointRows(robot, recordings)
-    except RecordingError:  # streams that do not overlap: others say so
+    if not np.any(robot.tree.gravity) or not owners:
         return None
     owner = owners[-1]
     load = EffectHypothesis(EffectAt(effect, owner), effect.parameters_at(robot, owner))
     joints = [joint for joint in range(robot.n) if rows.of(joint, WIDTH, load) is not None]
     search = _Search(rows, load, joints)
     found = [(search.best(i, *span), i, span) for i, span in enumerate(rows.spans())] if joints else []
-    told = [(*one, span[1], recordings[i].path) for one, i, span in found]
+    told = [(*one, span[1], paths[i]) for one, i, span in found]
     if not told:
         return None
     _, time, joint, left, size, end, path = min(told)

@@ -23,6 +23,7 @@ from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, p
 from jointscope.graphs.starts.motion_cells import motion_cells
 from jointscope.graphs.starts.windowed_sums import joint_signals, windowed_rows
 from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -32,7 +33,22 @@ DELAY, DELAY_NAME = "command_delay@robot", "robot.command_delay.delay"  # comman
 FEWEST_ROWS = 60  # windows
 
 
-def applies(robot: Robot) -> bool:
+def joint_rows(robot: Robot, recordings: Sequence[Recording]) -> JointRows | None:
+    """The rows of a robot's regression; None where it does not apply, or streams do not overlap: others say so.
+
+    Args:
+        robot: the model.
+        recordings: of it, at least one.
+    """
+    if not _applies(robot):
+        return None
+    try:
+        return JointRows(robot.in_posture(recordings[0].posture), recordings)
+    except RecordingError:
+        return None
+
+
+def _applies(robot: Robot) -> bool:
     """Whether all joints are rigid, with known masses, and with effects that columns tell."""
     if robot.layout.motors or robot.choices.link_dynamics != "model" or robot.transmission is not None:
         return False

@@ -10,18 +10,14 @@ rises with the acceleration. So its factor is asked for with a sigma, from block
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, applies, changes_between, fit
+from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
-from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -50,21 +46,15 @@ class LoadFriction:
     with_it: dict[str, float]
 
 
-def load_frictions(robot: Robot, recordings: Sequence[Recording]) -> tuple[LoadFriction, ...]:
+def load_frictions(rows: JointRows) -> tuple[LoadFriction, ...]:
     """The joints whose friction surely grows with their torque, by so much that it matters.
 
     Args:
-        robot: a model of rigid joints.
-        recordings: of it.
+        rows: of the regression.
     """
+    robot = rows.robot
     # what else a robot has is regressed on to first order only, which a few percent of a torque do not bear
-    more = [here for here in robot.effects if here.effect.id not in (PLAIN, LIMIT) and here.label != DELAY]
-    if more or not applies(robot):
-        return ()
-    robot = robot.in_posture(recordings[0].posture)
-    try:
-        rows = JointRows(robot, recordings)
-    except RecordingError:  # streams that do not overlap: others say so
+    if any(here.effect.id not in (PLAIN, LIMIT) and here.label != DELAY for here in robot.effects):
         return ()
     found = []
     for joint in range(robot.n):

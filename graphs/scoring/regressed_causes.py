@@ -19,14 +19,12 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, applies, changes_between, fit
+from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -67,22 +65,14 @@ class RegressedCause:
         return f"{self.effect}@{self.joint}"
 
 
-def regressed_causes(robot: Robot, recordings: Sequence[Recording]) -> tuple[RegressedCause, ...]:
-    """What the joints lack, in the order of the joints; nothing where regression does not apply, or tells nothing.
+def regressed_causes(rows: JointRows) -> tuple[RegressedCause, ...]:
+    """What the joints lack, in the order of the joints; nothing where regression tells nothing.
 
     Args:
-        robot: the calibrated robot.
-        recordings: those of the calibration.
+        rows: of the regression, of the calibrated robot and the recordings of the calibration.
     """
-    if not applies(robot):
-        return ()
-    robot = robot.in_posture(recordings[0].posture)
-    try:
-        rows = JointRows(robot, recordings)
-    except RecordingError:  # streams that do not overlap: others say so
-        return ()
-    asked = _hypotheses(robot)
-    found = [_of_joint(rows, joint, asked) for joint in range(robot.n)]
+    asked = _hypotheses(rows.robot)
+    found = [_of_joint(rows, joint, asked) for joint in range(rows.robot.n)]
     return _agreed([cause for cause in found if cause is not None])
 
 

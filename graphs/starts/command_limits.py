@@ -12,7 +12,7 @@ least of c open. Rotor, friction and constant are found in the same regression, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,8 +101,12 @@ def command_limits(
         held: whether a command acts until the next one.
         sharpness: k in tanh(k v) of dry friction, of all joints or of each, shape (n,) [s/rad].
     """
-    by_width = windows_of_drives(tree, recordings, sigmas, held=held, sharpness=sharpness)
-    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
+    return limits_in(windows_of_drives(tree, recordings, sigmas, held=held, sharpness=sharpness), tree.n)
+
+
+def limits_in(by_width: Mapping[float, list[DrivenWindows]], joints: int) -> list[CommandLimit | None]:
+    """The same in the windows of `windows_of_drives`, for a number of joints."""
+    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(joints)]
 
 
 def windows_of_drives(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointscope.graphs.starts.command_limits import CommandLimit, command_limits, windows_of_drives
+from jointscope.graphs.starts.command_limits import CommandLimit, limits_in, windows_of_drives
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
 from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_limit
 from jointscope.robots.errors import RecordingError
@@ -51,9 +51,8 @@ def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Noti
     if reported or robot.free_links or robot.transmission is not None or not robot.command_held:
         return []
     robot = robot.in_posture(recordings[0].posture)
-    driven, sigmas = driven_joints(robot, recordings), robot.motor_encoder.sigmas
     try:
-        windows = windows_of_drives(robot.tree, driven, sigmas)
+        windows = windows_of_drives(robot.tree, driven_joints(robot, recordings), robot.motor_encoder.sigmas)
     except RecordingError:  # streams that do not overlap: others say so
         return []
     unknown = [joint for joint in robot.joints if not robot.has_effect(LIMIT, joint)]
@@ -65,7 +64,7 @@ def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Noti
         shares = sum(limit.share for limit in told_uneven.values())
         count = round(shares * len(recordings[0].command))
         return [Notice("command", SATURATION, count, _of_uneven(robot, recordings, told_uneven))]
-    found = dict(zip(robot.joints, command_limits(robot.tree, driven, sigmas), strict=True))
+    found = dict(zip(robot.joints, limits_in(windows, robot.n), strict=True))
     told = {joint: limit for joint in unknown if (limit := found[joint]) is not None}
     if not told:
         return []

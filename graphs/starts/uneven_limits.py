@@ -25,9 +25,9 @@ from jointscope.graphs.starts.command_limits import (
     OPEN,
     CommandLimit,
     DrivenWindows,
-    command_limits,
     dry_friction,
     left_open,
+    limits_in,
     windows_of_drives,
 )
 from jointscope.graphs.starts.drive_regression import Driven
@@ -109,8 +109,9 @@ def uneven_limit(windows: Sequence[DrivenWindows], joint: int) -> UnevenLimit | 
 
 def even_limits(tree: RigidTree, recordings: Sequence[Driven], sigmas: Array) -> list[CommandLimit | None]:
     """As `command_limits`, but None where the limit differs between directions or falls with speed."""
-    windows, found = windows_of_drives(tree, recordings, sigmas)[WIDTH], command_limits(tree, recordings, sigmas)
-    return [None if limit and uneven_limit(windows, joint) else limit for joint, limit in enumerate(found)]
+    windows = windows_of_drives(tree, recordings, sigmas)
+    found = enumerate(limits_in(windows, tree.n))
+    return [None if limit and uneven_limit(windows[WIDTH], joint) else limit for joint, limit in found]
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,11 @@ class AtRest:
     half: WithSlopes
     sliding: WithSlopes
 
+    @property
+    def held(self) -> WithSlopes:
+        """What friction has to hold, less the middle of its band, k = n."""
+        return _sum((self.motors, 1.0), (self.middle, -1.0))
+
 
 def at_rest(
     model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads, creep: Array | None = None

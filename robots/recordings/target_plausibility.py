@@ -78,37 +78,6 @@ def seen_beside(motion: JointMotion, stream: Stream, delay: float = 0.0) -> tupl
     return motion.q[chosen], np.column_stack(seen)
 
 
-def target_delay(tree: RigidTree, body: str, at: Array, motion: JointMotion, stream: Stream) -> tuple[float, float]:
-    """By how much the stamps of a target are late for the joints' motion, and what it leaves, root mean square [m].
-
-    Springs put a target elsewhere with the acceleration, a delay with the velocity. Zero where the best delay does not
-    leave much less than none.
-
-    Args:
-        tree: rigid bodies.
-        body: link that carries the target.
-        at: place of the target on it, to begin with, shape (3,) [m].
-        motion: of the joints.
-        stream: what the tracker measured.
-    """
-
-    def left(delay: float) -> float:
-        q, seen = seen_beside(motion, stream, delay)
-        point = body_point(tree, body, np.zeros(3), q)
-        return tracker_and_shift(point.value, point.R_base_body, seen, at, FEW_ROUNDS)[2]
-
-    tried = np.arange(0.0, LATEST + 0.5 * STEP, STEP)
-    found = np.array([left(float(delay)) for delay in tried])
-    k = int(np.argmin(found))
-    if k == 0 or found[k] > LATE * found[0]:
-        return 0.0, float(found[0])
-    best = float(tried[k])
-    if k + 1 < len(tried):
-        bend = found[k - 1] ** 2 - 2.0 * found[k] ** 2 + found[k + 1] ** 2
-        best += 0.5 * STEP * float((found[k - 1] ** 2 - found[k + 1] ** 2) / max(bend, 1e-300))
-    return best, float(found[k])
-
-
 def fitted_tracker(tree: RigidTree, body: str, at: Array, q: Array, seen: Array) -> tuple[Array, Array, float]:
     """Best place of a tracker for a target anywhere on a link.
 
@@ -130,38 +99,54 @@ def fitted_tracker(tree: RigidTree, body: str, at: Array, q: Array, seen: Array)
 
 
 def _late(robot: Robot, target: PositionTarget, motion: JointMotion, stream: Stream) -> tuple[float, list[Notice]]:
-    """Delay of a tracker whose stamps are late, which the robot file does not know [s], and what is said of it."""
+    """Delay of a tracker whose stamps are late, which the robot file does not know [s], and what is said of it.
+
+    Springs put a target elsewhere with the acceleration, a delay with the velocity. Zero where the best delay does not
+    leave much less than none.
+    """
     if any(here.owner == target.name and isinstance(here.effect, TimeShift) for here in robot.effects):
         return 0.0, []
-    q, seen = seen_beside(motion, stream)
-    point = body_point(robot.tree, target.body, np.zeros(3), q)
-    now = tracker_and_shift(point.value, point.R_base_body, seen, target.at, FEW_ROUNDS)[2]
+    tried = np.arange(0.0, LATEST + 0.5 * STEP, STEP)
+    now = _left_at(robot.tree, target, motion, stream, 0.0)
     if now < NOISE * target.sigma:
         return 0.0, []
-    delay, left = target_delay(robot.tree, target.body, target.at, motion, stream)
-    if delay == 0.0:
+    found = np.array([now, *(_left_at(robot.tree, target, motion, stream, float(delay)) for delay in tried[1:])])
+    k = int(np.argmin(found))
+    if k == 0 or found[k] > LATE * now:
         return 0.0, []
+    delay = float(tried[k])
+    if k + 1 < len(tried):
+        bend = found[k - 1] ** 2 - 2.0 * found[k] ** 2 + found[k + 1] ** 2
+        delay += 0.5 * STEP * float((found[k - 1] ** 2 - found[k + 1] ** 2) / max(bend, 1e-300))
     springs = ", some of which may be due to springs" if robot.layout.motors else ""
     text = (
-        f"{target.name} is late, by about {1e3 * delay:.2g} ms{springs}: with it {1e3 * left:.3g} mm of "
+        f"{target.name} is late, by about {1e3 * delay:.2g} ms{springs}: with it {1e3 * found[k]:.3g} mm of "
         f"{1e3 * now:.3g} mm are left between tracker and motors (rms); put {DELAY}@{target.name} into the robot file "
         "(`jointscope add`), and the calibration finds the delay"
     )
     return delay, [Notice(target.name, "timing", len(stream), text)]
 
 
+def _left_at(tree: RigidTree, target: PositionTarget, motion: JointMotion, stream: Stream, delay: float) -> float:
+    """What is left between tracker and motors wherever both are, with stamps late by a delay [s], rms [m]."""
+    q, seen = seen_beside(motion, stream, delay)
+    point = body_point(tree, target.body, np.zeros(3), q)
+    return tracker_and_shift(point.value, point.R_base_body, seen, target.at, FEW_ROUNDS)[2]
+
+
 def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -> list[Notice]:
     tree, place = robot.tree, f"sensors.{target.name}"
     values = {name: parameter.value for name, parameter in robot.parameters.items()}
     at, R, origin, _ = target.seen(values)
-    expected = (body_point(tree, target.body, at, q).value - origin) @ R
+    places = body_point(tree, target.body, at, q).value
+    expected = (places - origin) @ R
     size, wanted, noise = _spread(seen), _spread(expected), NOISE * target.sigma
     if wanted > noise and not 1.0 / SAME_SIZE < size / wanted < SAME_SIZE:
         _check_unit(target, size / wanted)
     if size < noise:
         return []
     point = body_point(tree, target.body, np.zeros(3), q)
-    _check_hand(target, body_point(tree, target.body, at, q).value, seen)
+    _check_hand(target, places, seen)
     if tracker_and_shift(point.value, point.R_base_body, seen, at)[2] > max(ODD * size, noise):
         left = fitted_tracker(tree, target.body, at, q, seen)[2]
         if left > max(ODD * size, noise):
@@ -169,7 +154,7 @@ def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -
     distance = float(np.sqrt(np.mean(np.sum((expected - seen) ** 2, axis=1))))
     if distance <= max(ELSEWHERE * size, noise):
         return []
-    T, after, _ = base_from_tracker(body_point(tree, target.body, at, q).value, seen)
+    T, after, _ = base_from_tracker(places, seen)
     if _is_expected(robot, target, T, R, origin):
         return []
     text = (

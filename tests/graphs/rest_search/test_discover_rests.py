@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lever_arm import URDF
 from scipy.optimize import brentq
 
 from jointscope.graphs.rest_search.discover_rests import diagnose_rests, discover_rests
@@ -19,13 +20,6 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.rests.rests import Rests
 from jointscope.tools.bags.at_poses.read_rests import read_rests
 
-URDF = """<robot name="lever"><link name="base"/>
-<joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
- <limit effort="100" velocity="20" lower="-3" upper="3"/></joint>
-<link name="rod"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
- <inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hook_joint" type="fixed"><parent link="rod"/><child link="hook"/><origin xyz="0 0 -0.5"/></joint>
-<link name="hook"/></robot>"""
 YAML = """
 format: 1
 name: lever

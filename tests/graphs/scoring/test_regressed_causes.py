@@ -9,6 +9,7 @@ from simulated_arm import SHARP, Arm, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.scoring.changed_load import changed_load
+from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import regressed_causes
 from jointscope.robots.files.robot_file import load_robot
@@ -67,10 +68,10 @@ def taken_up_at(moment, kilograms):
 
 @pytest.mark.parametrize("how", CLEAN, ids=str)
 def test_nothing_is_named_where_nothing_is_missing(robot, how):
-    here = [recording(**how)]
-    assert load_frictions(robot, here) == ()
-    assert changed_load(robot, here) is None
-    assert [cause for cause in regressed_causes(robot, here) if cause.size > 0.01] == []
+    rows = joint_rows(robot, [recording(**how)])
+    assert load_frictions(rows) == ()
+    assert changed_load(rows, ["here"]) is None
+    assert [cause for cause in regressed_causes(rows) if cause.size > 0.01] == []
 
 
 @pytest.mark.parametrize(
@@ -82,32 +83,32 @@ def test_nothing_is_named_where_nothing_is_missing(robot, how):
     ],
 )
 def test_what_one_joint_lacks_has_its_name_at_that_joint(robot, drive, label, look_alike):
-    (cause,) = regressed_causes(robot, [recording(drive=drive)])
+    (cause,) = regressed_causes(joint_rows(robot, [recording(drive=drive)]))
     assert cause.label == label and set(cause.alike) <= {look_alike}
     assert cause.explained > 0.8 and cause.size > 0.01
 
 
 def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_need_it(robot):
     coarse = recording(counts=8192)
-    assert regressed_causes(robot, [coarse]), "joints turn over within a count, which looks like Stribeck friction"
+    rows = joint_rows(robot, [coarse])
+    assert regressed_causes(rows), "joints turn over within a count, which looks like Stribeck friction"
     result = calibrate(robot, [coarse])
     assert result.causes == () and result.changed is None and result.load_frictions == ()
 
 
 def test_cables_are_springs_at_all_joints(robot):
-    causes = regressed_causes(robot, [recording(cable=3.0)])
+    causes = regressed_causes(joint_rows(robot, [recording(cable=3.0)]))
     assert [cause.label for cause in causes] == [f"parallel_spring@{joint}" for joint in ARM.joints]
 
 
 def test_friction_that_grows_with_torque_is_told_with_its_share(robot):
-    here = [recording(drive=growing(0.06))]
-    found = load_frictions(robot, here)
+    found = load_frictions(joint_rows(robot, [recording(drive=growing(0.06))]))
     assert found
     for one in found:
         assert one.share == pytest.approx(0.06, abs=max(3.0 * one.sigma, 0.006))
 
 
 def test_a_load_that_is_taken_up_is_told_with_its_time(robot):
-    found = changed_load(robot, [recording(drive=taken_up_at(4.3, 0.6))])
+    found = changed_load(joint_rows(robot, [recording(drive=taken_up_at(4.3, 0.6))]), ["here"])
     assert found.time == pytest.approx(4.3, abs=0.15)
     assert found.size > 0.02

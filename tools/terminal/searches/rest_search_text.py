@@ -32,11 +32,10 @@ def step_table(found: RestDiscovery) -> tuple[list[str], list[list[str]]]:
     head = ["step", "model", "links off [sigma]", *torque]
     head += ["held out [sigma]", *torque] if found.holdout else []
     rows = []
-    for k, step in enumerate(found.steps):
+    for k, (step, both) in enumerate(zip(found.steps, found.errors_of_steps, strict=True)):
         row = [str(k), step.added.label if step.added else "base model"]
-        for recordings in (found.recordings, found.holdout):
-            if recordings:
-                errors = found.errors(step, recordings)
+        for errors in both:
+            if errors is not None:
                 missing = errors.torques(found.robot)
                 row += [significant(errors.error, 3), *(significant(1e3 * missing[joint], 3) for joint in joints)]
         rows.append(row)

@@ -58,7 +58,7 @@ def run_rest_search(
 def diagnosis_json(found: Any) -> dict[str, Any]:
     """The content of `--json` of a diagnosis."""
     candidates = [candidate_json(c, _measured(found)) for c in found.candidates]
-    return {"adequate": found.adequate, **_errors(found, found.steps[-1]), "candidates": candidates}
+    return {"adequate": found.adequate, **_errors(found, -1), "candidates": candidates}
 
 
 def discovery_json(found: Any, robot_file: Path | None) -> dict[str, Any]:
@@ -67,10 +67,10 @@ def discovery_json(found: Any, robot_file: Path | None) -> dict[str, Any]:
         {
             "added": None if step.added is None else step.added.label,
             "removed": None,
-            **_errors(found, step),
+            **_errors(found, k),
             "candidates": [candidate_json(c, _measured(found)) for c in step.judged.candidates],
         }
-        for step in found.steps
+        for k, step in enumerate(found.steps)
     ]
     return {
         "steps": steps,
@@ -108,9 +108,9 @@ def candidate_json(c: Any, measured: int) -> dict[str, Any]:
     }
 
 
-def _errors(found: Any, step: Any) -> dict[str, Any]:
-    train = found.errors(step, found.recordings)
-    held = found.errors(step, found.holdout) if found.holdout else None
+def _errors(found: Any, k: int) -> dict[str, Any]:
+    """Errors of the model of step k."""
+    train, held = found.errors_of_steps[k]
     torques = {"train": train.torques(found.robot), "heldout": None if held is None else held.torques(found.robot)}
     return {
         "train_error": train.error,
