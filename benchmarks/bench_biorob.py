@@ -22,7 +22,8 @@ from tables import Section, Table
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.discovery.discover import discover
 from jointscope.graphs.refits.validation import heldout_error
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags.read_recording import read_recording

@@ -16,7 +16,7 @@ from pathlib import Path
 from section_runs import run_sections
 from tables import Section
 
-SECTIONS = ("latency", "accuracy", "consistency", "trouble")
+SECTIONS = ("latency", "accuracy", "consistency", "trouble", "loop")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 MINUTES = 10.0
 

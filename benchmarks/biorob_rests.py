@@ -22,7 +22,8 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.refits.validation import heldout_error
 from jointscope.graphs.rests.calibrate_rests import RestCalibration, calibrate_rests
 from jointscope.robots.files.effect_editing import add_effect
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.verb_parts.rest_runs import read_all_rests

@@ -67,7 +67,10 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
 def _log_difference(upper: Array, lower: Array) -> Array:
     """log(Phi(upper) - Phi(lower)) for upper > lower, of which the lower one is negative where both are far out."""
     log_upper, log_lower = log_ndtr(upper), log_ndtr(lower)
-    return np.asarray(log_upper + np.log1p(-np.exp(np.minimum(log_lower - log_upper, -1e-300))))
+    # far out or in a narrow band both are the same number; the slope of the logarithm says how far apart they are
+    slope = np.exp(-0.5 * upper * upper - 0.5 * LOG_2PI - log_upper)
+    apart = np.maximum(log_upper - log_lower, np.maximum((upper - lower) * slope, 1e-300))
+    return np.asarray(log_upper + np.log(-np.expm1(-apart)))
 
 
 @cache

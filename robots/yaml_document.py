@@ -33,7 +33,7 @@ def read_document(path: Path, what: str = ROBOT_FILE) -> Any:
         raise RobotError(f"{path} is not a {what}: it is not text{_WAYS.get(what, '')}") from err
     except YAMLError as err:
         if path.suffix == ".urdf" or "<robot" in path.read_text(encoding="utf-8")[:2000]:
-            way = f"; make one with: jointscope init {path} BAG -o ROBOT.yaml" if what == ROBOT_FILE else ""
+            way = f"; make one with: jointscope init {path} BAG -o {path.stem}_robot.yaml" if what == ROBOT_FILE else ""
             raise RobotError(f"{path.name} is a URDF and no {what}{way}") from err
         raise RobotError(f"{path.name} is not YAML: {_trouble(err)}") from err
     return document

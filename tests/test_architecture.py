@@ -13,11 +13,11 @@ FLOORS = ("robots", "factors", "graphs", "tools")
 MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 ROOMS = """
 robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects
-robots.dynamics robots.recordings robots.files robots.ready
+robots.dynamics robots.recordings robots.rests robots.files robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.gtsam_solvers graphs.noise graphs.starts graphs.scoring.columns
 graphs.scoring graphs.calibration.stages graphs.calibration
-graphs.responses graphs.frequency graphs.rests graphs.poses graphs.joint_kinds
+graphs.responses graphs.frequency graphs.rests graphs.rest_search graphs.poses graphs.joint_kinds
 graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
@@ -25,9 +25,11 @@ tools.bags.at_poses
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator.arm tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text
-tools.presentation tools.verdicts tools.terminal tools.report.pdf tools.report.page tools.report.sections.calibration
+tools.presentation tools.verdicts tools.terminal tools.terminal.searches tools.report.pdf tools.report.page
+tools.report.sections.calibration
 tools.report.sections.comparison
 tools.report.sections.diagnosis tools.report.sections.replay tools.report.sections.closed_loop tools.report
+tools.report.searches
 tools.rerun_log.entities tools.rerun_log tools.verb_parts tools.verb_parts.simulations tools.verb_parts.searches
 tools.notebook tools.verbs tools
 """.split()

@@ -35,8 +35,12 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.drive_timing import drive_timing
+from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.load_friction import load_frictions
+from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
@@ -57,7 +61,14 @@ from jointscope.robots.recordings.resting_joints import must_move
 Array = NDArray[np.float64]
 
 WINDOW_ITERATIONS = 12
-TOLD_OF_WHITE = ("timing", "masses", "lacking", "inertia_shifts")  # what torques that last would hide
+TOLD_OF_WHITE = (
+    "timing",
+    "masses",
+    "lacking",
+    "causes",
+    "changed",
+    "inertia_shifts",
+)  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
@@ -162,7 +173,7 @@ def _calibrated(
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     if near is None and not biases_only:
-        result = _asked_for_causes(result, solved, stage if memory else None)
+        result = _asked_for_causes(result, solved, stage if memory else None, recordings)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -179,7 +190,9 @@ def _calibrated(
     return result
 
 
-def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeStage | None) -> CalibrationResult:
+def _asked_for_causes(
+    result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
+) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
     test = ScoreTest.of(*solved.of_motions)
     lacking = lacking_effects(test) if stage else ()
@@ -190,7 +203,25 @@ def _asked_for_causes(result: CalibrationResult, solved: Solved, stage: WholeSta
     for motion in zip(*solved.of_motions, strict=True):
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
-    return replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
+    result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
+    return _asked_by_regression(result, test, recordings) if stage else result
+
+
+def _asked_by_regression(
+    result: CalibrationResult, test: ScoreTest, recordings: Sequence[Recording]
+) -> CalibrationResult:
+    """With what regression says of each rigid joint: a load that changes, effects, friction by torque; the first."""
+    if result.saturated:
+        return result
+    # noise of encoders as it was before a model that lacks something took a part of it
+    robot = replace(result.robot, sensors=result.start.sensors)
+    rows = joint_rows(robot, recordings)
+    if rows is None:
+        return result
+    if changed := changed_load(rows, [recording.path for recording in recordings]):
+        return replace(result, changed=changed)
+    causes = confirmed(regressed_causes(rows), test)
+    return replace(result, causes=causes, load_frictions=() if causes else load_frictions(rows))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

@@ -10,7 +10,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 

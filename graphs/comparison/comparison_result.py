@@ -138,6 +138,21 @@ class ModelComparison:
         """What it would be at best: of a simulated loop no more is known than the noise of its sensor."""
         return self.floor if self.free_run is None else SENSOR_NOISE
 
+    def to_json(self) -> dict[str, Any]:
+        """The same for machines, without samples."""
+        run = self.free_run
+        free = {} if run is None else {"free_run": {"mean_abs": run.mean_abs, "rms": run.rms}}
+        return free | {
+            "error": self.error,
+            "floor": self.floor,
+            "channels": {
+                name: {"horizons": dict(c.horizons), "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
+                for name, c in self.channels.items()
+            },
+            "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in self.worst],
+            "isolated": [moment.to_json() for moment in self.isolated],
+        }
+
 
 @dataclass(frozen=True)
 class ComparisonResult:
@@ -149,19 +164,4 @@ class ComparisonResult:
     def to_json(self) -> dict[str, Any]:
         """The content of `--json` as INTERFACE promises it."""
         used = {"kind": "bags", "path": self.recording.path, "sha256": self.recording.sha256}
-        return {"models": {model.label: _model_json(model) for model in self.models}, "recordings": [used]}
-
-
-def _model_json(model: ModelComparison) -> dict[str, Any]:
-    run = model.free_run
-    free = {} if run is None else {"free_run": {"mean_abs": run.mean_abs, "rms": run.rms}}
-    return free | {
-        "error": model.error,
-        "floor": model.floor,
-        "channels": {
-            name: {"horizons": dict(c.horizons), "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
-            for name, c in model.channels.items()
-        },
-        "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in model.worst],
-        "isolated": [moment.to_json() for moment in model.isolated],
-    }
+        return {"models": {model.label: model.to_json() for model in self.models}, "recordings": [used]}

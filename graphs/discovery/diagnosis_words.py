@@ -125,8 +125,12 @@ def what_came_in(candidate: Candidate, robot: Robot, before: float, after: float
     values = ", ".join(f"{name} {p.value:.4g} {p.unit}".removesuffix(" 1") for name, p in own)
     what = f"{candidate.label} added ({values})" if values else f"{candidate.label} taken care of"
     why = "" if candidate.refitted or not candidate.reasons else f" It {candidate.reasons[0].removeprefix('it ')}."
-    way = "falls" if f"{after:.3g}" != f"{before:.3g}" and after < before else "goes"
-    return f"{what}: the training error {way} from {before:.3g} to {after:.3g} sigma.{why}"
+    if after < before:
+        return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"
+    return (
+        f"{what}: less torque is missing on blocks left out, although the training error goes from {before:.3g} to "
+        f"{after:.3g} sigma: something else is missing, too.{why}"
+    )
 
 
 def rises_elsewhere(before: float, after: float) -> str:

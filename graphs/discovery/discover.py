@@ -222,7 +222,7 @@ class _Search:
             robot=base.robot,
             train_error=errors.error,
             heldout_error=comparison.judged_error if self.held_out else float("nan"),
-            floor=comparison.judged_floor,
+            floor=self.kind.floor(comparison),
             diagnosis=None,
             comparison=comparison,
             paragraph=paragraph,

@@ -14,6 +14,7 @@ from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.discovery.starting_model import starting_model
+from jointscope.graphs.discovery.unexplained import believed_floor
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Progress
@@ -45,6 +46,9 @@ class Kind(Protocol):
     def compared(self, label: str, robot: Robot) -> ModelComparison:
         """A model against the held-out recording, else against the first training recording."""
 
+    def floor(self, comparison: ModelComparison) -> float:
+        """What noise alone would leave of the error of a model that was compared [sensor sigma], as far as believed."""
+
     def diagnosed(
         self, model: Any, comparison: ModelComparison, errors: Any, report: Progress, barred: Collection[str] = ()
     ) -> Diagnosis:
@@ -74,6 +78,10 @@ class Motion:
     def compared(self, label: str, robot: Robot) -> ModelComparison:
         """Predictions from causal states."""
         return compare_model(label, robot, self.holdout or self.recordings[0])
+
+    def floor(self, comparison: ModelComparison) -> float:
+        """That of the model's noise, or that of the sensors where the error lies well below it."""
+        return believed_floor(comparison, self.holdout or self.recordings[0])
 
     def diagnosed(
         self, model: BaseModel, comparison: ModelComparison, errors: Any, report: Progress, barred: Collection[str] = ()

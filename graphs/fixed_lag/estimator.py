@@ -45,6 +45,7 @@ Found = TypeVar("Found")
 BIAS_WALK = 1e-5  # [rad/s/sqrt(s)] a gyro's bias moves by 1e-4 rad/s in 100 s
 GAP = 0.3  # [s] without a tick after which the estimator begins anew; so far it predicts
 BROKEN = (RuntimeError, IndexError, np.linalg.LinAlgError)  # what GTSAM and numpy raise where numbers are impossible
+RAN_AWAY = ": by the last commands the robot would turn as nothing does; are their size and unit right?"
 NEAR = 0.3  # share of the usual distance of commands below which a command makes no tick of its own
 
 
@@ -253,7 +254,8 @@ class FixedLagEstimator(WindowAccess):
         self._books.count(innovations[len(innovations) - fresh :])
         fits = self._books.updated(engine.time, innovations)
         if not (fits and engine.newest.is_possible):
-            why = "became impossible" if fits else "contradicted the encoders for a tenth of a second"
+            gone = f"became impossible{RAN_AWAY * engine.ran_away}"
+            why = gone if fits else "contradicted the encoders for a tenth of a second"
             self._restart(engine.time, f"the estimate {why}")
             return
         if self._listener is not None:

@@ -149,7 +149,7 @@ def calibrate_frequency(
     sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
     found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
     told = dict(zip(calibration.names, sigmas.tolist(), strict=True))
-    found = replace(found, parameters=with_sigmas(found.parameters, told))
+    found = found_at.told(replace(found, parameters=with_sigmas(found.parameters, told)))
     report("done", 1.0)
     return FrequencyCalibration(
         robot=found,

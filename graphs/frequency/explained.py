@@ -193,7 +193,8 @@ def _realisation(problem: FrequencySet, number: int) -> FrequencySet | None:
     size, sharper = stage.friction
     shift = stage.shift[own] if isinstance(stage.shift, np.ndarray) else stage.shift
     geometry = {name: column[own] for name, column in stage.geometry.items()}
-    now = replace(stage, friction=(size[own], sharper[own]), shift=shift, geometry=geometry, x=None)
+    more = stage.sharper[own] if isinstance(stage.sharper, np.ndarray) else stage.sharper
+    now = replace(stage, friction=(size[own], sharper[own]), shift=shift, geometry=geometry, x=None, sharper=more)
     return replace(problem, pose=replace(pose, found=part), stage=now)
 
 

@@ -63,6 +63,7 @@ class Stage:
         slopes: of the arm by its geometry.
         unlikely: minus twice the logarithm of the likelihood of the residuals at `values`, but for a constant.
         x: motion of the arm behind its springs, shape (b, K, n) [rad]; None with logarithms.
+        sharper: derivative by log k of torques that effects of friction have at `values`, shape (e, l, nu) [N m].
     """
 
     parts: tuple[Array, Array, Array]
@@ -77,6 +78,7 @@ class Stage:
     slopes: GeometrySlopes
     unlikely: float = 0.0
     x: Complex | None = None
+    sharper: Complex | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -188,7 +190,7 @@ class FrequencySet:
         Z = self.with_friction(k.Z, values)
         r = (Z @ pose.motion[:, pose.lines].transpose(1, 2, 0)).transpose(2, 0, 1) + stage.shift - pose.torques
         sharper = self._sharper(values)
-        r += self._each(values, COULOMB) * (stage.friction[0] + sharper * stage.friction[1])
+        r += self._each(values, COULOMB) * (stage.friction[0] + sharper * stage.friction[1]) + sharper * stage.sharper
         for name, column in stage.geometry.items():
             r += (values[name] - stage.values[name]) * column
         return np.asarray(r)
@@ -219,7 +221,7 @@ class FrequencySet:
             own = np.eye(len(self.arm.joints))[i]
             by_name[f"{joint}.{VISCOUS}"] = jw * moved.transpose(2, 0, 1) * own
             by_name[f"{joint}.{COULOMB}"] = own * (stage.friction[0] + sharper * stage.friction[1])
-            by_name[f"{joint}.{SHARPNESS}"] = own * mu * stage.friction[1] * by_sharpness
+            by_name[f"{joint}.{SHARPNESS}"] = own * (mu * stage.friction[1] + stage.sharper) * by_sharpness
         return whitened, r, {**by_name, **stage.geometry}
 
     def response(self, values: Mapping[str, float]) -> Complex:

@@ -5,7 +5,7 @@ A wave of a gear and a spring that hardens are an offset u between motor and lin
 spring turned by it; a wave also levers the torque that is passed on. One of an encoder (o = 1) moves the rotor, too:
 a scale of the angle of 1 + 1e-4, which is as large as sigmas of drives. Friction laws are torques p of the motor:
 
-    u = c cos(o q) + s sin(o q),    -k3 d^3 / k
+    u = c cos(o q) + s sin(o q),    -k3 d^3 / (k + j w d)
     p = pull u'(q),      J u'' + f u',      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
 
 with d = q_link - q_motor and pull what the drive takes from the motor. All are taken in time and linear in their
@@ -14,8 +14,8 @@ parameter, along the motion of the stage before; measured torques that are late 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,28 +37,29 @@ from jointscope.robots.geometry.flexible_arm import FlexibleArm
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 FINER = 8  # samples by the lines of the motion: what turns over within a swing has many of them
+DRY = (STRIBECK, LOAD_FRICTION)
+LAWS = (*WAVES, *RIPPLE[:2], CUBIC, *DRY)
 BREAKAWAY = 0.02  # [rad/s] v_s, which a swing of some degrees per second passes through at every turn
 
 
 @dataclass(frozen=True)
 class MotorEffects:
-    """What effects of unit size do to the motors of a pose, by the name of their parameter.
+    """What effects do to the motors of a pose in every experiment as it was.
 
     Attributes:
-        offsets: motor, and turns that its drive is off by, in every experiment as it was, shape (b, K) [rad].
-        torques: motor, and torques that it needs beside, shape (b, K) [N m].
+        waves: by parameter the motor, and derivatives of its drive's offset [rad] and of its torque [N m], shape (b, K)
+            each; None where there is none.
+        offset: of all effects at their sizes, shape (b, K, nu) [rad].
+        torque: of all effects at their sizes, shape (b, K, nu) [N m].
+        sharper: its derivative by the logarithm of how sharply friction turns over, shape (b, K, nu) [N m].
+        stiffer: what drives that harden are stiffer by on average, 3 k3 <d^2>, shape (nu,) [N m/rad].
     """
 
-    offsets: Mapping[str, tuple[int, Complex]]
-    torques: Mapping[str, tuple[int, Complex]]
-
-    def offset(self, values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
-        """Sum of all offsets at some sizes, shape (b, K, nu) [rad]."""
-        return _summed(self.offsets, values, shape)
-
-    def torque(self, values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
-        """Sum of all torques at some sizes, shape (b, K, nu) [N m]."""
-        return _summed(self.torques, values, shape)
+    waves: Mapping[str, tuple[int, Complex | None, Complex | None]]
+    offset: Complex
+    torque: Complex
+    sharper: Complex
+    stiffer: Array
 
 
 def motor_effects(
@@ -73,32 +74,31 @@ def motor_effects(
         sharpness: of the dry friction of each motor, shape (nu,) [s/rad].
         x: motion of the arm behind its springs, shape (b, K, n) [rad].
     """
-    offsets: dict[str, tuple[int, Complex]] = {}
-    torques: dict[str, tuple[int, Complex]] = {}
+    waves: dict[str, tuple[int, Complex | None, Complex | None]] = {}
+    offset, torque, sharper = (np.zeros(pose.motions.shape, dtype=complex) for _ in range(3))
+    stiffer = np.zeros(len(arm.joints))
     for i, joint in enumerate(arm.joints):
-        laws = list(_laws(joint, values))
+        laws = {part: values[f"{joint}.{part}"] for part in LAWS if f"{joint}.{part}" in values}
         if not laws:
             continue
-        motion, s = _Motion.of(arm, pose, values, x, i, sharpness[i]), _rates(pose)
+        motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
+        order = values.get(f"{joint}.{RIPPLE[2]}", 0.0)
+        own = {part: motion.offset(part, order) for part in laws}
+        offset[:, :, i] = _summed(laws, own)
+        motion = motion.passing(offset[:, :, i])
+        beside = {part: motion.torque(part, order) for part in laws}
+        s = _rates(pose, pose.motions.shape[1])
         rotor = s * s * values[f"{joint}.inertia"] + s * values.get(f"{joint}.{VISCOUS}", 0.0)
-        for part in laws:
-            u, p = motion.does(part, joint, values)
-            for found, wave in ((offsets, u), (torques, p)):
-                if wave is not None:
-                    found[f"{joint}.{part}"] = i, motion.lines(wave)
-            if part in WAVES:
-                torques[f"{joint}.{part}"] = i, rotor * offsets[f"{joint}.{part}"][1]
-    return MotorEffects(offsets, torques)
-
-
-def stiffer_drives(arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex | None) -> Array | None:
-    """What drives that harden are stiffer by on average, 3 k3 <d^2>, shape (nu,) [N m/rad]; None where none does."""
-    k3 = np.array([values.get(f"{joint}.{CUBIC}", 0.0) for joint in arm.joints])
-    if x is None or not np.any(k3 > 0.0):
-        return None
-    power = np.abs(x[:, :, arm.driven] - pose.motions) ** 2
-    square = np.mean(power[:, 0] + 2.0 * power[:, 1:].sum(axis=1), axis=0)
-    return np.asarray(3.0 * np.maximum(k3, 0.0) * square)
+        beside |= {part: rotor * wave for part, wave in own.items() if part in WAVES and wave is not None}
+        torque[:, :, i] = _summed(laws, beside)
+        turning = motion.sharper()
+        sharper[:, :, i] = _summed(laws, {part: turning.torque(part, order) for part in DRY if part in laws})
+        stiffer[i] = 3.0 * max(laws.get(CUBIC, 0.0), 0.0) * motion.square
+        waves |= {f"{joint}.{part}": (i, own[part], beside[part]) for part in laws}
+        if order:
+            cos, sin = (laws.get(part, 0.0) for part in RIPPLE[:2])
+            waves[f"{joint}.{RIPPLE[2]}"] = i, *motion.by_order(order, cos, sin)
+    return MotorEffects(waves, offset, torque, sharper, stiffer)
 
 
 def measured_torques(
@@ -122,62 +122,83 @@ def measured_torques(
     return true, {name: column for name, column in columns.items() if name in values}
 
 
-def _laws(joint: str, values: Mapping[str, float]) -> Iterator[str]:
-    for part in (*WAVES, *RIPPLE[:2], CUBIC, STRIBECK, LOAD_FRICTION):
-        if f"{joint}.{part}" in values:
-            yield part
+def _summed(sizes: Mapping[str, float], waves: Mapping[str, Complex | None]) -> Complex | float:
+    """Sum of waves at some sizes, shape (b, K)."""
+    return sum((sizes[part] * wave for part, wave in waves.items() if wave is not None), 0.0)
 
 
-def _rates(pose: ShakenPose) -> Complex:
-    """J w of all lines, shape (K,) [rad/s]."""
-    return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(pose.motions.shape[1]))
+def _rates(pose: ShakenPose, count: int) -> Complex:
+    """J w of the first lines, shape (count,) [rad/s]."""
+    return np.asarray(2j * np.pi * pose.found.excitation.f0 * np.arange(count))
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """A motor and its drive in time, shape (b, N) each."""
+    """A motor and its drive in time, shape (b, N) each; deflection, shape (b, K), and spring, shape (K,), by lines.
+
+    `sharp` is k v, `turn` its tanh.
+    """
 
     q: Array
     v: Array
-    d: Array
+    sharp: Array
+    turn: Array
     pull: Array
-    stiffness: float
-    sharpness: float
-    kept: int
+    d: Complex
+    spring: Complex
 
     @staticmethod
     def of(
         arm: FlexibleArm, pose: ShakenPose, values: Mapping[str, float], x: Complex, i: int, sharpness: float
     ) -> _Motion:
-        m, spring = pose.motions[:, :, i], arm.springs[arm.driven[i]]
-        K = m.shape[1]
-        count = next_fast_len(FINER * K, real=True)
-        s = _rates(pose)
-        d = x[:, :, arm.driven[i]] - m
-        kappa = arm.dynamic(np.asarray(s.imag, dtype=np.float64), values)[:, arm.driven[i]]
-        q, v, apart, pull = (np.fft.irfft(part * count, count, axis=1) for part in (m, s * m, d, -kappa * d))
-        return _Motion(q, v, apart, pull, values[spring.stiffness], sharpness, K)
+        m, fast = pose.motions[:, :, i], pose.whole_motions[:, :, i]
+        count = next_fast_len(FINER * fast.shape[1], real=True)
+        w = np.asarray(_rates(pose, m.shape[1]).imag, dtype=np.float64)
+        q, v = (np.fft.irfft(X * count, count, axis=1) for X in (m, _rates(pose, fast.shape[1]) * fast))
+        kappa = arm.dynamic(w, values)[:, arm.driven[i]]
+        return _Motion(q, v, sharpness * v, np.tanh(sharpness * v), np.zeros_like(q), x[:, :, arm.driven[i]] - m, kappa)
 
-    def lines(self, wave: Array) -> Complex:
-        return np.asarray(np.fft.rfft(wave, axis=1)[:, : self.kept] / wave.shape[1])
+    def passing(self, offset: Complex | float) -> _Motion:
+        """With what the drive takes from the motor when it is off by some turns."""
+        return replace(self, pull=self._in_time(-self.spring * (self.d - offset)))
 
-    def does(self, part: str, joint: str, values: Mapping[str, float]) -> tuple[Array | None, Array | None]:
-        """Offset and torque of unit size."""
-        if part in (*WAVES, *RIPPLE[:2]):
-            order = 1.0 if part in WAVES else values[f"{joint}.{RIPPLE[2]}"]
-            c, s = np.cos(order * self.q), np.sin(order * self.q)
-            wave, slope = (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
-            return wave, None if part in WAVES else self.pull * slope
+    def sharper(self) -> _Motion:
+        """With the derivative of what turns over by the logarithm of its sharpness in its place."""
+        return replace(self, turn=self.sharp * (1.0 - self.turn**2))
+
+    @property
+    def square(self) -> float:
+        """Mean square of the deflection [rad^2]."""
+        return float(np.mean(self._in_time(self.d) ** 2))
+
+    def offset(self, part: str, order: float) -> Complex | None:
+        """By which an effect of unit size turns the drive, shape (b, K) [rad]."""
         if part == CUBIC:
-            return -(self.d**3) / self.stiffness, None
-        turn = np.tanh(self.sharpness * self.v)
+            return -self._lines(self._in_time(self.d) ** 3) / self.spring  # the damper has no part in its torque
+        return self._lines(self._wave(part, order)[0]) if part in (*WAVES, *RIPPLE[:2]) else None
+
+    def torque(self, part: str, order: float) -> Complex | None:
+        """That the motor needs for an effect of unit size, shape (b, K) [N m]."""
         if part == STRIBECK:
-            return None, np.exp(-((self.v / BREAKAWAY) ** 2)) * turn
-        return None, np.abs(self.pull) * turn
+            return self._lines(np.exp(-((self.v / BREAKAWAY) ** 2)) * self.turn)
+        if part == LOAD_FRICTION:
+            return self._lines(np.abs(self.pull) * self.turn)
+        return self._lines(self.pull * self._wave(part, order)[1]) if part in RIPPLE[:2] else None
 
+    def by_order(self, order: float, cos: float, sin: float) -> tuple[Complex, Complex]:
+        """Derivatives of offset and torque of a wave by its waves per turn, shape (b, K) each."""
+        (c, c_slope), (s, s_slope) = (self._wave(part, order) for part in RIPPLE[:2])
+        u, slope = cos * c + sin * s, (cos * c_slope + sin * s_slope) / order
+        return self._lines(self.q * slope), self._lines(self.pull * (slope - order * self.q * u))
 
-def _summed(parts: Mapping[str, tuple[int, Complex]], values: Mapping[str, float], shape: tuple[int, ...]) -> Complex:
-    total = np.zeros(shape, dtype=complex)
-    for name, (motor, wave) in parts.items():
-        total[:, :, motor] += values[name] * wave
-    return total
+    def _wave(self, part: str, order: float) -> tuple[Array, Array]:
+        """A wave of the gear, or of the encoder once per turn, and its slope."""
+        order = 1.0 if part in WAVES else order
+        c, s = np.cos(order * self.q), np.sin(order * self.q)
+        return (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
+
+    def _in_time(self, lines: Complex) -> Array:
+        return np.asarray(np.fft.irfft(lines * self.q.shape[1], self.q.shape[1], axis=1))
+
+    def _lines(self, wave: Array) -> Complex:
+        return np.asarray(np.fft.rfft(wave, axis=1)[:, : len(self.spring)] / wave.shape[1])

@@ -6,14 +6,15 @@ The begin is the likeliest one of some, for a resonance that is looked for at th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.graphs.frequency.rattling import dwellings
 from jointscope.graphs.frequency.stages import next_stage
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
@@ -22,6 +23,8 @@ from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.error_parameters import STIFFNESS
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 
 Array = NDArray[np.float64]
 MOST_STAGES = 25  # with little noise each is a tenth nearer than the one before
@@ -43,6 +46,7 @@ class Settled:
         iterations: of all stages.
         stages: how many there were.
         settled: whether nothing moved any more.
+        last: how far each value moved in the last stage, by name, in the unit of the value.
     """
 
     problems: list[FrequencySet]
@@ -50,6 +54,16 @@ class Settled:
     iterations: int
     stages: int
     settled: bool
+    last: Mapping[str, float]
+
+    def told(self, robot: Robot) -> Robot:
+        """The robot with sigmas that hold what stages may add that were not made: steps fall as slowly as they may."""
+        if self.settled:
+            return robot
+        sigmas = {name: robot.parameters[name].sigma for name in self.last if name in robot.parameters}
+        still = 1.0 / (1.0 - MOST_RATIO)
+        wider = {n: float(np.hypot(s, still * self.last[n])) for n, s in sigmas.items() if s is not None}
+        return replace(robot, parameters=with_sigmas(robot.parameters, wider))
 
 
 def settled_stages(
@@ -86,14 +100,17 @@ def settled_stages(
         moved, narrow = (known.dynamics - at) / sigmas, problems[0].stage.width == NEIGHBOURS
         if narrow and np.max(np.abs(moved)) < AGREES:
             _check_left(problems, known)
-            return Settled(problems, solution, iterations, stage + 1, True)
+            return Settled(problems, solution, iterations, stage + 1, True, {})
         ahead = _ahead(moved, None if step is None else step / sigmas)
         at, step = known.dynamics + ahead * sigmas, known.dynamics - at if narrow and not np.any(ahead) else None
         known = known.with_points({DYNAMICS: at})
         common = known.carried_to(common)
         problems = [next_stage(problem, known) for problem in problems]
-    _check_left(problems, solution.estimate.calibrations[0])
-    return Settled(problems, solution, iterations, stage + 1, False)
+    known = solution.estimate.calibrations[0]
+    _check_left(problems, known)
+    steps = np.abs(known.dynamics - at) * known.value_by_coordinate
+    last = dict(zip(known.names, steps.tolist(), strict=True))
+    return Settled(problems, solution, iterations, stage + 1, False, last)
 
 
 def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
@@ -108,9 +125,21 @@ def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
         share = float(np.linalg.norm(left) / np.linalg.norm(problem.pose.torques))
         if share > UNEXPLAINED:
             raise SolveError(
-                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; their sign, "
-                "units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; {_why(problem)}"
             )
+
+
+def _why(problem: FrequencySet) -> str:
+    """What makes a balance explain nothing: a gap that a drive rattles in, or what the robot file says."""
+    values = {name: p.value for name, p in problem.robot.parameters.items()}
+    each = dwellings(problem.pose, problem.arm.joints, values, problem.sharpness(values))
+    rattling = [one for one in each if one.rattles]
+    if rattling:
+        worst = max(rattling, key=lambda one: one.share / one.smooth)
+        return f"{worst}; shake it where its load keeps it on one side, and take the gap from --poses"
+    return (
+        "their sign, units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
+    )
 
 
 def _ahead(step: Array, before: Array | None) -> Array:

@@ -32,6 +32,7 @@ class ShakenPose:
         matrix: response from torques to positions.
         lines: that are used, in multiples of f0, shape (l,).
         carrier: complex amplitude of the motion that goes on beside the excitation, of each motor, shape (nu,) [rad].
+        reach: how far beyond the highest line motion counts: up to so many times its frequency.
     """
 
     signals: Signals
@@ -41,6 +42,7 @@ class ShakenPose:
     matrix: ResponseMatrix
     lines: NDArray[np.intp]
     carrier: Complex
+    reach: int = 1
 
     @staticmethod
     def of(signals: Signals, excitation: Excitation) -> ShakenPose:
@@ -85,16 +87,33 @@ class ShakenPose:
     @cached_property
     def motion(self) -> Complex:
         """Positions of the motors at all lines up to some beyond the highest one, shape (e, K, nu) [rad]."""
-        K = min(int(self.lines.max()) + 1 + 7 * max(self.step, 1), self.found.Y.shape[2])
+        K = min(self.reach * int(self.lines.max()) + 1 + 7 * max(self.step, 1), self.found.Y.shape[2])
         return np.asarray(self.found.Y[:, :, :K].mean(axis=1))
 
     @cached_property
     def motions(self) -> Complex:
         """The same in every experiment as it was, each sign by itself, shape (b, K, nu) [rad]."""
+        return self._each_sign(self.motion.shape[1])
+
+    @cached_property
+    def whole_motions(self) -> Complex:
+        """The same at all lines of the band of the velocities, shape (b, K', nu) [rad]."""
+        return self._each_sign(1 + int(VELOCITY_BAND * (self.found.Y.shape[2] - 1)))
+
+    @cached_property
+    def whole_torques(self) -> Complex:
+        """Torques of the motors at all lines in every experiment as it was, shape (b, K, nu) [N m]."""
+        return self._of_signs(*steady_spectra(self.signals.inputs, self.found.excitation, self.path))
+
+    def _each_sign(self, count: int) -> Complex:
+        """Positions at the first lines in every experiment as it was, shape (b, count, nu) [rad]."""
         common = self.found.common
-        K, signs = self.motion.shape[1], self._signs[:, :, None, None]
-        both = 0.0 if common is None else common[:, :, :K].mean(axis=1)
-        return np.asarray((both + signs * self.motion).reshape(-1, *self.motion.shape[1:]))
+        return self._of_signs(self.found.Y[:, :, :count], None if common is None else common[:, :, :count])
+
+    def _of_signs(self, odd: Complex, common: Complex | None) -> Complex:
+        """What both signs have, shape (b, K, nu), of the half of their difference and of their sum."""
+        half, both = odd.mean(axis=1), 0.0 if common is None else common.mean(axis=1)
+        return np.asarray((both + self._signs[:, :, None, None] * half).reshape(-1, *half.shape[1:]))
 
     def both_signs(self, each: Complex) -> Complex:
         """What every experiment has by itself, shape (b, ...), as spectra of this pose have it, shape (e, ...)."""

@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet, GeometrySlopes, Stage
-from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_torques, motor_effects, stiffer_drives
+from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_torques, motor_effects
 from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
-from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS, LINK_INERTIA, LINK_MASS, PAYLOAD
+from jointscope.robots.geometry.error_parameters import ANGLES, CUBIC, LENGTHS, LINK_INERTIA, LINK_MASS, PAYLOAD
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
+HARDENED = 2  # times the highest line: what a drive that hardens makes of two lines, and where it resonates under load
 NARROWER = 4  # times fewer lines from stage to stage
 STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [rad], [kg], [kg m2] of differences
 
@@ -35,7 +36,8 @@ STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [r
 def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
     """The pose with the logarithm of its matrix."""
     arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
-    m = pose.matrix
+    hardens = any(name.endswith(CUBIC) for name in values)
+    m, pose = pose.matrix, replace(pose, reach=HARDENED if hardens else 1)
     relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[pose.used]
     parts = arm.linearised(pose.q, values).mean
     sharpness = np.array([robot.sharpness_of(joint, values) for joint in arm.joints])
@@ -59,11 +61,18 @@ def next_stage(before: FrequencySet, calibration: Calibration) -> FrequencySet:
     values, pose, robot, arm = before.values(calibration), before.pose, before.robot, before.arm
     width = max(before.stage.width // NARROWER, NEIGHBOURS)
     parts, sharpness = arm.linearised(pose.q, values).mean, before.sharpness(values)
-    k, slopes = motor_stiffness(arm, parts, pose.w, values), before.stage.slopes
+    slopes = before.stage.slopes
     eye = np.broadcast_to(np.eye(len(arm.joints), dtype=complex), (len(pose.w), len(arm.joints), len(arm.joints)))
-    shift, x, columns = _moving(before, values, k, sharpness)
+    x, needed, effects = _moving(before, values, sharpness)
+    k = motor_stiffness(arm, parts, pose.w, values)
+    true, columns = measured_torques(arm.joints, pose.torques, pose.w, values)
+    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, pose.lines])
+    shift = np.asarray(needed[:, pose.lines] - standing - (true - pose.torques))
+    sharper = pose.both_signs(effects.sharper)[:, pose.lines]
+    columns |= _of_effects(before, values, k, effects)
     columns |= dict(zip(slopes.names, k.by_parts(pose.w, slopes.parts, pose.motion[:, pose.lines]), strict=True))
-    stage = Stage(parts, eye, shift, pose.friction(sharpness), sharpness, columns, values, False, width, slopes, x=x)
+    stage = Stage(parts, eye, shift, pose.friction(sharpness), sharpness, columns, values, False, width, slopes)
+    stage = replace(stage, x=x, sharper=sharper)
     now = FrequencySet(robot, pose, stage)
     r = now.torque_balance(values, k)
     root = np.linalg.cholesky(_covariance(r, width))
@@ -90,20 +99,17 @@ def with_columns(problem: FrequencySet, robot: Robot) -> FrequencySet:
 
 
 def _moving(
-    before: FrequencySet, values: Mapping[str, float], k: MotorStiffness, sharpness: Array
-) -> tuple[Complex, Complex, dict[str, Complex]]:
-    """Shift of the torques because the arm moves as it does, its motion, and columns of effects by name."""
-    pose, arm, lines, x = before.pose, before.arm, before.pose.lines, before.stage.x
-    shape = pose.motions.shape
-    known = None if x is None else motor_effects(arm, pose, values, sharpness, x)
-    offset = 0.0 if known is None else known.offset(values, shape)
-    moving = moving_arm(arm, pose, values, x, offset, stiffer_drives(arm, pose, values, x))
+    before: FrequencySet, values: Mapping[str, float], sharpness: Array
+) -> tuple[Complex, Complex, MotorEffects]:
+    """The arm's motion, torques that it needs, shape (e, K, nu), and effects on the motors."""
+    pose, arm, x = before.pose, before.arm, before.stage.x
+    if x is None:
+        moving = moving_arm(arm, pose, values)
+    else:
+        known = motor_effects(arm, pose, values, sharpness, x)
+        moving = moving_arm(arm, pose, values, x, known.offset, known.stiffer)
     effects = motor_effects(arm, pose, values, sharpness, moving.x)
-    beside = pose.both_signs(effects.torque(values, shape))
-    standing = np.einsum("lij,elj->eli", k.Z, pose.motion[:, lines])
-    true, columns = measured_torques(arm.joints, pose.torques, pose.w, values)
-    shift = (moving.torques + beside)[:, lines] - standing - (true - pose.torques)
-    return np.asarray(shift), moving.x, columns | _of_effects(before, values, k, effects)
+    return moving.x, moving.torques + pose.both_signs(effects.torque), effects
 
 
 def _of_effects(
@@ -113,13 +119,14 @@ def _of_effects(
     pose, lines = before.pose, before.pose.lines
     inertias = np.array([values[f"{joint}.inertia"] for joint in before.arm.joints])
     springs = k.Z + (pose.w**2)[:, None, None] * np.diag(inertias)
+
     found: dict[str, Complex] = {}
-    for name, (motor, wave) in effects.offsets.items():
-        found[name] = np.einsum("li,el->eli", springs[:, :, motor], pose.both_signs(wave)[:, lines])
-    for name, (motor, wave) in effects.torques.items():
-        own = np.zeros((len(pose.motion), len(lines), len(inertias)), dtype=complex)
-        own[:, :, motor] = pose.both_signs(wave)[:, lines]
-        found[name] = own + found[name] if name in found else own
+    for name, (motor, offset, torque) in effects.waves.items():
+        found[name] = np.zeros((len(pose.motion), len(lines), len(inertias)), dtype=complex)
+        if offset is not None:
+            found[name] += np.einsum("li,el->eli", springs[:, :, motor], pose.both_signs(offset)[:, lines])
+        if torque is not None:
+            found[name][:, :, motor] += pose.both_signs(torque)[:, lines]
     return found
 
 

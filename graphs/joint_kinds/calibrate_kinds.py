@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +109,7 @@ def calibrate_kinds(
         if moved < AGREES and poses.left_out == before.left_out:
             break
         problems = [problem.of_robot(poses.robot) for problem in problems]
+    poses = replace(poses, robot=at.told(poses.robot))
     report("done", 1.0)
     seconds = time.perf_counter() - began
     found = tuple(problem.of_robot(poses.robot) for problem in problems)

@@ -27,13 +27,15 @@ from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
 EDGES = (1.0, 0.2, EDGE)  # of the friction: blur of the bands' edges, stage by stage
 PASSES = 6  # of the repeatability
 AGREES = 0.05  # relative change of it that asks for no further pass
 MOST_ITERATIONS = 150
+RAN_AWAY = 10.0  # times what a band has held at most, from which it is no band of these rests
+FEWEST_HELD = 4  # rests of a motor that had moved, for this
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
 
@@ -99,20 +101,23 @@ class RestCalibration:
 
 
 @in_solver_context
-def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None) -> RestCalibration:
+def calibrate_rests(
+    robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None, near: RestSet | None = None
+) -> RestCalibration:
     """Calibrates a robot from rests.
 
     Args:
         robot: with start values and priors.
         recordings: rests of each.
         progress: called with a text and the share done.
+        near: rests with the weights to begin with, where the values of the robot are near the end.
 
     Raises:
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    problems, solution, iterations = settled_rests(robot, recordings, report)
-    _, covariance = posteriors(list(problems), solution)
+    problems, solution, iterations = settled_rests(robot, recordings, report, near)
+    _, covariance = posteriors([RestSet.joined(problems)], solution)
     calibration = solution.estimate.calibrations[0]
     index = calibration.columns[DYNAMICS]
     sigmas, scale = np.sqrt(np.diag(covariance)[index]), calibration.value_by_coordinate
@@ -131,7 +136,7 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
         robot=found,
         start=robot,
         problems=tuple(problems),
-        states=tuple(solution.estimate.states),
+        states=states_of(problems, solution),
         parameters=tuple(told),
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
@@ -144,32 +149,95 @@ def calibrate_rests(robot: Robot, recordings: Sequence[Rests], progress: Progres
     )
 
 
-def settled_rests(robot: Robot, recordings: Sequence[Rests], report: Progress) -> tuple[list[RestSet], Solution, int]:
-    """Rests with the weights that they deserve, their solution, and the iterations that it took."""
+def settled_rests(
+    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None = None
+) -> tuple[list[RestSet], Solution, int]:
+    """Rests with the weights that they deserve, the solution of all as one set, and the iterations that it took.
+
+    Args:
+        robot: with start values and priors.
+        recordings: rests of each.
+        report: called with a text and the share done.
+        near: rests with the weights to begin with, where the values of the robot are near the end.
+
+    Raises:
+        SolveError: no convergence, or a friction that ran away.
+    """
+    try:
+        return _settled(robot, recordings, report, near)
+    except SolveError:  # springs that are far off make bands wide, which never come back
+        return _settled(robot, recordings, report, near, links_first=True)
+
+
+def _settled(
+    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None, links_first: bool = False
+) -> tuple[list[RestSet], Solution, int]:
+    """The same from one beginning: bands at once, or links in equilibrium before them."""
     problems = [RestSet.of(robot, rests) for rests in recordings]
-    starts = [problem.start(Calibration.of(robot)) for problem in problems]
-    estimate, iterations = Estimate(tuple(x for x, _ in starts), tuple(c for _, c in starts)), 0
-    for k, edge in enumerate((*EDGES, *[EDGE] * PASSES)):
-        problems = [replace(problem, edge=edge) for problem in problems]
-        solution = solve(problems, estimate, max_iterations=MOST_ITERATIONS)
+    if near is not None:
+        weights = near.repeatability, near.per_command
+        problems = [replace(problem, repeatability=weights[0], per_command=weights[1]) for problem in problems]
+    whole, edges = RestSet.joined(problems), EDGES if near is None else EDGES[-1:]
+    x, calibration = whole.start(Calibration.of(robot))
+    estimate, iterations = Estimate((x,), (calibration,)), 0
+    if links_first:
+        nothing = np.zeros_like(whole.rests.creep)
+        links = replace(whole, rests=replace(whole.rests, moved=nothing.astype(bool), creep=nothing))
+        solution = solve([links], estimate, max_iterations=MOST_ITERATIONS)
+        estimate, iterations = solution.estimate, len(solution.iterations)
+    for k, edge in enumerate((*edges, *[EDGE] * PASSES)):
+        whole = replace(whole, edge=edge)
+        solution = solve([whole], estimate, max_iterations=MOST_ITERATIONS)
         estimate, iterations = solution.estimate, iterations + len(solution.iterations)
         report(f"rests, pass {k + 1}, cost {solution.cost:.6g}", min((k + 1) / 6.0, 0.95))
         if not (solution.converged or solution.flat):
             raise SolveError(
                 f"no convergence after {len(solution.iterations)} iterations over "
-                f"{sum(len(problem.rests) for problem in problems)} rests; loads, units, signs or names may be wrong: "
+                f"{len(whole.rests)} rests; loads, units, signs or names may be wrong: "
                 "look at what `jointscope compare ROBOT --rests BAG` says"
             )
-        scale = _repeatability(problems, solution)
-        agrees = np.all(np.abs(np.log(scale / problems[0].repeatability)) < AGREES)
+        scale = repeatability_of(whole, solution)
+        agrees = np.all(np.abs(np.log(scale / whole.repeatability)) < AGREES)
         if edge == EDGE and agrees:
             break
-        problems = [replace(problem, repeatability=scale) for problem in problems]
-    return problems, solution, iterations
+        whole = replace(whole, repeatability=scale)
+    check_bands(whole, solution.estimate.states[0], solution.estimate.calibrations[0])
+    weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
+    return weighed, solution, iterations
 
 
-def _repeatability(problems: Sequence[RestSet], solution: Solution) -> Array:
+def check_bands(whole: RestSet, x: Array, calibration: Calibration) -> None:
+    """Bands that are far wider than all that they ever held: there the likelihood hardly falls and nothing leads back.
+
+    Args:
+        whole: the rests.
+        x: where links and motors stand, shape (m, d).
+        calibration: values.
+
+    Raises:
+        SolveError: the friction of a joint ran away.
+    """
+    torques = whole.torques(x, calibration)
+    held = np.where(whole.rests.moved, np.abs(torques.held.value), 0.0).max(axis=0, initial=0.0)
+    usual = np.median(torques.half.value, axis=0)
+    away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (usual > RAN_AWAY * held)
+    if away.any():
+        j = int(np.argmax(away))
+        raise SolveError(
+            f"the friction of {whole.robot.joints[j]} ran away: it could hold {usual[j]:.3g} N m, and had to hold "
+            f"{held[j]:.3g} N m at the most; gains or start values are far off: hold the gain of the drive if you know "
+            "it (`fixed: true` with the value of the data sheet), else begin nearer"
+        )
+
+
+def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, ...]:
+    """The states of each recording in the solution of all as one set."""
+    ends = np.cumsum([len(problem.rests) for problem in problems])[:-1]
+    return tuple(np.split(solution.estimate.states[0], ends))
+
+
+def repeatability_of(whole: RestSet, solution: Solution) -> Array:
     """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
-    residuals = np.concatenate([p.residuals(x) for p, x in zip(problems, solution.estimate.states, strict=True)])
-    size = np.sqrt(np.mean(residuals**2, axis=0))
-    return np.maximum(problems[0].repeatability * size, 1.0)
+    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
+    size = np.sqrt(np.mean(whole.residuals(x, whole.model.named(calibration.values)) ** 2, axis=0))
+    return np.maximum(whole.repeatability * size, 1.0)

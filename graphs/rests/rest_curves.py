@@ -18,6 +18,7 @@ from jointscope.robots.bodies.known_loads import KnownLoads, known_loads
 from jointscope.robots.dynamics.at_rest import WithSlopes, at_rest
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.rests.at_encoders import acting_commands
 
 Array = NDArray[np.float64]
 GRID = 81  # points of a spring's curve
@@ -90,11 +91,12 @@ def friction_curves(problems: Sequence[RestSet], covariance: Array) -> list[Meas
         states = problem.start(calibration)[0]
         torques = problem.torques(states, calibration)
         carried = _carried(problem, _states(problem), values)
-        drive = torques.motors.value - torques.middle.value
+        drive = torques.held.value
+        acting, _ = acting_commands(robot, problem.rests.u, values)
         if problem.rests.q_link is None:
             return []
         # the spring's torque is known better from what hangs on it than from encoders
-        held.append(np.abs(problem.model.drive_gain(calibration.values) * problem.rests.u + carried) if _elastic(robot)
+        held.append(np.abs(problem.model.drive_gain(calibration.values) * acting + carried) if _elastic(robot)
                     else np.abs(drive))  # fmt: skip
         load.append(np.abs(carried))
         moved.append(problem.rests.moved)

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.rests.at_encoders import encoder_errors
 
 Array = NDArray[np.float64]
+SURELY = 3.0  # [sigma] of the encoders' noise in a torque that is missing for sure
 
 
 @dataclass(frozen=True)
@@ -26,12 +28,21 @@ class RestErrors:
         residual: the same in sigmas of each rest.
         torque: torques that are missing for equilibrium where links and motors were measured, shape (m, n) [N m].
         friction: what friction holds beyond its band, of motors that had moved, shape (m, n) [N m].
+        certain: the same less what noise of the encoders may be, shape (m, n) [N m].
+        half: half widths of the bands, shape (m, n) [N m].
     """
 
     position: Array
     residual: Array
     torque: Array
     friction: Array
+    certain: Array
+    half: Array
+
+    @property
+    def bands(self) -> Array:
+        """Median half width of each motor's band, shape (n,) [N m]."""
+        return np.asarray(np.median(self.half, axis=0))
 
     @property
     def error(self) -> float:
@@ -61,21 +72,36 @@ def rest_errors(problems: Sequence[RestSet]) -> RestErrors:
     return RestErrors(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _of(problem: RestSet) -> tuple[Array, Array, Array, Array]:
+def _of(problem: RestSet) -> tuple[Array, ...]:
     robot, rests = problem.robot, problem.rests
     measured, calibration = problem.start(Calibration.of(robot))
     predicted = problem.predicted()
     columns = robot.layout.joint_link
-    seen = np.zeros_like(rests.q_motor) if rests.q_link is None else rests.q_link - predicted[:, columns]
+    seen = np.zeros_like(rests.q_motor)
+    if rests.q_link is not None:
+        values, q = {name: p.value for name, p in robot.parameters.items()}, predicted[:, columns]
+        seen = rests.q_link - q - encoder_errors(robot, q, values, on_links=True).value
     torques = problem.torques(measured, calibration)
     missing = np.zeros((len(rests), robot.layout.n_link))
     missing[:, problem.held] = torques.links.value
-    beyond = np.abs(torques.motors.value - torques.middle.value) - torques.half.value
+    held = torques.held
+    beyond = np.abs(held.value) - torques.half.value
     friction = np.where(rests.moved, np.maximum(beyond, 0.0), 0.0)
     # how far motors are off moves the links as well
     motor, link = problem.encoder_sigmas()
+    certain = np.maximum(friction - SURELY * _noise(problem, held.by_position, motor, link), 0.0)
     sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
-    return seen, seen / sigma, missing[:, columns], friction
+    return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value
+
+
+def _noise(problem: RestSet, slopes: Array, motor: Array, link: Array) -> Array:
+    """Sigma of torques with derivatives by positions, shape (m, n, d), that encoders leave, shape (m, n) [N m]."""
+    layout = problem.robot.layout
+    squares = np.zeros(slopes.shape[:2])
+    for columns, sigma in ((layout.motor_q, motor), (layout.joint_q, link)):
+        if np.all(np.isfinite(sigma)):
+            squares += np.sum((slopes[:, :, problem.places(columns)] * sigma[:, None, :]) ** 2, axis=2)
+    return np.sqrt(squares)
 
 
 def _rms(x: Array) -> float:

@@ -26,7 +26,7 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -36,6 +36,7 @@ ENCODER = "encoder_delay"
 USUAL = 0.8  # of the sigmas of a late drive signal of one joint, with which a late encoder of another is named
 CLEARER = 1.5  # times the sigmas of a late drive that one late encoder must have, to be named instead
 EARLY_OR_LATE = 5.0  # [sigma] from which a delay of the drive signal is one ...
+FILTERED = 1e-3  # [s] of a delay after the stamps, from which filters are late by as much
 MOVES = (3.5, 0.01)  # [sigma of a value, share of it], both, from which it matters
 
 
@@ -69,7 +70,11 @@ class DriveTiming:
         if self.joint:
             return f"correct its stamps where they are made, or record {self.joint} with the others' clock and filter"
         output = edited_argument(robot, EFFECT)
-        return f"`jointscope add {robot_argument(robot)} {EFFECT}@{OWNER} -o {output}`, then calibrate again"
+        alike = " (a low-pass of the positions, encoder_filter, or of the drive, motor_lag, is late, too)"
+        return (
+            f"`jointscope add {robot_argument(robot)} {EFFECT}@{OWNER} -o {output}`, then calibrate again"
+            f"{alike if self.delay > FILTERED else ''}"
+        )
 
     def moved(self, found: Mapping[str, Value]) -> list[str]:
         """Names of the values that the delay would change by much; none where it may be chance.

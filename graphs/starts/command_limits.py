@@ -12,14 +12,14 @@ least of c open. Rotor, friction and constant are found in the same regression, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import Driven, load_of
-from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands, motion_cells
+from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands
 from jointscope.graphs.starts.windowed_sums import SIGNALS, joint_signals, windowed_rows
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
@@ -40,6 +40,7 @@ FEWEST_ROWS = 60  # windows in which a joint moves; fewer are explained by anyth
 SEVERAL, GOOD_PART = 3, 0.02  # blocks of the recording with such a part of the excess, mean square
 FAR_BETTER = 20.0  # times less must be left open where there are fewer: a push may look alike
 DRY_COLUMN = SIGNALS.index("dry") - 1  # of the motion: all signals but the command
+MOVES = 0.7  # of a limit that dry friction may take: a drive that gives hardly more moves nothing
 PIECES = 6  # of the windows with excess that are left out one by one
 
 
@@ -65,7 +66,7 @@ def limited(command: Stream, limits: Sequence[CommandLimit | None]) -> Stream:
 
 
 @dataclass(frozen=True)
-class _Windows:
+class DrivenWindows:
     """One recording under windows of one width: motion of each joint, and what its commands need to follow."""
 
     cells: MotionCells
@@ -100,19 +101,36 @@ def command_limits(
         held: whether a command acts until the next one.
         sharpness: k in tanh(k v) of dry friction, of all joints or of each, shape (n,) [s/rad].
     """
-    by_width: dict[float, list[_Windows]] = {width: [] for width in WIDTHS}
-    for encoder, command, left_out in recordings:
-        cells = motion_cells(encoder, command, sigmas, held, left_out)
-        signals = joint_signals(cells, load_of(tree, cells), sharpness)[:, :, 1:]
+    return limits_in(windows_of_drives(tree, recordings, sigmas, held=held, sharpness=sharpness), tree.n)
+
+
+def limits_in(by_width: Mapping[float, list[DrivenWindows]], joints: int) -> list[CommandLimit | None]:
+    """The same in the windows of `windows_of_drives`, for a number of joints."""
+    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(joints)]
+
+
+def windows_of_drives(
+    tree: RigidTree,
+    recordings: Sequence[Driven],
+    sigmas: Array,
+    *,
+    held: bool = True,
+    sharpness: float | Array = 1e4,
+) -> dict[float, list[DrivenWindows]]:
+    """The recordings under windows of each width [s]; arguments as of `command_limits`."""
+    by_width: dict[float, list[DrivenWindows]] = {width: [] for width in WIDTHS}
+    for driven in recordings:
+        cells, of_links = driven.cells(sigmas, held)
+        signals = joint_signals(cells, load_of(tree, of_links), sharpness)[:, :, 1:]
         for width in WIDTHS:
             rows, _ = windowed_rows(cells, signals, width)
             if rows:
                 parts = [motion for motion, _, _ in rows], [block for _, block, _ in rows]
-                by_width[width].append(_Windows(cells, command, held, width, *parts))
-    return [_limit(j, {width: some for width, some in by_width.items() if some}) for j in range(tree.n)]
+                by_width[width].append(DrivenWindows(cells, driven.command, held, width, *parts))
+    return by_width
 
 
-def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | None:
+def _limit(joint: int, by_width: dict[float, list[DrivenWindows]]) -> CommandLimit | None:
     """The limit of one drive."""
     by_width = {w: some for w, some in by_width.items() if sum(len(x.motion[joint]) for x in some) >= FEWEST_ROWS}
     if not by_width:
@@ -138,12 +156,14 @@ def _limit(joint: int, by_width: dict[float, list[_Windows]]) -> CommandLimit | 
         whole = _left_open(windows, joint, np.inf)
     if whole < BETTER * left or left > OPEN or np.count_nonzero(sizes > level) < FEWEST:
         return None
+    if dry_friction(windows, joint, [_clipped(some, joint, level) for some in windows]) > MOVES * level:
+        return None
     lost, sigma, several = _lost(windows, joint, level)
     believed = lost > LOST and sigma < SURE and (several or whole > FAR_BETTER * left)
     return CommandLimit(level, float(np.mean(sizes > level)), lost) if believed else None
 
 
-def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float, float]:
+def _best_level(windows: list[DrivenWindows], joint: int, grid: Array) -> tuple[float, float]:
     """Where the motion leaves least of the command open, between the neighbours of the best of a grid; and how much."""
     for _ in range(2):
         found = [_left_open(windows, joint, float(level)) for level in grid]
@@ -169,17 +189,27 @@ def _best_level(windows: list[_Windows], joint: int, grid: Array) -> tuple[float
     return float(best[1]), float(best[0])
 
 
-def _clipped(some: _Windows, joint: int, level: float) -> Array:
+def _clipped(some: DrivenWindows, joint: int, level: float) -> Array:
     return np.clip(some.command.channel(joint).values[:, 0], -level, level)
 
 
-def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
-    """Share of the mean square of the limited command, beyond what dry friction may be, that motion does not explain.
+def _left_open(windows: list[DrivenWindows], joint: int, level: float) -> float:
+    """What motion leaves open of a command that is limited to a level, see `left_open`."""
+    return left_open(windows, joint, [_clipped(some, joint, level) for some in windows])
+
+
+def left_open(windows: Sequence[DrivenWindows], joint: int, given: Sequence[Array]) -> float:
+    """Share of the mean square of what a drive gave, beyond what dry friction may be, that motion does not explain.
 
     Where a drive always pushes in the direction of its motion, its limited command is a dry friction, the more so the
     lower the limit.
+
+    Args:
+        windows: of each recording.
+        joint: index.
+        given: what the drive gave instead of each command, shape (s,) for each recording.
     """
-    y = np.concatenate([some.of_command(joint, _clipped(some, joint, level)) for some in windows])
+    y = np.concatenate([some.of_command(joint, values) for some, values in zip(windows, given, strict=True)])
     X = np.concatenate([some.motion[joint] for some in windows])
     if len(y) <= X.shape[1] or not y.any():
         return 1.0
@@ -190,7 +220,15 @@ def _left_open(windows: list[_Windows], joint: int, level: float) -> float:
     return float(rest @ rest / max(float(beyond @ beyond), 1e-300))
 
 
-def _lost(windows: list[_Windows], joint: int, level: float) -> tuple[float, float, bool]:
+def dry_friction(windows: Sequence[DrivenWindows], joint: int, given: Sequence[Array]) -> float:
+    """Dry friction that the motion asks for, in the unit of the command; arguments as of `left_open`."""
+    y = np.concatenate([some.of_command(joint, values) for some, values in zip(windows, given, strict=True)])
+    X = np.concatenate([some.motion[joint] for some in windows])
+    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    return float(np.linalg.lstsq(X / size, y, rcond=1e-10)[0][DRY_COLUMN] / size[DRY_COLUMN])
+
+
+def _lost(windows: list[DrivenWindows], joint: int, level: float) -> tuple[float, float, bool]:
     """Part of the excess that is lost, its sigma from leaving out pieces of it, and whether it comes several times."""
     y, e, X, blocks, first = [], [], [], [], 0
     for some in windows:

@@ -8,6 +8,9 @@ With rigid joints and known masses the equation of motion is linear in what is w
 Commands are known exactly, motion nearly so, and what the model lacks is torque. So the command is regressed on the
 motion, k u = (M a + c + g) + b a + d v + mu sign(v), divided by k; a known k needs no dividing. Sigmas come from
 leaving out one block of time after the other, so they hold for errors that last.
+
+Behind springs the links move otherwise than their motors: where encoders see them, M a + c + g is of their motion, and
+the equation holds whatever the springs are.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.motion_cells import MotionCells, motion_cells
+from jointscope.graphs.starts.motion_cells import MotionCells, motion_cells, on_links
 from jointscope.graphs.starts.windowed_sums import WIDTHS, WindowedSums, joint_signals, windowed_sums
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
@@ -41,6 +44,13 @@ class Value(NamedTuple):
     sigma: float
 
 
+class Links(NamedTuple):
+    """What encoders on the links saw: positions from zero [rad], and their noise, shape (n,) [rad]."""
+
+    encoder: Stream
+    sigmas: Array
+
+
 class Driven(NamedTuple):
     """What of one recording tells about drives.
 
@@ -48,11 +58,21 @@ class Driven(NamedTuple):
         encoder: positions from zero [rad].
         command: what drives the joints.
         left_out: stretches of time in which something else acted [s].
+        links: positions of links that springs let move otherwise than their motors; None where they move alike.
     """
 
     encoder: Stream
     command: Stream
     left_out: Sequence[tuple[float, float]] = ()
+    links: Links | None = None
+
+    def cells(self, sigmas: Array, held: bool) -> tuple[MotionCells, MotionCells]:
+        """Motion of the motors, whose encoders have some noise, shape (n,) [rad], and of the links."""
+        cells = motion_cells(self.encoder, self.command, sigmas, held, self.left_out)
+        if self.links is None:
+            return cells, cells
+        of_links = on_links(cells, *self.links)
+        return replace(cells, known=of_links.known), of_links
 
 
 @dataclass(frozen=True)
@@ -156,9 +176,10 @@ def drive_equations(
         sharpness: k in tanh(k v), which stands for sign(v), of all joints or of each, shape (n,) [s/rad].
     """
     found: list[dict[float, DriveEquation]] = []
-    for encoder, command, left_out in recordings:
-        cells = motion_cells(encoder, command, sigmas, held, left_out)
-        now = equations_by_width(cells, load_of(tree, cells), tree.mass_matrix(cells.q[:1])[0], sigmas, sharpness)
+    for driven in recordings:
+        cells, of_links = driven.cells(sigmas, held)
+        M, links = tree.mass_matrix(of_links.q[:1])[0], driven.links
+        now = equations_by_width(cells, load_of(tree, of_links), M, sigmas, sharpness, links)
         merged = (
             [{w: _both(a, b[w]) for w, a in old.items()} for old, b in zip(found, now, strict=True)] if found else now
         )
@@ -173,7 +194,7 @@ def load_of(tree: RigidTree, cells: MotionCells) -> Array:
 
 
 def equations_by_width(
-    cells: MotionCells, load: Array, M: Array, sigmas: Array, sharpness: float | Array
+    cells: MotionCells, load: Array, M: Array, sigmas: Array, sharpness: float | Array, links: Links | None = None
 ) -> list[dict[float, DriveEquation]]:
     """For each joint its equation by width of the windows [s].
 
@@ -183,10 +204,14 @@ def equations_by_width(
         M: mass matrix at some posture, which tells what noise of accelerations becomes, shape (n, n) [kg m2].
         sigmas: noise of the encoders, shape (n,) [rad].
         sharpness: k in tanh(k v) [s/rad].
+        links: whose motion the load is of, if it is not that of the motors.
     """
     signals = joint_signals(cells, load, sharpness)
     rms = np.sqrt(np.mean(signals**2, axis=0))
     noise = np.column_stack([M**2 @ sigmas**2, np.diag(M) * sigmas**2, sigmas**2])
+    if links is not None:  # which have noise of their own, as many times of it as they are sampled more seldom
+        noise[:, 0] = M**2 @ (links.sigmas**2 * links.encoder.periods) / cells.periods
+        noise[:, 1] = 0.0
     by_width = [windowed_sums(cells, signals, noise, width) for width in WIDTHS]
     return [
         {width: DriveEquation(sums[j], rms[j]) for width, sums in zip(WIDTHS, by_width, strict=True)}

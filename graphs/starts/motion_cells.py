@@ -9,7 +9,7 @@ same filter, however they were sampled: half a sample of delay between them cost
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +119,25 @@ def motion_cells(
     known = ~_dwelling(resting[1:] & resting[:-1], fewest) & usable[:, None]
     at_middle, a = _path(encoder, middle)[0], np.diff(v, axis=0) / h
     return MotionCells(h, middle, at_middle, np.diff(q, axis=0) / h, v_smooth, a, means, known, periods)
+
+
+def on_links(cells: MotionCells, links: Stream, sigmas: Array) -> MotionCells:
+    """The same cells with the motion that encoders on the links saw; sigmas of those, shape (n,) [rad]."""
+    edges, periods = cells.edges, links.periods
+    q, v = _path(links, edges)
+    missing = [
+        _missing(links.times[good], cells.times, own)
+        for good, own in zip(np.isfinite(links.measured).T, periods, strict=True)
+    ]
+    return replace(
+        cells,
+        q=_path(links, cells.times)[0],
+        v=np.diff(q, axis=0) / cells.h,
+        v_smooth=_smooth(v, sigmas, periods, cells.h)[0],
+        a=np.diff(v, axis=0) / cells.h,
+        known=cells.known & ~np.any(missing, axis=0)[:, None],
+        periods=periods,
+    )
 
 
 def mean_commands(command: Stream, edges: Array, held: bool) -> Array:

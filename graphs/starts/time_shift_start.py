@@ -24,6 +24,7 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 TRIED = np.array([1.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0, 24.0]) * 1e-3  # [s], and their negatives
+OF_TARGETS = np.array([30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 110.0, 130.0, 150.0]) * 1e-3  # [s] cameras are later
 ITERATIONS = 3
 REFINED = 5  # parabolas through the lowest values at the most
 NEAR = 2e-4  # [s]
@@ -63,7 +64,8 @@ class _Scan:
         parameter = robot.parameters[self.name]
         one_sided = parameter.positive or _one_sided(robot, self.name)
         # all of them: far from the right one the cost has further valleys
-        for value in (parameter.value, *TRIED, *(() if one_sided else -TRIED)):
+        later = OF_TARGETS if any(self.name.startswith(f"{target.name}.") for target in robot.targets) else ()
+        for value in (parameter.value, *TRIED, *later, *(() if one_sided else -TRIED)):
             self._cost(float(value))
         for _ in range(REFINED):
             best = self._best()

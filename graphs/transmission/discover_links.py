@@ -49,6 +49,10 @@ class Links:
         """Each sensor predicted from the others."""
         return compare_links_model(label, robot, self.holdout or self.recordings[0])
 
+    def floor(self, comparison: ModelComparison) -> float:
+        """What the noise of the sensors leaves."""
+        return comparison.judged_floor
+
     def diagnosed(
         self,
         model: LinksModel,

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.rigid_tree import RigidTree
 
 Array = NDArray[np.float64]
-STEP = 1e-5  # [rad] of the differences that make the derivative, which is exact to 1e-9
 
 
 @dataclass(frozen=True)
@@ -41,21 +40,19 @@ def known_loads(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) 
     Raises:
         RobotError: no such link.
     """
-    torque = _torques(tree, links, forces, q)
-    by_q = np.zeros((*q.shape, q.shape[1]))
-    for k in range(q.shape[1]) if np.any(forces) else ():
-        h = STEP * np.eye(q.shape[1])[k]
-        by_q[:, :, k] = (_torques(tree, links, forces, q + h) - _torques(tree, links, forces, q - h)) / (2.0 * STEP)
+    coupling, axes = tree.coupling, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    pulled = [bool(link) and bool(np.any(force)) for link, force in zip(links, forces, strict=True)]
+    frames = {link: tree.frame_id(link) for link in {link for link, some in zip(links, pulled, strict=True) if some}}
+    own = q if coupling is None else coupling.positions(q)
+    J = np.zeros((len(q), 6, tree.model.nv))
+    for i in (i for i, some in enumerate(pulled) if some):
+        # a model of one joint gives a vector
+        J[i] = pin.computeFrameJacobian(tree.model, tree.data, own[i], frames[links[i]], axes).reshape(6, -1)
+    linear, angular = J[:, :3], J[:, 3:]
+    torque = np.einsum("mck,mc->mk", linear, forces)
+    # a column turns with every joint k before its own: dJ_j / dq_k = w_k x J_j, and dJ_k / dq_j is the same
+    turned = np.einsum("mjc,mkc->mjk", np.swapaxes(linear, 1, 2), np.cross(forces[:, None], np.swapaxes(angular, 1, 2)))
+    by_q = np.tril(turned) + np.swapaxes(np.tril(turned, -1), 1, 2)
+    if coupling is not None:
+        torque, by_q = torque @ coupling.G, coupling.G.T @ by_q @ coupling.G
     return KnownLoads(torque, by_q)
-
-
-def _torques(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) -> Array:
-    found, coupling = np.zeros_like(q), tree.coupling
-    for i, (link, force) in enumerate(zip(links, forces, strict=True)):
-        if link and np.any(force):
-            own = q[i] if coupling is None else coupling.positions(q[i : i + 1])[0]
-            frame = tree.frame_id(link)
-            axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            J = pin.computeFrameJacobian(tree.model, tree.data, own, frame, axes)[:3]
-            found[i] = (J if coupling is None else J @ coupling.G).T @ force
-    return found

@@ -11,6 +11,7 @@ that depends on load, position or direction says its band by itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,15 +49,24 @@ class AtRest:
         links: torques on link coordinates that no motor turns itself, which vanish in equilibrium, k = number of them.
         motors: y, what friction has to hold, k = n.
         middle, half: of the band of y, k = n.
+        sliding: torques on motors that creep, with their whole friction, which vanish, k = n; y where they stand.
     """
 
     links: WithSlopes
     motors: WithSlopes
     middle: WithSlopes
     half: WithSlopes
+    sliding: WithSlopes
+
+    @property
+    def held(self) -> WithSlopes:
+        """What friction has to hold, less the middle of its band, k = n."""
+        return _sum((self.motors, 1.0), (self.middle, -1.0))
 
 
-def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads) -> AtRest:
+def at_rest(
+    model: ElasticJoints, positions: Array, u: Array, parameters: Array, loads: KnownLoads, creep: Array | None = None
+) -> AtRest:
     """Torques of a standing robot.
 
     Args:
@@ -65,16 +75,19 @@ def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array,
         u: commands in their SI unit, shape (m, n).
         parameters: values of the free parameters, shape (p,).
         loads: what hangs on it.
+        creep: velocities of motors that slide on slowly, shape (m, n) [rad/s], 0 where they stand; none without.
     """
     layout, values = model.layout, model.named(parameters)
     x = np.zeros((len(positions), layout.size))
     x[:, layout.positions] = positions
     q, still = x[:, layout.q_link], np.zeros((len(x), layout.n_link))
-    outside = loads.torque[:, layout.joint_link]
-    terms = model.torques(x, u, parameters, outside)
+    speeds: list[Array | float] = [0.0, SLIPPING, -SLIPPING]
+    if creep is not None and np.any(creep):
+        speeds.append(creep)
+    found = _at_speeds(model, x, u, parameters, loads.torque[:, layout.joint_link], speeds)
+    terms, plain, *sliding = found[0], *(_rows(part, layout.motor_row, layout.positions) for part in found)
     assert terms.by_state is not None and terms.by_parameter is not None
     bodies, n = model.tree.bodies(values), layout.n_link
-    plain = _rows(terms, layout.motor_row, layout.positions)
     terms.value[:, :n] += loads.torque - bodies.torque(q, still, still)
     terms.by_state[:, :n, layout.q_link] += loads.by_q - bodies.gravity_derivatives(q)
     for name, weight in model.tree.gravity_by_parameter(q, values).items():
@@ -82,16 +95,29 @@ def at_rest(model: ElasticJoints, positions: Array, u: Array, parameters: Array,
             terms.by_parameter[:, :n, model.names.index(name)] -= weight
     driven = set(layout.motor_row.tolist())
     held = [row for row in range(n) if row not in driven]
-    sliding = []
-    for speed in (SLIPPING, -SLIPPING):
-        x[:, layout.motor_v] = speed
-        terms_there = model.torques(x, u, parameters, outside, np.full(len(layout.joints), AT_ONCE))
-        sliding.append(_rows(terms_there, layout.motor_row, layout.positions))
-    forwards, backwards = sliding
+    forwards, backwards = sliding[:2]
     # the balance y is held by minus the friction that would act
     middle = _sum((plain, 1.0), (forwards, -0.5), (backwards, -0.5))
     half = _sum((backwards, 0.5), (forwards, -0.5))
-    return AtRest(_rows(terms, held, layout.positions), _rows(terms, layout.motor_row, layout.positions), middle, half)
+    links, motors = (_rows(terms, rows, layout.positions) for rows in (held, layout.motor_row))
+    # a rigid joint's motor carries the weight of its links as well
+    creeping = _sum((sliding[2], 1.0), (motors, 1.0), (plain, -1.0)) if len(sliding) > 2 else motors
+    return AtRest(links, motors, middle, half, creeping)
+
+
+def _at_speeds(
+    model: ElasticJoints, x: Array, u: Array, parameters: Array, outside: Array, speeds: Sequence[Array | float]
+) -> list[TorqueTerms]:
+    """Torques without the rigid bodies at some speeds of the motors, friction turning over at once; by one call."""
+    count, m, layout = len(speeds), len(x), model.layout
+    tall = np.tile(x, (count, 1))
+    for i, speed in enumerate(speeds):
+        tall[i * m : (i + 1) * m, layout.motor_v] = speed
+    sharp = np.full(len(layout.joints), AT_ONCE)
+    terms = model.torques(tall, np.tile(u, (count, 1)), parameters, np.tile(outside, (count, 1)), sharp)
+    assert terms.by_state is not None and terms.by_parameter is not None
+    parts = (np.split(part, count) for part in (terms.value, terms.by_state, terms.by_parameter))
+    return [TorqueTerms(*part) for part in zip(*parts, strict=True)]
 
 
 def _rows(terms: TorqueTerms, rows: Columns | list[int], positions: Columns) -> WithSlopes:

@@ -9,6 +9,7 @@ from typing import Protocol
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, Topic
 
 
@@ -50,6 +51,10 @@ class RobotView(Protocol):
     @property
     def accelerometers(self) -> Sequence[Accelerometer]:
         """All accelerometers."""
+
+    @property
+    def targets(self) -> Sequence[PositionTarget]:
+        """All targets that a tracker measures."""
 
     @property
     def link_encoder(self) -> LinkEncoder | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An encoder reading that is older than its stamp."""
+"""A reading of an encoder, or of a tracker, that is older than its stamp."""
 
 from __future__ import annotations
 
@@ -22,20 +22,22 @@ def late(stamps: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]
 
 EFFECT = TimeShift(
     id="encoder_delay",
-    owners=("joint", "link_encoder", "robot"),
+    owners=("joint", "link_encoder", "target", "robot"),
     late=late,
     sensors="encoder",
     parameters=(EffectParameter("delay", "s", start=1e-3, prior_sigma=0.5, sign="+"),),
     example={"delay": 3e-3},
     card=Card(
-        title="encoder older than its stamp",
-        law="reading(t) = q_motor(t - delay), or q_link(t - delay) for the encoders on the links",
+        title="position older than its stamp",
+        law="reading(t) = q_motor(t - delay), or q_link(t - delay) for the encoders on the links; of a target "
+        "p(t - delay)",
         explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
-        "joint: its encoder is read later than those of the others.",
+        "joint: its encoder is read later than those of the others. Cameras expose, compute and send for tens of "
+        "milliseconds.",
         source="Kelly, Sukhatme (2014), A general framework for temporal calibration of multiple proprioceptive and "
         "exteroceptive sensors, in Experimental Robotics, Springer",
-        typical="0.1 to 10 ms",
-        excitation="fast oscillation, with a gyro that sees the same joint",
+        typical="0.1 to 10 ms; of cameras and motion capture 5 to 100 ms",
+        excitation="fast oscillation, with another sensor that sees the same joint",
         look_alikes={
             "encoder_filter": "a filter of first order is late, too; the variance is what no delay explains",
             "command_delay": "with the encoder late, motion seems to lag behind the command",

@@ -20,12 +20,13 @@ def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:
 EFFECT = ReadingEffect(
     id="encoder_offset",
     turning=True,
+    owners=("joint", "joint_link"),
     law=law,
     parameters=(EffectParameter("offset", "rad", start=0.0, prior_sigma=1.0),),
     example={"offset": 0.05},
     card=Card(
         title="wrong zero of an encoder",
-        law="reading = q_motor + zero + offset",
+        law="reading = q_motor + zero + offset; q_link for an encoder on the link, JOINT.link",
         explanation="Where the encoder reads zero the joint is somewhere else: it was mounted or homed wrongly. The "
         "weight of the links and their coupling then belong to another posture than the model thinks. Correct the "
         "zero; this is no physics of the robot.",

@@ -17,6 +17,7 @@ from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
 from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities, unseen_links
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.process_noise import ProcessNoise
@@ -66,7 +67,7 @@ def _better_integrated(robot: Robot) -> Robot:
 
 
 def remove_effect(robot: Robot, label: str) -> Robot:
-    """A robot without one of its effects.
+    """A robot without one of its effects, and without the derived results that follow from it.
 
     Raises:
         EffectError: the robot does not have it, another effect needs it, or it is a choice of the model and no entry.
@@ -78,7 +79,8 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     if held:
         raise EffectError(
             f"{label} cannot be removed from {robot.name}: {', '.join(held)} acts in that spring; remove both: "
-            f"jointscope remove {robot.path} {' '.join(held)} {label} -o OUT.yaml"
+            f"jointscope remove {robot_argument(robot)} {' '.join(held)} {label} "
+            f"-o {edited_argument(robot, 'without')}"
         )
     document = copy.deepcopy(robot.document)
     remove_at(document, "effects", document["effects"].index(label))
@@ -88,7 +90,11 @@ def remove_effect(robot: Robot, label: str) -> Robot:
         if name.startswith(start) and name in document["parameters"]:
             _take_out_parameter(document, name)
     effects = tuple(here for here in robot.effects if here.label != label)
-    new = replace(robot, parameters=parameters, effects=effects, document=document)
+    follows = [result for result in robot.derived if set(result.of) - parameters.keys()]
+    for result in follows:
+        remove_at(document, "derived", result.name)
+    derived = tuple(result for result in robot.derived if result not in follows)
+    new = replace(robot, parameters=parameters, effects=effects, derived=derived, document=document)
     by_name = set(new.layout.links) - set(new.layout.joints) | set(new.memories)
     if not by_name and "effects" in document.get("noise", {}):
         remove_at(document, "noise", "effects")

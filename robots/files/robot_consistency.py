@@ -9,6 +9,7 @@ from jointscope.robots.files.needed_spring import needed_spring
 from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.geometry.arm_effects import effect_units
 from jointscope.robots.geometry.error_parameters import pose_units
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
@@ -102,7 +103,8 @@ def _check_links(robot: Robot, place: str) -> None:
         label = " ".join(f"joint_elasticity@{joint}" for joint in rigid)
         raise RobotError(
             f"{place}: sensors.{sensor.name}: a torque is measured at the spring of a joint, and {', '.join(rigid)} "
-            f"has none; remove the sensor, then `jointscope add {robot.path} {label} -o OUT.yaml` and put it back"
+            f"has none; remove the sensor, then `jointscope add {robot_argument(robot)} {label} "
+            f"-o {edited_argument(robot, 'elastic')}` and put it back there"
         )
     if sensor is not None and robot.transmission is not None:
         raise RobotError(f"{place}: sensors.{sensor.name}: not used with a section transmission; remove the sensor")

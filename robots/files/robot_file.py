@@ -7,7 +7,6 @@ Ready robots are the YAML files below `robots/`; every other name is a path.
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from jointscope.robots.files.pose_section import pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
 from jointscope.robots.files.transmission_section import transmission_matrix
+from jointscope.robots.model.command_words import READY_ROOT, ready_robots
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.tracker_frames import with_trackers
 from jointscope.robots.parts.model_choices import ModelChoices
@@ -37,36 +37,12 @@ from jointscope.robots.yaml_document import read_document
 from jointscope.robots.yaml_section import Section, did_you_mean
 
 FORMAT = 1
-READY_ROOT = Path(__file__).parents[1] / "ready"
 READY_PREFIX = "ready:"
 
 INTEGRATORS = ("euler", "midpoint", "simpson")
 COMMAND_UNITS = ("duty", "V", "A", "N m")
 NO_COMMAND = Topic("", "", "", "N m")  # of a robot of which only poses are measured
 CONSTANTS = ("motor.supply_voltage", "motor.gear")
-
-
-def ready_robots() -> dict[str, Path]:
-    """The robots that come with the package: name and file."""
-    return {path.stem: path for path in sorted(READY_ROOT.glob("*/*.yaml"))}
-
-
-def robot_argument(robot: Robot) -> str:
-    """What a user types to name a robot: the name of a ready one, else the path of its file."""
-    stem = robot.path.stem
-    return shlex.quote(stem if ready_robots().get(stem) == robot.path else str(robot.path))
-
-
-def edited_argument(robot: Robot, edit: str) -> str:
-    """What a user types to name a file that an edit makes of a robot's: beside it, of a ready robot where he is.
-
-    Args:
-        robot: as it is.
-        edit: a word for what is done to it, as in "arm_limited.yaml".
-    """
-    here = ready_robots().get(robot.path.stem) == robot.path
-    name = f"{robot.path.stem}_{edit}.yaml"
-    return shlex.quote(name if here else str(robot.path.with_name(name)))
 
 
 def load_robot(name_or_path: str | Path) -> Robot:

@@ -200,6 +200,8 @@ def _position_target(name: str, section: Section) -> PositionTarget:
     source = topic(section)
     if si_unit(source.unit) != "m":
         raise RobotError(f"{section.place}.unit: a position is in m or mm, got {source.unit!r}")
+    if section.flag("left_handed", False):
+        source = replace(source, scale=RIGHT_FROM_LEFT)
     tracker, pose = section.text("tracker", None), section.array("tracker_pose", (4, 4), None)
     if (tracker is None) == (pose is None):
         raise RobotError(

@@ -33,7 +33,9 @@ def base_from_tracker(in_base: Array, in_tracker: Array) -> tuple[Array, float, 
     return T, left(R), hand < 0.0 and left(mirrored) < 0.1 * left(R)
 
 
-def tracker_and_shift(points: Array, turns: Array, in_tracker: Array, shift: Array) -> tuple[Array, Array, float]:
+def tracker_and_shift(
+    points: Array, turns: Array, in_tracker: Array, shift: Array, rounds: int = ROUNDS
+) -> tuple[Array, Array, float]:
     """The same with the target anywhere on its link: both in turn.
 
     Args:
@@ -41,13 +43,14 @@ def tracker_and_shift(points: Array, turns: Array, in_tracker: Array, shift: Arr
         turns: rotations of its link, shape (m, 3, 3).
         in_tracker: measured ones, shape (m, 3) [m].
         shift: of the target in the axes of its link to begin with, shape (3,) [m].
+        rounds: of place of the tracker and place of the target in turn.
 
     Returns:
         Base from tracker, shape (4, 4), shift of the target in the axes of its link, shape (3,), what is left [m].
     """
     T, left = np.eye(4), np.inf
     spread = (turns - turns.mean(axis=0)).reshape(-1, 3)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         T, left, _ = base_from_tracker(points + turns @ shift, in_tracker)
         wanted = in_tracker @ T[:3, :3].T + T[:3, 3] - points
         shift = np.linalg.lstsq(spread, (wanted - wanted.mean(axis=0)).reshape(-1), rcond=None)[0]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import edited_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.encoder_gyro_scale import check_scales
 from jointscope.robots.recordings.held_joints import about_bodies
@@ -24,7 +25,7 @@ from jointscope.robots.recordings.resting_joints import (
     must_move,
     what_it_cannot_tell,
 )
-from jointscope.robots.recordings.rests import OFTEN, standing_share
+from jointscope.robots.recordings.still_stretches import OFTEN, standing_share
 from jointscope.robots.recordings.target_plausibility import check_targets
 from jointscope.robots.recordings.wrapped_counter import wrapping_jump
 from jointscope.robots.units import UNITS, si_factor, si_unit
@@ -199,7 +200,7 @@ def _check_limits(motion: JointMotion, robot: Robot) -> list[Notice]:
                 raise RecordingError(f"{text}; {_one_joint_hint(robot, others)}")
             raise RecordingError(f"{text}; {_unit_hint(robot, k, float(share[k]))}")
         if share[k] > BEYOND_LIMIT:
-            notices.append(Notice(robot.motor_encoder.name, "unit", 0, text))
+            notices.append(Notice(robot.motor_encoder.name, "limit", 0, text))
     return notices
 
 
@@ -210,7 +211,8 @@ def _one_joint_hint(robot: Robot, others: list[str]) -> str:
     return (
         "all other joints keep theirs: look whether its samples jump, whether it alone has another unit (`unit: "
         f"[{now}]` of sensors.{encoder.name} has one for each joint), or whether the URDF allows it too little; "
-        f"without it: jointscope init {robot.tree.urdf} BAG --joints {','.join(others)} -o NEW.yaml"
+        f"without it: jointscope init {robot.tree.urdf} BAG --joints {','.join(others)} "
+        f"-o {edited_argument(robot, 'without')}"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Does a target move as a point of its link? Wrong units, a wrong link, a tracker that stands elsewhere show.
+"""Does a target move as a point of its link? Units, links, trackers that are left-handed, late or moved show.
 
 Measured positions are held against those that the encoders imply: as they are, and after the best place of tracker and
 target. Springs make the two differ by millimetres; another link by a good part of the motion.
@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from jointscope.robots.bodies.body_points import body_point
 from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.tracker_fit import base_from_tracker, tracker_and_shift
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
+from jointscope.robots.parts.sensors import RIGHT_FROM_LEFT
 from jointscope.robots.recordings.joint_motion import JointMotion
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.units import UNITS, si_factor, si_unit
@@ -32,6 +34,11 @@ CLEARLY_BETTER = 0.5  # times what is left there may be left of the right one
 ALIKE = 4  # decimals [m] in which the fits of two links that one joint moves are the same
 ELSEWHERE = 0.3  # of the motion: a tracker that is farther off has been moved
 IN_PRIOR = 3.0  # [sigma] how far a calibration goes without being told
+LATEST, STEP = 0.2, 0.004  # [s] delays that are looked for
+FEW_ROUNDS = 30  # of a fit where only its delay is asked for
+MIRRORED = 0.5  # times what is left of right-handed positions may be left of mirrored ones
+DELAY = "encoder_delay"  # the effect of a late tracker
+LATE = 0.7  # times what is left without a delay may be left with it
 ARMS = 0.3  # [m] places of a target on its link to begin with
 
 
@@ -46,17 +53,28 @@ def check_targets(recording: Recording, robot: Robot, motion: JointMotion) -> li
     """
     notices = []
     for target in robot.targets:
-        q, seen = seen_beside(motion, recording.streams[target.name])
+        stream = recording.streams[target.name]
+        q, seen = seen_beside(motion, stream)
         if len(q) >= FEWEST_POINTS:
-            notices += _check_target(robot, target, q, seen)
+            delay, told = _late(robot, target, motion, stream)
+            if told:
+                q, seen = seen_beside(motion, stream, delay)
+            notices += told + _check_target(robot, target, q, seen)
     return notices
 
 
-def seen_beside(motion: JointMotion, stream: Stream) -> tuple[Array, Array]:
-    """Some hundred positions of the joints, shape (m, n), and of a target at the same instants, shape (m, 3)."""
-    inside = np.flatnonzero((motion.times >= stream.times[0]) & (motion.times <= stream.times[-1]))
+def seen_beside(motion: JointMotion, stream: Stream, delay: float = 0.0) -> tuple[Array, Array]:
+    """Some hundred positions of the joints, shape (m, n), and of a target at the same instants, shape (m, 3).
+
+    Args:
+        motion: of the joints.
+        stream: what the tracker measured.
+        delay: by how much its stamps are late [s].
+    """
+    taken = stream.times - delay
+    inside = np.flatnonzero((motion.times >= taken[0]) & (motion.times <= taken[-1]))
     chosen = inside[:: max(len(inside) // MOST_POINTS, 1)]
-    seen = [np.interp(motion.times[chosen], stream.times, column) for column in stream.values.T]
+    seen = [np.interp(motion.times[chosen], taken, column) for column in stream.values.T]
     return motion.q[chosen], np.column_stack(seen)
 
 
@@ -80,17 +98,55 @@ def fitted_tracker(tree: RigidTree, body: str, at: Array, q: Array, seen: Array)
     return min(fits, key=lambda fit: fit[2])
 
 
+def _late(robot: Robot, target: PositionTarget, motion: JointMotion, stream: Stream) -> tuple[float, list[Notice]]:
+    """Delay of a tracker whose stamps are late, which the robot file does not know [s], and what is said of it.
+
+    Springs put a target elsewhere with the acceleration, a delay with the velocity. Zero where the best delay does not
+    leave much less than none.
+    """
+    if any(here.owner == target.name and isinstance(here.effect, TimeShift) for here in robot.effects):
+        return 0.0, []
+    tried = np.arange(0.0, LATEST + 0.5 * STEP, STEP)
+    now = _left_at(robot.tree, target, motion, stream, 0.0)
+    if now < NOISE * target.sigma:
+        return 0.0, []
+    found = np.array([now, *(_left_at(robot.tree, target, motion, stream, float(delay)) for delay in tried[1:])])
+    k = int(np.argmin(found))
+    if k == 0 or found[k] > LATE * now:
+        return 0.0, []
+    delay = float(tried[k])
+    if k + 1 < len(tried):
+        bend = found[k - 1] ** 2 - 2.0 * found[k] ** 2 + found[k + 1] ** 2
+        delay += 0.5 * STEP * float((found[k - 1] ** 2 - found[k + 1] ** 2) / max(bend, 1e-300))
+    springs = ", some of which may be due to springs" if robot.layout.motors else ""
+    text = (
+        f"{target.name} is late, by about {1e3 * delay:.2g} ms{springs}: with it {1e3 * found[k]:.3g} mm of "
+        f"{1e3 * now:.3g} mm are left between tracker and motors (rms); put {DELAY}@{target.name} into the robot file "
+        "(`jointscope add`), and the calibration finds the delay"
+    )
+    return delay, [Notice(target.name, "timing", len(stream), text)]
+
+
+def _left_at(tree: RigidTree, target: PositionTarget, motion: JointMotion, stream: Stream, delay: float) -> float:
+    """What is left between tracker and motors wherever both are, with stamps late by a delay [s], rms [m]."""
+    q, seen = seen_beside(motion, stream, delay)
+    point = body_point(tree, target.body, np.zeros(3), q)
+    return tracker_and_shift(point.value, point.R_base_body, seen, target.at, FEW_ROUNDS)[2]
+
+
 def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -> list[Notice]:
     tree, place = robot.tree, f"sensors.{target.name}"
     values = {name: parameter.value for name, parameter in robot.parameters.items()}
     at, R, origin, _ = target.seen(values)
-    expected = (body_point(tree, target.body, at, q).value - origin) @ R
+    places = body_point(tree, target.body, at, q).value
+    expected = (places - origin) @ R
     size, wanted, noise = _spread(seen), _spread(expected), NOISE * target.sigma
     if wanted > noise and not 1.0 / SAME_SIZE < size / wanted < SAME_SIZE:
         _check_unit(target, size / wanted)
     if size < noise:
         return []
     point = body_point(tree, target.body, np.zeros(3), q)
+    _check_hand(target, places, seen)
     if tracker_and_shift(point.value, point.R_base_body, seen, at)[2] > max(ODD * size, noise):
         left = fitted_tracker(tree, target.body, at, q, seen)[2]
         if left > max(ODD * size, noise):
@@ -98,7 +154,7 @@ def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -
     distance = float(np.sqrt(np.mean(np.sum((expected - seen) ** 2, axis=1))))
     if distance <= max(ELSEWHERE * size, noise):
         return []
-    T, after, _ = base_from_tracker(body_point(tree, target.body, at, q).value, seen)
+    T, after, _ = base_from_tracker(places, seen)
     if _is_expected(robot, target, T, R, origin):
         return []
     text = (
@@ -107,6 +163,27 @@ def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -
         f"instead of what {place} says, {after:.3g} m are left"
     )
     return [Notice(target.name, "unit", 0, text)]
+
+
+def _check_hand(target: PositionTarget, points: Array, seen: Array) -> None:
+    """Raises where nothing but a mirror image fits the places of the target, shape (m, 3) [m].
+
+    Motion in a plane does not tell; nor does that of a target whose place on its link is not known: it may be mirrored,
+    too.
+    """
+    _, left, _ = base_from_tracker(points, seen)
+    T, mirrored, _ = base_from_tracker(points, seen * RIGHT_FROM_LEFT)
+    if left < NOISE * target.sigma or mirrored > MIRRORED * left:
+        return
+    pose = [[round(x, 5) for x in row] for row in T.tolist()]
+    flip = "no `left_handed`" if target.source.scale else "`left_handed: true`"
+    raise RecordingError(
+        f"{target.name}: only a mirror image of its positions fits the motion of {target.body} ({mirrored:.3g} m "
+        f"instead of {left:.3g} m are left, rms): the axes of its tracker are left-handed, two of its columns are "
+        "exchanged, or a joint before it counts the other way round than the URDF. For the first, "
+        f"set {flip} of sensors.{target.name} in the robot file (x is turned over when it is read) and "
+        f"tracker_pose: {pose}, or mend the columns"
+    )
 
 
 def _is_expected(robot: Robot, target: PositionTarget, T: Array, R: Array, origin: Array) -> bool:

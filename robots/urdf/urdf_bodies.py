@@ -58,7 +58,10 @@ class UrdfBodies:
                 f"{path} is a xacro file ({text.macro}), expected a URDF without macros: xacro {path} > {expanded} "
                 "(from ROS, or pip install xacro)"
             )
+        if text.unread and not text.trouble:
+            raise RobotError(f"{path}, {text.unread}; expected a decimal number with a point, as 1.6")
         model, complaints = parse_urdf(path, text)
+        complaints += tuple(f"link {link} has an inertia but mass 0, as no body has" for link in text.weightless)
         names = set(model.names)
         followers = {name: follower for name, follower in followers_of(text, path.name).items() if name in names}
         lost = [name for name in text.mimics if name in names and name not in followers]

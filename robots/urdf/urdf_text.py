@@ -7,6 +7,7 @@ nothing declares (leftovers of xacro, sections of simulators) are no mistake her
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from xml.parsers import expat
@@ -25,6 +26,9 @@ class UrdfText:
         joints: names of all joints, fixed ones, too.
         mimics: attributes of <mimic>, by joint.
         trouble: why it is no XML; empty if it is.
+        unread: the first place where a mass or an inertia is no number; empty if all are. The parser would leave the
+            whole body out.
+        weightless: links with an inertia and a mass of zero, as no body has.
         macro: the first place where bodies or joints wait for xacro; empty if there is none.
     """
 
@@ -32,7 +36,9 @@ class UrdfText:
         self._text = urdf.read_bytes()
         self.joints: set[str] = set()
         self.mimics: dict[str, Mapping[str, str]] = {}
-        self.trouble = self.macro = ""
+        self.trouble = self.macro = self.unread = ""
+        self.weightless: list[str] = []
+        self._link, self._mass = "", math.nan
         self._open: list[str] = []
         self._joint: Mapping[str, str] = {}
         self._limited = False
@@ -60,6 +66,10 @@ class UrdfText:
         if not self.macro:
             self.macro = self._expression(tag, attributes)
         name = self._joint.get("name", "")
+        if self._open == ["robot", "link"]:
+            self._link, self._mass = attributes.get("name", ""), math.nan
+        elif self._open[:-1] == ["robot", "link", "inertial"] and tag in ("mass", "inertia"):
+            self._weigh(tag, attributes)
         if self._open == ["robot", "joint"]:
             self._joint, self._limited = attributes, False
             self.joints.add(attributes.get("name", ""))
@@ -71,6 +81,18 @@ class UrdfText:
             self._missing += [
                 (behind, b' %s="0"' % key) for key in (b"effort", b"velocity") if key.decode() not in attributes
             ]
+
+    def _weigh(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Looks at the numbers of a body: the mass, or what stands after it in the inertia."""
+        numbers = {key: _number(value) for key, value in attributes.items()}
+        odd = next((key for key, number in numbers.items() if not math.isfinite(number)), "")
+        if odd and not self.unread:
+            where = f'line {self._parser.CurrentLineNumber}: <{tag} {odd}="{attributes[odd]}"> of link {self._link}'
+            self.unread = f"{where} is no number"
+        if tag == "mass":
+            self._mass = numbers.get("value", math.nan)
+        elif self._mass == 0.0 and any(numbers.values()):
+            self.weightless.append(self._link)
 
     def _end(self, tag: str) -> None:
         whole = self._open == ["robot", "joint"] and not self._limited
@@ -86,3 +108,11 @@ class UrdfText:
             return ""
         found = next((f'{key}="{value}"' for key, value in attributes.items() if "${" in value), "")
         return found and f"line {self._parser.CurrentLineNumber}: <{tag} {found}>"
+
+
+def _number(text: str) -> float:
+    """As the parser reads it, which knows no decimal comma."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from jointscope.robots.recordings.recording import Stream
 mujoco = pytest.importorskip("mujoco", reason="arms are moved by MuJoCo, which the extra `sim` brings")
 
 STEP = 5e-4  # [s]
+Drive = Callable[[float, np.ndarray, Any, Any], np.ndarray]
 SHARP = 400.0  # [s/rad] of the simulated dry friction
 LINK = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="of_{name}"/>
  <origin xyz="0 0 {place}"/><axis xyz="{axis}"/><limit effort="900" velocity="30" lower="-6" upper="6"/></joint>
@@ -99,6 +101,7 @@ def moved(
     cable: float = 0.0,
     sharp: float = SHARP,
     most: tuple[float, ...] = (),
+    drive: Drive | None = None,
 ) -> tuple[Stream, Stream]:
     """Positions and torques of a motion around a posture, stamps with a little jitter.
 
@@ -115,6 +118,8 @@ def moved(
         stop: joint, and from where to where it can move from its middle [rad].
         cable: stiffness of a cable that pulls each joint to its zero [N m/rad].
         most: torque that each drive gives at the most, whatever is commanded [N m]; empty for all that is asked.
+        drive: what the drives make of commands, from the time [s], the commands, and the engine's model and data, which
+            it may change.
         sharp: how sharply dry friction turns over that does not truly hold a joint [s/rad].
     """
     rng, n = np.random.default_rng(seed), len(arm.axes)
@@ -147,6 +152,7 @@ def moved(
             u = data.qfrc_bias + heavy * (150.0 * (target - data.qpos) - 12.0 * data.qvel)
             commands[sent], sent = u, sent + 1
         given = np.clip(u, -np.array(most), np.array(most)) if most else u
+        given = given if drive is None else drive(k * STEP, given, model, data)
         data.qfrc_applied[:] = given - dry * np.tanh(sharp * data.qvel)
         if push is not None and push[0] <= k * STEP < push[1]:
             data.qfrc_applied[push[2]] += push[3]

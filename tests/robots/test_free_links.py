@@ -10,8 +10,9 @@ import pytest
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effect_editing import add_effect
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.motor_zero import with_motor_zero
 from jointscope.robots.recordings.recording import Recording, Stream
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 
 R1 = "value: [[-1, 0, 0], [0, 0, -1], [0, -1, 0]]"
 STIFFNESS = "joint1.stiffness: {value: 400.0, unit: N m/rad, prior_sigma: 600.0, published: 187.555}"

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import edited_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor, si_unit
@@ -111,8 +112,8 @@ def _refuse(moving: dict[str, tuple[float, str]], robot: Robot, bag: str) -> Non
     joints = ",".join([*robot.joints, *moving])
     raise RecordingError(
         f"{bag}: {said}, but the robot file has {'it' if len(moving) == 1 else 'them'} not in `joints`; expected the "
-        f"other joints to stand still: jointscope init {robot.tree.urdf} {bag} --joints {joints} -o NEW.yaml, or use a "
-        "recording in which they are held"
+        f"other joints to stand still: jointscope init {robot.tree.urdf} {bag} --joints {joints} "
+        f"-o {edited_argument(robot, 'with_them')}, or use a recording in which they are held"
     )
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.starts.command_limits import command_limits, limited
-from jointscope.graphs.starts.drive_regression import Driven
+from jointscope.graphs.starts.command_limits import limited
+from jointscope.graphs.starts.drive_regression import Driven, Links
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
+from jointscope.graphs.starts.uneven_limits import even_limits
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.joint_motion import joint_motion
 from jointscope.robots.recordings.recording import Stream
@@ -27,7 +28,7 @@ from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
-from jointscope.tools.init.estimates.soft_joints import soft_joints
+from jointscope.tools.init.estimates.soft_joints import giving_joints
 from jointscope.tools.init.estimates.wiring_by_torques import Exchange, wiring_by_torques
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
@@ -130,8 +131,8 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     noises = robot.noise(roles.motor_encoder)
     of_links = None if roles.link_encoder is None else robot.noise(roles.link_encoder)
 
-    def drives(positions: Stream, elastic: tuple[str, ...] = ()) -> Drives:
-        return _drives(robot, positions, noises, torque, elastic, typed.unit)
+    def drives(positions: Stream, elastic: tuple[str, ...] = (), links: Links | None = None) -> Drives:
+        return _drives(robot, positions, links, noises, torque, elastic, typed.unit)
 
     # the links turn the gyroscopes, and their encoders know where zero is
     encoder, seen = robot.encoder, robot.links or robot.encoder
@@ -149,14 +150,14 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
     felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
-    elastic = (*_seen(tree, gyros), *_giving(robot, turned, seen, noises, of_links)) if masses else ()
-    drive, exchanged = drives(turned, elastic), None
+    giving, behind = _giving(robot, turned, seen, noises, of_links)
+    elastic = (*_seen(tree, gyros), *giving) if masses else ()
+    drive, exchanged = drives(turned, elastic, behind), None
     if masses and not robot.gyros and robot.links is None:
         others, exchanged = _by_torques(robot, turned, drive)
         if others is not None:
             signs = others
             drive = drives(replace(encoder, values=encoder.values * np.array(signs.signs)))
-    left_out += _unused(signals, roles, masses)
     return RobotGuess(
         name=typed.name or typed.urdf.stem,
         urdf=typed.urdf,
@@ -175,7 +176,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         link_noise=of_links,
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
-        left_out=left_out,
+        left_out=left_out + _unused(signals, roles, masses),
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
         elastic=elastic,
@@ -188,6 +189,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
 def _drives(
     robot: MeasuredRobot,
     encoder: Stream,
+    links: Links | None,
     noises: Sequence[NoiseGuess],
     torque: Stream | None,
     elastic: tuple[str, ...],
@@ -202,12 +204,13 @@ def _drives(
         return replace(found, unit=(unit, TYPED)) if unit else found
     measured = roles.command.signal.topic == roles.motor_encoder.signal.topic
     # what motors report beside their positions is what they gave
-    limits = [None] * tree.n if measured else command_limits(tree, [Driven(encoder, command)], sigmas)
-    limits = [None if joint in elastic else limit for joint, limit in zip(tree.joints, limits, strict=True)]
+    limits = [None] * tree.n if measured else even_limits(tree, [Driven(encoder, command, links=links)], sigmas)
+    hidden = elastic if links is None else ()  # of these the motion of the motors does not tell the load
+    limits = [None if joint in hidden else limit for joint, limit in zip(tree.joints, limits, strict=True)]
     command = limited(command, limits)
-    told = None if elastic else acts_until_the_next(tree, [Driven(encoder, command)], sigmas)
+    told = None if hidden else acts_until_the_next(tree, [Driven(encoder, command, links=links)], sigmas)
     held = not measured if told is None else told
-    found = find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit)
+    found = find_drives(tree, encoder, command, sigmas, held=held, elastic=elastic, unit=unit, links=links)
     joints = [replace(drive, limit=limit) for drive, limit in zip(found.joints, limits, strict=True)]
     return replace(found, joints=joints)
 
@@ -249,14 +252,13 @@ def _giving(
     links: Stream,
     of_motors: Sequence[NoiseGuess],
     of_links: Sequence[NoiseGuess] | None,
-) -> tuple[str, ...]:
-    """Joints whose two encoders tell that they give way."""
-    if of_links is None:
-        return ()
-    tree = robot.tree
-    soft = soft_joints(motor, links, np.hypot(_in_si(robot, of_motors), _in_si(robot, of_links)))
-    no_spring = {*tree.slides, *tree.massless}
-    return tuple(name for name, gives in zip(tree.joints, soft, strict=True) if gives and name not in no_spring)
+) -> tuple[tuple[str, ...], Links | None]:
+    """Joints whose two encoders tell that they give way, and what the links do; nothing and None where all is rigid."""
+    if of_links is None or not robot.masses:
+        return (), None
+    behind = Links(links, _in_si(robot, of_links))
+    giving = giving_joints(robot.tree, motor, behind, _in_si(robot, of_motors))
+    return giving, behind if giving else None
 
 
 def _gyros(

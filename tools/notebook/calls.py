@@ -137,6 +137,7 @@ def diagnose(
     holdout: AnyRecording | None = None,
     *,
     missing_torque: bool = True,
+    accept: AnyLimits = (),
     side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
 ) -> Diagnosed:
@@ -147,6 +148,7 @@ def diagnose(
         recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
         holdout: is scored and reported, and never chooses.
         missing_torque: estimate the torque that the model lacks, for the pictures.
+        accept: limits that the model must keep (docs/accept.md); `result.accepted` says whether it does.
         side_by_side: processes that fit the candidates; this one alone if not given.
         progress: called with a text and the share done, from 0 to 1.
 
@@ -154,12 +156,16 @@ def diagnose(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
+    limits = limits_of(accept)
     model, learnt, held = to_learn_from(robot, recordings, holdout)
     if model.free_links:
-        return Diagnosed.of(diagnosis_of(diagnose_links(model, learnt, held, progress=progress), learnt, held))
-    options: dict[str, Any] = {"missing_torque": missing_torque, "side_by_side": side_by_side, "progress": progress}
-    found = diagnose_motion(model, learnt, held, **options)
-    return Diagnosed.of(diagnosis_of(found, learnt, held))
+        found = diagnose_links(model, learnt, held, progress=progress)
+    else:
+        options: dict[str, Any] = {"missing_torque": missing_torque, "side_by_side": side_by_side, "progress": progress}
+        found = diagnose_motion(model, learnt, held, **options)
+    predicted = found.comparison.to_json() if found.comparison is not None else {}
+    content = {model.name: predicted | found.to_json()} if limits else {}
+    return Diagnosed.of(diagnosis_of(found, learnt, held), acceptance=check_models(limits, content))
 
 
 def discover(

@@ -152,7 +152,7 @@ class Compared(_Limited, ComparisonResult):
 
 
 @dataclass(frozen=True)
-class Diagnosed(_Found, Diagnosis):
+class Diagnosed(_Limited, Diagnosis):
     """Effects that a model may lack."""
 
     def answer(self) -> str:
@@ -182,7 +182,7 @@ class Diagnosed(_Found, Diagnosis):
 
     def write(self, files: ResultFiles) -> None:
         """Report, viewer recording, JSON."""
-        result_files.write_diagnosis(self, files)
+        result_files.write_diagnosis(self, files, self.acceptance)
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMIT
         *acceptance(checked),
         parameters(result),
         *rest_pictures(*rests_of(result)),
-        mounting(result),
+        *([mounting(result)] if result.robot.gyros else []),
         *([fits(result), commands(result)] if motion else []),
         residuals(result),
         weak_directions(result),

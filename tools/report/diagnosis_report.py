@@ -6,7 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.compared_models import of_diagnosis
+from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.notices import notices
 from jointscope.tools.report.page.page import Section, page
 from jointscope.tools.report.page.provenance import provenance
@@ -24,11 +26,12 @@ from jointscope.tools.report.sections.diagnosis.torque_over_time import torque_o
 from jointscope.tools.report.sections.diagnosis.untestable import untestable
 
 
-def diagnosis_report(result: Diagnosis) -> str:
+def diagnosis_report(result: Diagnosis, checked: AcceptedBy = NO_LIMITS) -> str:
     """The whole page as text.
 
     Args:
         result: what the diagnosis found.
+        checked: limits that the user has declared, as they came out.
 
     Returns:
         HTML without references to anything outside of itself.
@@ -37,6 +40,7 @@ def diagnosis_report(result: Diagnosis) -> str:
     seconds = sum(result.wall_seconds.values()) if result.wall_seconds else None
     sections = [
         diagnosis_verdict(result),
+        *acceptance(checked),
         ranking(result),
         channel_failures(result.failure),
         regimes(result.failure),

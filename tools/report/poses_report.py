@@ -19,7 +19,7 @@ from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
-from jointscope.tools.terminal.arm_discovery_text import step_table
+from jointscope.tools.terminal.searches.arm_discovery_text import step_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 Array = NDArray[np.float64]

@@ -23,10 +23,16 @@ def rests_report(result: RestCalibration, checked: AcceptedBy = NO_LIMITS, more:
         checked: limits that the user has declared, as they came out.
         more: sections at the end.
     """
+    paths = ", ".join(problem.rests.path for problem in result.problems)
+    first, *others = rest_sections(result)
+    sections = [first, *acceptance(checked), *others, *more]
+    return page(f"{result.robot.name}: springs, friction and weight from rests", paths, sections)
+
+
+def rest_sections(result: RestCalibration) -> list[Section]:
+    """Verdict, pictures and values."""
     problems = [problem.of_robot(result.robot) for problem in result.problems]
-    paths = ", ".join(problem.rests.path for problem in problems)
-    sections = [_verdict(result), *acceptance(checked), *rest_pictures(problems, result.covariance), _values(result)]
-    return page(f"{result.robot.name}: springs, friction and weight from rests", paths, [*sections, *more])
+    return [_verdict(result), *rest_pictures(problems, result.covariance), _values(result)]
 
 
 def _verdict(result: RestCalibration) -> Section:

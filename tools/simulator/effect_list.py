@@ -19,6 +19,7 @@ EXAMPLES = {
     "last joint": "the last joint",
     "imu": "imu1",
     "robot": "robot",
+    "target": "target",
     "upright robot": "robot (upright)",
     "weighed elastic joint": "joint1 (elastic, under gravity)",
 }

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.candidate_numbers import origin_text, p_text, parameter_texts, share_text
 from jointscope.tools.presentation.model_answer import diagnosis_answer, missing_numerics, of_verdict
 from jointscope.tools.presentation.numbers import percent, significant

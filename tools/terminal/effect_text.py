@@ -13,17 +13,21 @@ from jointscope.tools.terminal.text_table import text_table
 
 WIDTH = 100
 LABEL = 14
+OWNERS = 27  # columns of the list
 SIGNS = {"+": "never negative", "+-": "either sign"}
 
 
 def list_text(effects: Iterable[Effect]) -> str:
     """One line per effect, under the part of the robot where it sits."""
-    rows = [[e.id, ", ".join(e.owners), e.card.title, _nulls(e)] for e in effects]
-    groups = {e.id: group_of(e) for e in effects}
+    rows, groups = [], []
+    for effect in effects:
+        first, *more = textwrap.wrap(", ".join(effect.owners), OWNERS)
+        rows += [[effect.id, first, effect.card.title, _nulls(effect)], *(["", owners, "", ""] for owners in more)]
+        groups += [group_of(effect)] * (1 + len(more))
     head, *lines = text_table(["effect", "owner", "what it is", "absent at"], rows, "<<<<").splitlines()
     text = [head]
     for group in GROUPS:
-        own = [line for line, row in zip(lines, rows, strict=True) if groups[row[0]] == group]
+        own = [line.rstrip() for line, its in zip(lines, groups, strict=True) if its == group]
         if own:
             text += ["", group, *own]
     return "\n".join([*text, "", "`jointscope effects ID` prints the card of one."])

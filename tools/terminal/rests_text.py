@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import Counter
 from collections.abc import Mapping
 
@@ -10,6 +11,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult, 
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
@@ -17,6 +19,8 @@ from jointscope.tools.terminal.text_table import text_table
 
 LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
+WIDENED, FAR = 1.5, 3.0  # times that sigmas of link encoders were widened: more than they may repeat, and no noise
+BEYOND = 0.1  # of its band, that friction may have to hold beyond it
 
 
 def rest_calibration_text(result: RestCalibration) -> str:
@@ -63,6 +67,8 @@ def verdict(result: RestCalibration) -> str:
     error = result.errors.error
     if error > DOUBTFUL:
         return "No, do not rely on this yet: links do not rest where the model says."
+    if doubt := _misfit(result):
+        return f"No, do not rely on this yet: {doubt}; something is missing: {_diagnosis(result)}"
     for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
@@ -74,9 +80,41 @@ def verdict(result: RestCalibration) -> str:
         names = ", ".join(f"{p.name} (+-{significant(100 * p.sigma / p.value, 2)} %)" for p in loose)
         so = "No, do not rely on this yet" if len(loose) == len(told) else "Usable, with reservations"
         return f"{so}: these rests hardly tell {names}; let it rest in more postures, or with other weights."
-    if error > AS_EXPECTED:
+    if error > AS_EXPECTED or _widened(result)[1] > WIDENED:
         return "Usable, with reservations: links rest further from where the model says than their encoders explain."
     return "Yes, the model holds at these rests."
+
+
+def _widened(result: RestCalibration) -> tuple[str, float]:
+    """The joint whose link encoder repeats worst, and its sigma over the stated one."""
+    scale = result.problems[0].repeatability
+    j = int(scale.argmax())
+    return result.robot.joints[j], float(scale[j])
+
+
+def _misfit(result: RestCalibration) -> str:
+    """Links far from where the model has them, friction far beyond its band; empty where noise explains all."""
+    joint, widened = _widened(result)
+    if widened > FAR:
+        return (
+            f"{joint} rests {significant(widened, 2)} sigmas of its encoder away, and its sigma was widened by as much "
+            "to go on"
+        )
+    bands = result.errors.bands
+    for j, joint in enumerate(result.robot.joints):
+        beyond = float(result.errors.certain[:, j].max(initial=0.0))
+        if beyond > BEYOND * bands[j]:
+            return (
+                f"friction of {joint} would have to hold {significant(1e3 * beyond, 2)} mN m beyond a band of "
+                f"{significant(1e3 * bands[j], 2)} mN m"
+            )
+    return ""
+
+
+def _diagnosis(result: RestCalibration) -> str:
+    """The command that looks for it."""
+    bags = " ".join(shlex.quote(problem.rests.path) for problem in result.problems)
+    return f"`jointscope diagnose {robot_argument(result.start)} --rests {bags}`"
 
 
 def _errors(by_label: Mapping[str, RestErrors], robot: Robot) -> str:

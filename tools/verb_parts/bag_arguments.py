@@ -15,6 +15,7 @@ from jointscope.tools.terminal.progress import Progress, reading
 from jointscope.tools.verb_parts.first_look import first_look
 from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, add_holdout_frequency_option
 from jointscope.tools.verb_parts.pose_runs import add_holdout_poses_option, add_poses_option, check_one_kind
+from jointscope.tools.verb_parts.rest_runs import add_holdout_rests_option, add_rests_option, check_rests_alone
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 
@@ -36,6 +37,8 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     add_holdout_poses_option(parser)
     add_frequency_option(parser)
     add_holdout_frequency_option(parser)
+    add_rests_option(parser)
+    add_holdout_rests_option(parser)
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -44,6 +47,7 @@ def input_files(args: argparse.Namespace) -> list[Path]:
     """Everything that must not be overwritten."""
     robot = [Path(args.robot)] if Path(args.robot).is_file() else []
     still = [*args.poses, *args.holdout_poses, *args.frequency, *args.holdout_frequency]
+    still += [*args.rests, *args.holdout_rests]
     return [*robot, *args.bags, *([args.holdout] if args.holdout else []), *still, *args.effects]
 
 
@@ -58,7 +62,8 @@ def check_kind(args: argparse.Namespace) -> None:
         "--holdout-share": args.holdout_share is not None,
         "--leave-out": bool(args.leave_out),
     }
-    check_one_kind(args.bags, args.poses, None, of_motion, args.frequency)
+    check_rests_alone(args)
+    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
     if args.holdout_poses and not args.poses:
         raise RecordingError("--holdout-poses goes with --poses")
     if args.holdout_frequency and not args.frequency:

@@ -13,7 +13,15 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.tools.terminal.progress import ERASE_LINE
 
-PLAIN_MISTAKES = ("unit", "axes", SATURATION)  # kinds of notices
+LIMIT = "limit"
+PLAIN_MISTAKES = ("unit", "axes", LIMIT, SATURATION)  # kinds of notices
+CONTRADICTED = (
+    "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording takes "
+    "long to calibrate (Ctrl-C ends it).\n"
+)
+BEYOND_LIMITS = (
+    "Look at this first: a limit of the URDF may be wrong, or a unit; the calibration goes on without limits.\n"
+)
 
 
 def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | None = None) -> None:
@@ -29,19 +37,18 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     """
     stream = stream or sys.stderr
     seen: dict[str, str] = {}
+    kinds = set()
     for recording in recordings:
         for notice in _screened(recording, robot):
             if notice.kind in PLAIN_MISTAKES:
                 seen.setdefault(notice.text, recording.path)
+                kinds.add(notice.kind)
     if not seen:
         return
     lead = ERASE_LINE if stream.isatty() else ""
     for text, path in seen.items():
         stream.write(f"{lead}{path}: {text}\n")
-    stream.write(
-        "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording "
-        "takes long to calibrate (Ctrl-C ends it).\n"
-    )
+    stream.write(BEYOND_LIMITS if kinds == {LIMIT} else CONTRADICTED)
     stream.flush()
 
 

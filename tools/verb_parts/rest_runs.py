@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RobotError
+from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
@@ -29,6 +29,37 @@ def add_rests_option(parser: argparse.ArgumentParser) -> None:
         metavar="BAG",
         help="recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
     )
+
+
+def add_holdout_rests_option(parser: argparse.ArgumentParser) -> None:
+    """Adds --holdout-rests."""
+    parser.add_argument(
+        "--holdout-rests",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="BAG",
+        help="recordings of rests that are scored once per step, but never influence the choice",
+    )
+
+
+def check_rests_alone(args: argparse.Namespace) -> None:
+    """Rests are searched alone.
+
+    Raises:
+        RecordingError: another kind beside them, a recording twice, or none that the held-out ones go with.
+    """
+    if args.holdout_rests and not args.rests:
+        raise RecordingError("--holdout-rests goes with --rests")
+    if args.rests and (args.bags or args.poses or args.frequency):
+        other = "recordings of motion" if args.bags else "--poses" if args.poses else "--frequency"
+        raise RecordingError(
+            f"a search takes --rests alone, not yet with {other}; search with --rests, and give the robot file that "
+            "`discover` writes as ROBOT with the others (`jointscope calibrate` takes motion and --rests together)"
+        )
+    twice = next((path for path in args.holdout_rests if path in args.rests), None)
+    if twice is not None:
+        raise RecordingError(f"{twice} is given with --rests and held out; leave it out once")
 
 
 def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> list[Rests]:

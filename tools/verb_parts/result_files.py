@@ -129,8 +129,8 @@ def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_L
         _write_views(stack, result, files, report, log_comparison, lambda: said)
 
 
-def write_diagnosis(result: Any, files: ResultFiles) -> None:
-    """Writes a Diagnosis.
+def write_diagnosis(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
+    """Writes a Diagnosis, and which limits its model keeps.
 
     Raises:
         JointscopeError: a file cannot be written; then none is.
@@ -139,7 +139,8 @@ def write_diagnosis(result: Any, files: ResultFiles) -> None:
         from jointscope.tools.report import diagnosis_report
         from jointscope.tools.rerun_log import log_diagnosis
 
-        _write_views(stack, result, files, diagnosis_report, log_diagnosis)
+        report, said = partial(diagnosis_report, checked=checked), acceptance_json(checked)
+        _write_views(stack, result, files, report, log_diagnosis, lambda: said)
 
 
 def write_discovery(result: Any, files: ResultFiles, start: str) -> None:

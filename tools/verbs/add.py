@@ -12,7 +12,7 @@ from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_ro
 EXAMPLE = """example:
   jointscope add doggy bearing_flexibility@joint1 -o doggy_bearing.yaml
   jointscope calibrate doggy_bearing.yaml train.mcap -o doggy_calibrated.yaml
-  jointscope add arm.yaml 'motor_viscous@*' cogging@elbow -o arm.yaml
+  jointscope add arm.yaml 'motor_viscous@*' cogging@elbow -o arm_friction.yaml
 
 ID@* means everything that the effect can act on. A joint declared rigid gets the spring that an effect needs.
 `jointscope effects` lists the effects, `jointscope diagnose` tells which one is missing."""
@@ -34,6 +34,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Adds, writes, and says what a calibration will find."""
     from jointscope.robots.files.effects_at_once import add_effects
+    from jointscope.robots.model.command_words import edited_path
     from jointscope.tools.presentation.numbers import significant
 
     before, edited = edit_robot(args, add_effects)
@@ -44,5 +45,6 @@ def run(args: argparse.Namespace) -> int:
     print(f"{', '.join(edited.labels)} added to {before.name}{notes(edited)}")
     if rows:
         print(text_table(["parameter", "start", "unit", "prior"], rows, "<><<"))
-    print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o CALIBRATED.yaml finds the values")
+    calibrated = edited_path(args.output, "calibrated")
+    print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o {calibrated} finds the values")
     return 0

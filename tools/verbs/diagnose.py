@@ -6,20 +6,33 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from jointscope.robots.errors import RobotError
 from jointscope.tools.terminal.progress import progress_bar
+from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
+from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
+  jointscope diagnose biorob --rests spring1 spring2 gravity --report diagnosis.html
   jointscope diagnose tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv
 
 The robot is calibrated first. Effects are chosen by blocks of the training recordings that were left out; the held-out
 recording only reports. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
+ARM_LIMITS = (
+    "--accept: a diagnosis of poses or frequency responses has nothing that limits are of; `jointscope calibrate` and "
+    "`jointscope compare` take them with --poses and --frequency"
+)
+
+REST_LIMITS = (
+    "--accept: a diagnosis of rests has nothing that limits are of; `jointscope calibrate` and `jointscope compare` "
+    "take them with --rests"
+)
 
 
 def add_parser(subparsers: Any) -> None:
@@ -33,6 +46,7 @@ def add_parser(subparsers: Any) -> None:
     )
     add_bag_arguments(parser)
     add_workers_option(parser)
+    add_accept_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)
 
@@ -43,25 +57,41 @@ def run(args: argparse.Namespace) -> int:
     check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
+    limits = limits_of(args)
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.notebook.calls import diagnose
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
     if args.poses or args.frequency:
+        if limits:
+            raise RobotError(ARM_LIMITS)
         given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:
             print(run_arm_search(robot, given, held, files, False, progress))
+        return 0
+    if args.rests:
+        if limits:
+            raise RobotError(REST_LIMITS)
+        with progress_bar() as progress:
+            print(run_rest_search(robot, args.rests, args.holdout_rests, files, False, progress))
+        files.tell()
         return 0
     check_viewer(robot, files)
     with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
         result = diagnose(
-            robot, recordings, holdout, missing_torque=files.pictures, side_by_side=workers, progress=progress
+            robot,
+            recordings,
+            holdout,
+            missing_torque=files.pictures,
+            accept=limits,
+            side_by_side=workers,
+            progress=progress,
         )
         if files.pictures:
             progress("writing", 1.0)
         result.write(files)
     print(diagnosis_text(result))
     files.tell()
-    return 0
+    return print_acceptance(result.acceptance)

@@ -15,12 +15,14 @@ from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
+from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
+  jointscope discover biorob --rests spring1 spring2 gravity --holdout-rests spring3 -o found.yaml
   jointscope discover tx90l --poses poses.csv --holdout-poses others.csv -o found.yaml
   jointscope discover tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv -o found.yaml
 
@@ -66,6 +68,11 @@ def run(args: argparse.Namespace) -> int:
         given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:
             print(run_arm_search(robot, given, held, files, True, progress))
+        files.tell()
+        return 0
+    if args.rests:
+        with progress_bar() as progress:
+            print(run_rest_search(robot, args.rests, args.holdout_rests, files, True, progress))
         files.tell()
         return 0
     check_viewer(robot, files)

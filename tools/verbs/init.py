@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.init.text.held_text import locked_line
     from jointscope.tools.init.text.robot_text import robot_text
 
-    _check_order(args.urdf, args.bag)
+    _check_order(args.urdf, args.bag, args.output)
     unit, targets = args.unit.replace("Nm", "N m"), tuple(args.target)
     typed = Typed(args.urdf, args.bag, args.output, _wish(args.joints, args.lock), args.name, unit, targets)
     with progress_bar() as progress:
@@ -139,6 +139,7 @@ def _with_position_hints(guess: RobotGuess, robot: Robot, bag: Path, targets: Se
 
 def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:
     """Whether the regression explains the recording; what to look at where it does not."""
+    from jointscope.robots.model.command_words import edited_path
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
 
     poor = [
@@ -151,22 +152,27 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
             f"{', '.join(poor)} (table above): names, units, signs, gravity or masses are wrong there, or a spring is "
             "missing; look at it first (a base that is not level: jointscope add "
-            f"{args.output} gravity_direction@robot -o {args.output})"
+            f"{args.output} gravity_direction@robot "
+            f"-o {edited_path(args.output, 'gravity_direction')})"
         )
         if guess.exchanged is not None:
-            print(guess.exchanged.sentence(str(args.urdf), str(args.bag), str(args.output), guess.roles.joints))
+            print(
+                guess.exchanged.sentence(
+                    str(args.urdf), str(args.bag), edited_path(args.output, "exchanged"), guess.roles.joints
+                )
+            )
     else:
         print(f"\nWrote {args.output}; the recording can be used with it")
 
 
-def _check_order(urdf: Path, bag: Path) -> None:
+def _check_order(urdf: Path, bag: Path, output: Path) -> None:
     """Says at once that a URDF is missing, or that bag and URDF have changed places."""
     from jointscope.robots.errors import RobotError
     from jointscope.robots.yaml_section import did_you_mean
     from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
     if bag.suffix == ".urdf" and (urdf.is_dir() or urdf.suffix in BAG_SUFFIXES):
-        raise RobotError(f"{urdf} is no URDF; the URDF comes first: jointscope init {bag} {urdf} -o ROBOT.yaml")
+        raise RobotError(f"{urdf} is no URDF; the URDF comes first: jointscope init {bag} {urdf} -o {output}")
     if not urdf.is_file():
         others = sorted(path.name for path in urdf.parent.glob("*.urdf")) if urdf.parent.is_dir() else []
         raise RobotError(f"there is no URDF {urdf}{did_you_mean(urdf.name, others) if others else ''}")

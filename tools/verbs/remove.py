@@ -10,7 +10,7 @@ from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_ro
 
 EXAMPLE = """example:
   jointscope remove doggy_bearing.yaml bearing_flexibility@joint1 -o doggy_rigid.yaml
-  jointscope remove arm.yaml 'motor_viscous@*' cogging@elbow -o arm.yaml
+  jointscope remove arm.yaml 'motor_viscous@*' cogging@elbow -o arm_plain.yaml
 
 ID@* means that effect wherever the robot has it. The other parameters keep their values; calibrate again, because they
 were found beside the effect."""
@@ -32,9 +32,11 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Removes, writes, and says what is gone."""
     from jointscope.robots.files.effects_at_once import remove_effects
+    from jointscope.robots.model.command_words import edited_path
 
     before, edited = edit_robot(args, remove_effects)
     gone = ", ".join(p.name for p in only_in(before, edited.robot))
     print(f"{', '.join(edited.labels)} removed from {before.name}{f': {gone}' if gone else ''}{notes(edited)}")
-    print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o CALIBRATED.yaml finds the values again")
+    calibrated = edited_path(args.output, "calibrated")
+    print(f"\nWrote {args.output}; jointscope calibrate {args.output} BAG -o {calibrated} finds the values again")
     return 0

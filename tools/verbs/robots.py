@@ -33,7 +33,8 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Lists, or prints one."""
     check_outputs([args.json])
-    from jointscope.robots.files.robot_file import READY_PREFIX, READY_ROOT, ready_robots
+    from jointscope.robots.files.robot_file import READY_PREFIX
+    from jointscope.robots.model.command_words import READY_ROOT, ready_robots
     from jointscope.robots.yaml_document import read_document
     from jointscope.robots.yaml_section import did_you_mean
 

@@ -12,6 +12,7 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
@@ -85,7 +86,7 @@ def judge(result: CalibrationResult) -> Judgement:
     held, steps = values_from_data(result), short_steps(result)
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
-        *_given(result),
+        *(Check("bad", name, text) for name, text in given(result)),
         *signs,
         *_agreeing(signs),
         Check(steps[0], "Steps short enough", steps[1]),
@@ -115,11 +116,6 @@ def _agreeing(signs: Sequence[Check]) -> list[Check]:
         "the sigmas do not include it. `jointscope diagnose` says what it may be."
     )
     return [Check("bad", "No two signs that something is missing", text)]
-
-
-def _given(result: CalibrationResult) -> list[Check]:
-    """A check that fails where drives saturate, which the model does not know."""
-    return [Check("bad", "Drives that give what is commanded", result.saturated)] if result.saturated else []
 
 
 def _noise_as_stated(result: CalibrationResult) -> Check:

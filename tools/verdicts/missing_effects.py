@@ -4,20 +4,32 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
+from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.one_step import would_be
 
 MOST_ALIKE = 2
+MOST_CHANGES = 3
+MATTERS = 0.01  # of the rms torque of a drive that an effect explains, from which values cannot be relied on
 
 
 def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     """A level of `judgement.LEVELS` and a sentence."""
     if result.robot.free_links:
         return "info", "Without masses this cannot be checked."
+    if given(result):
+        return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
+    if result.causes:
+        return _named(result)
+    if result.load_frictions:
+        return "bad", _growing_friction(result)
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
     within = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found, sigmas=0.0))]
@@ -32,6 +44,57 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
         f"{_change(result, first, worst)}{covered}. {_next(result, first)}."
     )
+
+
+def _named(result: CalibrationResult) -> tuple[str, str]:
+    """Effects that regression names and the calibration asks for: they are what is missing, or look like it."""
+    causes, catalogued = result.causes, catalogue()
+    by_effect: dict[str, list[RegressedCause]] = {}
+    for cause in causes:
+        by_effect.setdefault(cause.effect, []).append(cause)
+    listed = " and ".join(
+        f"{', '.join(c.label for c in some)}, {catalogued[effect].card.title}{_alike(some)}"
+        for effect, some in by_effect.items()
+    )
+    worst = max(causes, key=lambda cause: cause.size)
+    labels, output = " ".join(c.label for c in causes), edited_argument(result.start, next(iter(by_effect)))
+    return "bad" if worst.size > MATTERS else "warn", (
+        f"The recording asks for {listed}: at {worst.joint} {100.0 * worst.explained:.0f} % of what regression leaves "
+        f"open is of its shape, {significant(100.0 * worst.size, 2)} % of the drive's torque{_moved(causes)}. Add it: "
+        f"`jointscope add {robot_argument(result.start)} {labels} -o {output}`, then calibrate again."
+    )
+
+
+def _growing_friction(result: CalibrationResult) -> str:
+    """Friction that no effect of rigid joints knows: what it does to the values, and what is left to do."""
+    told = result.load_frictions
+    shares = [(one.joint, significant(100.0 * one.share, 2), significant(100.0 * one.sigma, 1)) for one in told]
+    listed = ", ".join(f"{joint} ({share} ± {sigma} % of it)" for joint, share, sigma in shares)
+    found = result.found
+    factors = {n: f for one in told for n, f in one.with_it.items() if n in found}
+    changed = "; ".join(
+        f"{name} {significant(factor * found[name].value)} instead of {significant(found[name].value)}"
+        for name, factor in sorted(factors.items(), key=lambda item: -abs(item[1] - 1.0))[:MOST_CHANGES]
+    )
+    return (
+        f"By regression the dry friction of {listed} grows with the torque that the drive passes on, as that of gears "
+        f"does; with it {changed}. Effects of rigid joints know friction that grows with the weight alone. Which "
+        f"comes nearest: `{_discover(result)}`."
+    )
+
+
+def _alike(causes: Sequence[RegressedCause]) -> str:
+    others = list(dict.fromkeys(effect for cause in causes for effect in cause.alike))
+    return f" (or {' or '.join(others[:MOST_ALIKE])}, which looks alike here)" if others else ""
+
+
+def _moved(causes: Sequence[RegressedCause]) -> str:
+    """The value that changes most, in words; nothing where none changes by much."""
+    factors = {name: factor for cause in causes for name, factor in cause.with_it.items()}
+    if not factors:
+        return ""
+    name = max(factors, key=lambda n: abs(factors[n] - 1.0))
+    return f", and with it {name} would be {100.0 * (factors[name] - 1.0):+.0f} %"
 
 
 def _next(result: CalibrationResult, effect: LackingEffect) -> str:

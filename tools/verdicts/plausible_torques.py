@@ -16,8 +16,9 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
-from jointscope.robots.files.robot_file import robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.given_recordings import given
 
 CONSTANT = "torque_constant"
 MASSES = (0.05, 0.25)  # share by which one N m of the command may be off: fine up to the first, bad beyond the second
@@ -69,7 +70,8 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    for mass in result.masses:
+    named = result.causes or given(result)  # to one linear step these look like masses
+    for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:
             continue
@@ -90,11 +92,11 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
 
 def _another_place(result: CalibrationResult, joint: str) -> str:
     """First moments that are wrong where the mass may be right: weight in another direction does the same."""
-    file = robot_argument(result.start)
+    file, output = robot_argument(result.start), edited_argument(result.start, "gravity_direction")
     return (
         f"The recording asks for weight at another place behind {joint}, as a load would that "
         f"{result.robot.tree.urdf.name} lacks, or a base that is not level. If that may be: `jointscope add {file} "
-        f"gravity_direction@robot -o {file}`, then calibrate again; otherwise correct the "
+        f"gravity_direction@robot -o {output}`, then calibrate again; otherwise correct the "
         "masses and their places in the URDF."
     )
 
@@ -143,5 +145,5 @@ def _one_factor(values: list[float]) -> str:
 def _again(result: CalibrationResult, option: str = "") -> str:
     """The command that begins anew."""
     bag = shlex.quote(result.bags[0].recording.path) if result.bags else "BAG"
-    urdf, robot = shlex.quote(str(result.robot.tree.urdf)), robot_argument(result.start)
-    return f"`jointscope init {urdf} {bag} -o {robot}{option}`"
+    urdf, output = shlex.quote(str(result.robot.tree.urdf)), edited_argument(result.start, "anew")
+    return f"`jointscope init {urdf} {bag} -o {output}{option}`"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.robot_file import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 VANISHED = 0.1  # of its prior, a size that may be on its way to nothing

@@ -73,6 +73,11 @@ class TickEngine:
         return self._process.torque_gain
 
     @property
+    def ran_away(self) -> bool:
+        """Whether the newest step led farther than any robot moves."""
+        return bool(np.isnan(self.newest.mean).any())
+
+    @property
     def kept(self) -> NewestState | None:
         """The newest state if its biases are worth keeping: possible, and near what was known of them before."""
         found = getattr(self, "newest", None)

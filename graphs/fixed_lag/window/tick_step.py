@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 ITERATIONS = 4
 SAME_FRICTION = 1e-3  # share of the Coulomb torque that a straight line may miss before rates are evaluated anew
 SAME_DERIVATIVE = 0.01  # largest change of h df/dx over a step whose middle is not evaluated
+FARTHEST = 1e5  # [rad, rad/s, m, m/s] by which no robot changes within a step; torques that do are no torques
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
 
 
@@ -137,10 +138,13 @@ def undivided_step(
     start = RatesAt.of(model, x0, torque) if before is None else before.near(model, x0, torque)
     eye, columns = _eye(len(x0)), model.friction_columns
     if rule == "euler":
-        return TickStep(x0 + h * start.f, -eye - h * start.A, eye, eye, h * start.C, None)
+        x1 = x0 + h * start.f
+        return TickStep(x1, -eye - h * start.A, eye, eye, h * start.C, None) if _near(x0, x1) else _lost(x0, start.C)
     defect = _simpson if rule == "simpson" else _midpoint
     x1 = x0 + lapack.dgesv(eye - 0.5 * h * start.A, h * start.f)[2]
     for _ in range(ITERATIONS):
+        if not _near(x0, x1):
+            return _lost(x0, start.C)
         r, R0, R1, end = defect(model, start, x1, h)
         inverse = lapack.dgesv(R1, eye)[2]
         change = inverse @ r
@@ -179,6 +183,16 @@ def _midpoint(model: StateRates, start: RatesAt, x1: Array, h: float) -> tuple[A
     f_mid, A_mid, _ = model.with_jacobian(0.5 * (start.x + x1), start.torque)
     eye, half = _eye(len(x1)), 0.5 * h * A_mid
     return x1 - start.x - h * f_mid, -eye - half, eye - half, None
+
+
+def _near(x0: Array, x1: Array) -> bool:
+    return bool(np.abs(x1 - x0).max() < FARTHEST)
+
+
+def _lost(x0: Array, by_torque: Array) -> TickStep:
+    """A step that leads nowhere: what comes of it is no number, quietly, and never an overflow further on."""
+    nowhere = np.full((len(x0), len(x0)), np.nan)
+    return TickStep(nowhere[0], nowhere, nowhere, nowhere, np.full_like(by_torque, np.nan), None)
 
 
 @cache

@@ -10,8 +10,10 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
 from jointscope.graphs.fixed_lag.replay.replay import replay
 from jointscope.robots.errors import RecordingError, RobotError
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.screening import screen
 
 TRUE = {"marker3.tracker_x": 0.03, "marker3.tracker_turn_z": 0.08, "marker3.offset_x": 0.006}
@@ -100,6 +102,42 @@ def test_springs_are_known_much_better_with_it(result, robot, made):
     shares = {name: result.robot.parameters[name].sigma / p.sigma for name, p in alone.items() if not p.fixed}
     assert all(share < 1.001 for share in shares.values()), shares
     assert all(shares[f"joint{k}.stiffness"] < 0.7 for k in (1, 2, 3)), shares  # 0.62, 0.56, 0.43
+
+
+def test_the_delay_of_a_camera_is_told_and_found(robot, made):
+    stream = made.recording.streams["marker3"]
+    late = replace(stream, times=stream.times + 0.04, received=None)
+    recording = replace(made.recording, streams={**made.recording.streams, "marker3": late})
+    (told,) = (n.text for n in screen(recording, robot) if n.kind == "timing")
+    about = float(told.split("marker3 is late, by about ")[1].split(" ms, some of which may be due to springs")[0])
+    assert about == pytest.approx(40.0, abs=25.0)
+    assert "encoder_delay@marker3" in told and not [n for n in screen(made.recording, robot) if n.kind == "timing"]
+    knowing = add_effect(robot, "encoder_delay@marker3")
+    assert not [n for n in screen(recording, knowing) if n.kind == "timing"]
+    found = calibrate(knowing, [recording]).robot.parameters
+    delay = found["marker3.encoder_delay.delay"]
+    assert abs(delay.value - 0.04) < 4.0 * delay.sigma < 4e-4
+    assert found["joint2.stiffness"].value == pytest.approx(made.truth["parameters"]["joint2.stiffness"], rel=5e-3)
+
+
+def test_a_left_handed_tracker_is_told_and_read(robot, made, tmp_path):
+    stream = made.recording.streams["marker3"]
+    mirrored = replace(stream, values=stream.values * (1.0, -1.0, 1.0))
+    alone = robot.without([target for target in robot.targets if target.name == "marker2"])
+    with pytest.raises(RecordingError, match="only a mirror image of its positions fits the motion of link3") as err:
+        screen(_with_marker(made.recording, mirrored), alone)
+    assert "set `left_handed: true` of sensors.marker3" in str(err.value)
+    pose = str(err.value).split("tracker_pose: ")[1].split(", or mend")[0]
+    before = "[[0, -1, 0, 2.0], [0, 0, -1, 0.5], [1, 0, 0, 1.0], [0, 0, 0, 1]]"
+    known = written(tmp_path, before, f"{pose}\n    left_handed: true")
+    scale = known.sensors["marker3"].source.scale
+    assert scale == (-1.0, 1.0, 1.0)
+    read = _with_marker(made.recording, replace(mirrored, values=mirrored.values * scale))
+    assert not [n for n in screen(read, known.without(known.targets[1:])) if "marker3" in n.text]
+
+
+def _with_marker(recording, stream):
+    return replace(recording, streams={**recording.streams, "marker3": stream})
 
 
 def test_what_was_found_stands_in_the_robot_file(result, tmp_path):

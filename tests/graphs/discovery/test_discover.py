@@ -11,6 +11,7 @@ import pytest
 
 from jointscope.graphs.discovery import search_kind as search
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
+from jointscope.graphs.discovery.diagnosis_words import what_came_in
 from jointscope.graphs.discovery.discover import discover
 from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.robots.files.effect_editing import add_effect
@@ -215,3 +216,19 @@ def test_what_stood_second_is_asked_where_the_first_did_not_hold(doggy, made_up,
     labels = [here.label for here in found.robot.effects]
     assert SECOND in labels and FIRST not in labels
     assert {FIRST} in asked
+
+
+def test_steps_have_floors_that_are_believed(doggy, made_up, monkeypatch):
+    made_up([FIRST, SECOND])
+    # the model's noise holds what is missing, and its floor lies above the error
+    monkeypatch.setattr(search, "believed_floor", lambda comparison, recording: min(comparison.judged_floor, 0.5))
+    found, _ = run(doggy)
+    assert [step.floor for step in found.steps] == [0.5, 0.5, 0.5]
+
+
+def test_an_effect_with_which_the_training_error_rises_is_not_said_to_lower_it(doggy):
+    came = Candidate("torque_offset", "joint1", 100.0, 1, 1e-9, {}, "missing", reasons=("it explains 40 %",))
+    robot = add_effect(doggy, "torque_offset@joint1")
+    assert "the training error falls from 8 to 4 sigma. It explains" in what_came_in(came, robot, 8.0, 4.0)
+    risen = what_came_in(came, robot, 195.0, 233.0)
+    assert "falls" not in risen and "although the training error rises from 195 to 233 sigma" in risen

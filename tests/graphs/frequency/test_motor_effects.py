@@ -8,7 +8,7 @@ import pytest
 from shaken_arm import made_up
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.frequency.motor_effects import motor_effects, stiffer_drives
+from jointscope.graphs.frequency.motor_effects import motor_effects
 from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage, with_columns
@@ -70,6 +70,17 @@ def test_the_column_of_an_effect_is_what_the_whole_balance_does(label, robot, po
     assert np.linalg.norm(moved - size * column) < share * np.linalg.norm(moved)
 
 
+def test_waves_per_turn_and_sharpness_have_the_columns_of_what_they_do(robot, pose):
+    sizes = {"joint3.gear_ripple.cos": 1e-6, "joint3.gear_ripple.sin": 5e-7}
+    ripple = with_effect(robot, effect("gear_ripple@joint3"), sizes)
+    rough = with_effect(robot, effect("motor_stribeck@joint3"), {"joint3.motor_stribeck.torque": 3.0})
+    for base, name, step in ((ripple, "joint3.gear_ripple.order", 1e-3), (rough, "joint3.friction_sharpness", 1.0)):
+        problem, value = settled(base, pose, 3), base.parameters[name].value
+        column = problem.balance(problem.stage.values)[2][name]
+        moved = balance(settled(base.with_values({name: value + step}), pose, 3)) - balance(problem)
+        assert np.linalg.norm(moved - step * column) < 0.15 * np.linalg.norm(moved)
+
+
 def test_the_column_of_an_eccentric_encoder_is_what_it_does_beside_the_offset_that_poses_tell(robot, pose):
     hypothesis, size, base = effect("encoder_eccentricity@joint2"), 1e-2, settled(robot, pose)
     columns = with_columns(base, at_null(robot, [hypothesis])).stage.geometry
@@ -85,10 +96,10 @@ def test_an_arm_that_is_found_about_its_stiffness_under_load_is_the_same_arm(rob
     hardening = with_effect(robot, hypothesis, {hypothesis.names[0]: 5e9})
     problem = settled(hardening, pose, 12)
     arm, values, x = problem.arm, problem.stage.values, problem.stage.x
-    more = stiffer_drives(arm, pose, values, x)
-    assert more[1] > 1e-3 * values["joint2.stiffness"] and more[0] == more[2] == 0.0
+    pose = problem.pose
     effects = motor_effects(arm, pose, values, problem.sharpness(values), x)
-    offset = effects.offset(values, pose.motions.shape)
+    more, offset = effects.stiffer, effects.offset
+    assert more[1] > 1e-3 * values["joint2.stiffness"] and more[0] == more[2] == 0.0
     plain, about = (moving_arm(arm, pose, values, x, offset, each) for each in (None, more))
     np.testing.assert_allclose(about.torques, plain.torques, atol=1e-5 * np.abs(plain.torques).max())
 

@@ -7,23 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lever_arm import URDF
 from scipy.optimize import brentq
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.graphs.rests.calibrate_rests import calibrate_rests, check_bands
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.errors import SolveError
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.robots.recordings.rests import Rests
+from jointscope.robots.rests.rests import Rests
 from jointscope.tools.terminal.rests_text import verdict
 
-URDF = """<robot name="lever"><link name="base"/>
-<joint name="swing" type="revolute"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/>
- <limit effort="100" velocity="20" lower="-3" upper="3"/></joint>
-<link name="rod"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
- <inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hook_joint" type="fixed"><parent link="rod"/><child link="hook"/><origin xyz="0 0 -0.5"/></joint>
-<link name="hook"/></robot>"""
 YAML = """
 format: 1
 name: lever
@@ -67,11 +63,14 @@ def lever(folder, rigid=False):
     return load_robot(folder / "lever.yaml")
 
 
-def hanging(count, seed, rigid=False):
-    """Rests with weights on the hook, pulled sideways by a rope over a pulley; friction anywhere in its band."""
+def hanging(count, seed, rigid=False, creeping=0):
+    """Rests with weights on the hook, pulled sideways by a rope over a pulley; friction anywhere in its band.
+
+    The motor still creeps in the first ones, and friction is all that it can be.
+    """
     rng = np.random.default_rng(seed)
     pull = rng.choice([0.0, 4.0, 8.0, 12.0, -4.0, -8.0, -12.0], count)
-    motor, link, u = np.zeros((3, count, 1))
+    motor, link, u, creep = np.zeros((4, count, 1))
     for k in range(count):
         # 2 kg at 0.3 m turn the rod down, a force along x at 0.5 m turns it up against it
         def weight(q, k=k):
@@ -81,13 +80,17 @@ def hanging(count, seed, rigid=False):
         tau = weight(q)
         # the spring pulls the link back: K d + K2 d^2 + K3 d^3 = tau with d = q_link - q_motor
         d = 0.0 if rigid else brentq(lambda d, tau=tau: K * d + K2 * d**2 + K3 * d**3 - tau, -0.5, 0.5)
-        friction = (C0 + (0.0 if rigid else C1 * abs(tau))) * rng.uniform(-1.0, 1.0)
+        share = rng.uniform(-1.0, 1.0)
+        if k < creeping:
+            share = np.sign(share)
+            creep[k] = share * 1e-3
+        friction = (C0 + (0.0 if rigid else C1 * abs(tau))) * share
         link[k], motor[k], u[k] = q + 2e-4 * rng.normal() * (not rigid), q - d, -tau + friction
     zero = np.zeros((count, 1))
     forces = np.column_stack([pull, 0.0 * pull, 0.0 * pull])
     return Rests(
         "bench", "", np.zeros((count, 2)), motor, None if rigid else link, u, zero, zero, zero, forces,
-        ("hook",) * count, np.ones((count, 1), dtype=bool),
+        ("hook",) * count, np.ones((count, 1), dtype=bool), creep,
     )  # fmt: skip
 
 
@@ -110,6 +113,49 @@ def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path)
     assert held_out.error < 1.05 * exact.error
 
 
+def test_motors_that_creep_tell_their_friction_better_than_those_that_stand(tmp_path):
+    robot = lever(tmp_path)
+    stands, creeps = (calibrate_rests(robot, [hanging(40, 5, creeping=n)]) for n in (0, 30))
+    before, after = ({p.name: p for p in result.parameters} for result in (stands, creeps))
+    for name, value in {"swing.coulomb_torque": C0, "swing.weight_dependent_friction.coefficient": C1}.items():
+        assert abs(after[name].value - value) < 3.0 * after[name].sigma, name
+        assert after[name].sigma < 0.5 * before[name].sigma, name
+    assert after["swing.coulomb_torque"].value == pytest.approx(C0, rel=0.02)
+    assert abs(after["swing.stiffness"].value - K) < 3.0 * after["swing.stiffness"].sigma
+
+
+@pytest.mark.parametrize("start", (1.0, 2.2, 3.0))
+def test_a_drive_gain_is_found_from_starts_that_are_far_off(tmp_path, start):
+    # from 3.0 bands first become so wide that nothing leads back: then links find their springs before them
+    path = lever(tmp_path).path
+    text = path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
+    gain = f"parameters:\n  swing.torque_constant: {{value: {start}, unit: N m/A, prior_sigma: 3.0}}\n"
+    path.write_text(text.replace("parameters:\n", gain, 1), encoding="utf-8")
+    rests = hanging(60, 1)
+    result = calibrate_rests(load_robot(path), [replace(rests, u=rests.u / 2.0)])
+    found = {p.name: p for p in result.parameters}
+    assert abs(found["swing.torque_constant"].value - 2.0) < 3.0 * found["swing.torque_constant"].sigma < 0.1
+    assert abs(found["swing.coulomb_torque"].value - C0) < 3.0 * found["swing.coulomb_torque"].sigma < 0.5 * C0
+
+
+def test_friction_that_ran_away_is_no_result(tmp_path):
+    far = lever(tmp_path).with_values({"swing.coulomb_torque": 300.0})
+    whole = RestSet.of(far, hanging(20, 1))
+    x, calibration = whole.start(Calibration.of(far))
+    with pytest.raises(SolveError, match=r"friction of swing ran away: it could hold 3\d\d N m"):
+        check_bands(whole, x, calibration)
+
+
+def test_friction_far_beyond_its_band_and_sigmas_that_were_widened_are_no_yes(tmp_path):
+    good = calibrate_rests(lever(tmp_path), [hanging(60, 1)])
+    assert verdict(good).startswith("Yes")
+    narrow = good.robot.with_values({"swing.coulomb_torque": 0.1, "swing.weight_dependent_friction.coefficient": 0.01})
+    said = verdict(replace(good, errors=rest_errors([p.of_robot(narrow) for p in good.problems])))
+    assert said.startswith("No") and "friction of swing would have to hold" in said and "diagnose" in said
+    wide = tuple(replace(p, repeatability=np.array([20.0])) for p in good.problems)
+    assert "swing rests 20 sigmas of its encoder away" in verdict(replace(good, problems=wide))
+
+
 def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
     robot = lever(tmp_path)
     assert verdict(calibrate_rests(robot, [hanging(60, 1)])).startswith("Yes")
@@ -124,7 +170,7 @@ def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
 
 def test_gradients_are_those_of_differences(tmp_path):
     robot = lever(tmp_path)
-    problem = RestSet.of(robot, hanging(6, 3))
+    problem = RestSet.of(robot, hanging(6, 3, creeping=2))
     x, calibration = problem.start(Calibration.of(robot))
     x, h = x + 1e-3, 1e-7
     system = problem.linearize(x, calibration)
@@ -152,3 +198,66 @@ def test_rests_of_a_rigid_joint_tell_its_friction(tmp_path):
     result = calibrate_rests(robot, [hanging(80, 5, rigid=True)])
     (found,) = result.parameters
     assert found.name == "swing.coulomb_torque" and abs(found.value - C0) < 3.0 * found.sigma < 0.1 * C0
+
+
+def test_rigid_joints_that_creep_carry_their_weight(tmp_path):
+    robot = lever(tmp_path, rigid=True)
+    result = calibrate_rests(robot, [hanging(40, 6, rigid=True, creeping=30)])
+    (found,) = result.parameters
+    assert found.value == pytest.approx(C0, rel=0.01) and abs(found.value - C0) < 3.0 * found.sigma
+
+
+def test_less_torque_per_command_is_no_likelier_where_commands_are_judged(tmp_path):
+    robot = add_effect(lever(tmp_path), "torque_constant_error@swing", {"share": 0.0})
+    # commands that friction alone holds: half of their torque fits into half of the band
+    rests = replace(hanging(30, 8), forces=np.zeros((30, 3)), q_motor=np.zeros((30, 1)), q_link=np.zeros((30, 1)))
+    rests = replace(rests, u=np.linspace(-0.3, 0.3, 30)[:, None])
+    costs = {}
+    for per_command in (False, True):
+        for share in (0.0, -0.5):
+            values = {"swing.torque_constant_error.share": share, "swing.coulomb_torque": 0.31 * (1.0 + share)}
+            values["swing.weight_dependent_friction.coefficient"] = 1e-9
+            problem = replace(RestSet.of(robot, rests).of_robot(robot.with_values(values)), per_command=per_command)
+            x, calibration = problem.start(Calibration.of(problem.robot))
+            costs[per_command, share] = problem.linearize(x, calibration).cost
+    assert costs[False, -0.5] < costs[False, 0.0] - 0.9 * 30 * np.log(2.0)
+    assert costs[True, -0.5] == pytest.approx(costs[True, 0.0], abs=0.1 * 30)
+
+
+def test_recordings_as_one_set_cost_what_they_cost_one_by_one(tmp_path):
+    robot = lever(tmp_path)
+    problems = [RestSet.of(robot, hanging(count, count, creeping=2)) for count in (6, 9)]
+    starts = [problem.start(Calibration.of(robot)) for problem in problems]
+    whole = RestSet.joined(problems)
+    x, calibration = whole.start(Calibration.of(robot))
+    together = whole.linearize(x, calibration)
+    apart = [problem.linearize(*start) for problem, start in zip(problems, starts, strict=True)]
+    np.testing.assert_allclose(together.costs, np.concatenate([each.costs for each in apart]))
+    np.testing.assert_allclose(together.g_p, sum(each.g_p for each in apart))
+    kept = np.arange(15) >= 6
+    np.testing.assert_allclose(whole.only(kept).linearize(x[kept], calibration).costs, apart[1].costs)
+
+
+@pytest.mark.parametrize(
+    ("label", "start"),
+    [
+        ("encoder_offset@swing", {"offset": 0.01}),
+        ("encoder_offset@swing.link", {"offset": -0.02}),
+        ("encoder_eccentricity@swing.link", {"cos": 0.01, "sin": 0.02, "cos2": 0.005, "sin2": -0.01}),
+        ("encoder_scale@swing", {"scale": 0.02}),
+        ("torque_constant_error@swing", {"share": 0.1}),
+        ("pwm_deadband@swing", {"width": 0.3}),
+    ],
+)
+def test_effects_of_encoders_and_commands_act_at_rest_with_the_gradients_of_differences(tmp_path, label, start):
+    robot = add_effect(lever(tmp_path), label, start)
+    problem = replace(RestSet.of(robot, hanging(8, 3, creeping=3)), per_command=True)
+    x, calibration = problem.start(Calibration.of(robot))
+    system, h = problem.linearize(x + 1e-3, calibration), 1e-7
+    plain = RestSet.of(lever(tmp_path), hanging(8, 3, creeping=3))
+    assert system.cost != pytest.approx(plain.linearize(x + 1e-3, Calibration.of(plain.robot).only([DYNAMICS])).cost)
+    for i, name in enumerate(calibration.names):
+        step = h * np.eye(len(calibration.names))[i]
+        there = [calibration.with_points({DYNAMICS: calibration.dynamics + side * step}) for side in (1.0, -1.0)]
+        up, down = (problem.linearize(x + 1e-3, point).cost for point in there)
+        assert system.g_p[i] == pytest.approx((up - down) / (2.0 * h), rel=1e-4, abs=0.2), name

@@ -11,8 +11,9 @@ from robots_to_compare import MIMICKING
 
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.held_joints import about_bodies
 from jointscope.robots.recordings.recording import Recording, Stream
 

@@ -10,7 +10,8 @@ from robots_to_compare import ROBOTS, states
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.rates_of_many import RatesOfMany
 from jointscope.robots.files.effects_at_once import add_effects
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 
 
 def compare_with_elastic_joints(robot):

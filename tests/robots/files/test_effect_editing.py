@@ -7,9 +7,10 @@ import pytest
 
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
 from jointscope.robots.files.yaml_comments import remove_at
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.yaml_document import dump_document, read_document
 
 OFFSET, DRAG, MEMORY = "torque_offset@joint1", "link_viscous@joint2", "hysteresis@joint1"

@@ -9,8 +9,9 @@ from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.files.effects_at_once import add_effects, remove_effects, without_effects
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 
 URDF = """<robot name="crane"><link name="base"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="column"/><axis xyz="0 0 1"/>
@@ -160,7 +161,8 @@ def test_a_spring_stays_while_something_acts_in_it(crane):
         remove_effect(robot, "joint_elasticity@turn")
     assert str(error.value) == (
         "joint_elasticity@turn cannot be removed from crane: backlash@turn acts in that spring; remove both: "
-        f"jointscope remove {crane.path} backlash@turn joint_elasticity@turn -o OUT.yaml"
+        f"jointscope remove {crane.path} backlash@turn joint_elasticity@turn "
+        f"-o {crane.path.with_name('crane_without.yaml')}"
     )
     edited = remove_effects(robot, ["joint_elasticity@*"])
     assert edited.labels == ("joint_elasticity@reach",)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 
 MATRIX = "matrix: [[1, 0, 0], [0.2, 0.9, 0], [0, 0, 1]]"
 ELEMENT = "joint2.from_joint1: {value: 0.2, unit: rad/rad, positive: false}"

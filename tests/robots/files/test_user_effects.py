@@ -105,8 +105,8 @@ def test_a_file_may_hold_several_effects_and_import_others(folder):
         ),
         (
             changed("card=CARD", 'card=CARD, owners=("wheel",)'),
-            "my_effects.py, line 12: drag: owners: expected some of joint, joint_link, gyro, link_encoder, robot, "
-            "got ('wheel',)",
+            "my_effects.py, line 12: drag: owners: expected some of joint, joint_link, gyro, link_encoder, target, "
+            "robot, got ('wheel',)",
         ),
         (
             changed("(SIZE,)", "(SIZE, SIZE)"),

@@ -9,8 +9,9 @@ import pytest
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.sensor_placement import factor_on_state
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 
 SENSOR = """  acc:

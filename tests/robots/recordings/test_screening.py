@@ -167,7 +167,7 @@ def test_a_joint_at_rest_is_noted_with_the_parameters_it_hides(doggy, good):
     said = error_of(resting, doggy, every_joint=True)
     assert "joint2 never moves, so joint2.coulomb_torque, joint2.stiffness, joint2.damping cannot be found" in said
     assert "add a recording that moves joint2 to this one, or lock it where it stands" in said
-    assert "--joints joint1,joint3 -o doggy.yaml" in said
+    assert "--joints joint1,joint3 -o doggy_locked.yaml" in said
 
 
 def test_no_parameter_is_asked_for_that_the_robot_does_not_have(doggy, good):

@@ -161,7 +161,7 @@ def test_without_a_header_the_time_of_reception_counts_less_what_messages_take_a
         "command: the messages name no joints; the order of the robot file is assumed",
         "command: its messages carry no stamp; the time of reception stands in for it, less the "
         f"{1e6 * latency:.3g} us that other messages take; if the model does not fit, look for a delay: "
-        "jointscope add ROBOT command_delay@robot -o ROBOT",
+        "jointscope add ROBOT command_delay@robot -o ROBOT_command_delay.yaml",
     ]
 
 

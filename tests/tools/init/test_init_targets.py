@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Topic
 from jointscope.tools.command_line import main

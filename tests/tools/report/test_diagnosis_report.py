@@ -57,9 +57,12 @@ def test_the_ranking_shows_sizes_with_sigmas_units_verdicts_and_reasons(page):
 
 
 def test_commands_to_run_next_are_quoted_for_the_shell(page):
-    assert f"jointscope add doggy {BEARING} -o with_effect.yaml" in page.text
-    assert "jointscope calibrate with_effect.yaml 'runs/train <1>.mcap' -o calibrated.yaml" in page.text
-    assert "--holdout runs/test.mcap -o found.yaml" in page.text
+    assert f"jointscope add doggy {BEARING} -o doggy_bearing_flexibility.yaml" in page.text
+    assert (
+        "jointscope calibrate doggy_bearing_flexibility.yaml 'runs/train <1>.mcap' -o doggy_calibrated.yaml"
+        in page.text
+    )
+    assert "--holdout runs/test.mcap -o doggy_better.yaml" in page.text
 
 
 def test_an_untestable_effect_comes_with_the_motion_that_would_show_it(page):

@@ -50,7 +50,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     ),
     "encoder_scale": ("joint", "scale"),
     "encoder_eccentricity": ("joint, joint seen on the link", "cos sin order"),
-    "encoder_delay": ("joint, robot", "delay"),
+    "encoder_delay": ("joint, robot, target", "delay"),
     "encoder_filter": ("joint, robot", "variance"),
     "encoder_offset": ("joint", "offset"),
     "torque_constant_error": ("joint", "share"),

@@ -40,6 +40,17 @@ def test_swapped_axes_are_said_once_with_the_recording_that_showed_them(doggy, s
     assert "Look at this first" in text
 
 
+def test_a_speed_beyond_the_limit_of_the_urdf_is_told_as_such_and_not_as_a_long_calibration(
+    doggy, simulated, monkeypatch
+):
+    stream = simulated.recording.streams["motor_encoder"]
+    fastest = np.abs(stream.values[20:] - stream.values[:-20]).max() / (stream.times[20] - stream.times[0])
+    allowed = property(lambda tree: np.full(3, fastest / 2.0))
+    monkeypatch.setattr(type(doggy.tree), "velocity_limits", allowed)
+    text = said(doggy, simulated.recording)
+    assert "moves at" in text and "a limit of the URDF may be wrong" in text and "takes long" not in text
+
+
 def test_a_recording_that_cannot_be_used_is_named(doggy, simulated):
     stream = simulated.recording.streams["imu1"]
     dead = replace(stream, values=np.zeros_like(stream.values))

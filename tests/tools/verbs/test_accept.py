@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`--accept`: exit codes, JSON and report of `calibrate` and `compare` with limits."""
+"""`--accept`: exit codes, JSON and report of `calibrate`, `compare` and `diagnose` with limits."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,8 @@ import pytest
 
 from jointscope.tools.command_line import main
 
-POSES = Path(__file__).resolve().parents[4] / "shared/data/tx90l"
+DATA = Path(__file__).resolve().parents[4] / "shared/data"
+POSES, SLIDE = DATA / "tx90l", DATA / "slide" / "offset"
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +51,44 @@ def test_what_cannot_be_told_has_an_exit_code_of_its_own(bag, tmp_path, capsys):
     accept = limits(tmp_path, "parameter: joint1.stiffness, at_most: 1000")
     assert main(["compare", "doggy", str(bag), "--accept", accept]) == 4
     assert "Undecided" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SLIDE.is_dir(), reason="shared/data/slide is not beside the project")
+def test_a_diagnosis_is_checked_for_torques_that_the_model_lacks(tmp_path, capsys):
+    told, page, robot = tmp_path / "out.json", tmp_path / "out.html", tmp_path / "slide.yaml"
+    (urdf,) = SLIDE.glob("*.urdf")
+    assert main(["init", str(urdf), str(SLIDE / "train"), "--unit", "Nm", "-o", str(robot)]) == 0
+    accept = limits(
+        tmp_path,
+        "joint: carriage, missing_torque_percent: 50",
+        'joint: "*", missing_torque_percent: 1.0e-9',
+        "channel: carriage.motor_position, horizon: 0.1, error: 1.0",
+    )
+    done = main(
+        ["diagnose", str(robot), str(SLIDE / "train"), "--accept", accept, "--json", str(told), "--report", str(page)]
+    )
+    assert done == 3
+    content = json.loads(told.read_text())
+    (lines,) = content["acceptance"].values()
+    assert [line["outcome"] for line in lines] == ["pass", "fail", "pass"]
+    found = f"{content['missing_torque_percent']['carriage']:.6g} %"
+    assert [line["found"] for line in lines[:2]] == [found, found]
+    assert "Not accepted: 1 of 3 limits are not kept." in capsys.readouterr().out
+    assert "Not accepted: 1 of 3 limits are not kept." in page.read_text()
+
+
+@pytest.mark.slow
+def test_of_a_model_that_is_judged_by_predictions_no_torque_passes(bag, tmp_path, capsys):
+    accept = limits(tmp_path, "joint: joint1, missing_torque_percent: 50")
+    assert main(["diagnose", "doggy", str(bag), "--accept", accept]) == 4
+    assert "judged by predictions" in capsys.readouterr().out
+
+
+def test_limits_of_a_diagnosis_without_motion_are_refused(tmp_path, capsys):
+    accept = limits(tmp_path, "joint: joint1, missing_torque_percent: 5")
+    assert main(["diagnose", "tx90l", "--poses", str(tmp_path / "poses.csv"), "--accept", accept]) == 1
+    assert "jointscope calibrate" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not POSES.is_dir(), reason="needs recordings that are not part of this repository")

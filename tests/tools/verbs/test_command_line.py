@@ -14,7 +14,8 @@ import pytest
 from fake_results import fake_calibration, fake_comparison
 
 import jointscope
-from jointscope.robots.files.robot_file import load_robot, ready_robots
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags import read_recording as read_module
 from jointscope.tools.bags.needed_streams import needed_streams
@@ -369,7 +370,7 @@ def test_a_missing_urdf_and_files_in_the_wrong_order_are_said_with_the_command(c
     for told, arguments in (
         ("there is no URDF arn.urdf; did you mean 'arm.urdf'?", ("init", "arn.urdf", "a.mcap", "-o", "x.yaml")),
         (
-            "a.mcap is no URDF; the URDF comes first: jointscope init arm.urdf a.mcap -o ROBOT.yaml",
+            "a.mcap is no URDF; the URDF comes first: jointscope init arm.urdf a.mcap -o x.yaml",
             ("init", "a.mcap", "arm.urdf", "-o", "x.yaml"),
         ),
         (

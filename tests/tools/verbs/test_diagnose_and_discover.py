@@ -209,7 +209,9 @@ def test_an_effect_is_added_and_removed_and_comments_survive(capsys):
     said = capsys.readouterr().out
     assert said.startswith(f"{BEARING} added to doggy\n")
     assert "joint1.bearing_flexibility.compliance_x" in said
-    assert said.endswith("Wrote more.yaml; jointscope calibrate more.yaml BAG -o CALIBRATED.yaml finds the values\n")
+    assert said.endswith(
+        "Wrote more.yaml; jointscope calibrate more.yaml BAG -o more_calibrated.yaml finds the values\n"
+    )
     assert Path("more.yaml").read_text().startswith("# my own comment\n")
     assert "joint1.bearing_flexibility.compliance_x" in json.loads(Path("a.json").read_text())["added"]
     assert main(["remove", "more.yaml", BEARING, "-o", "less.yaml"]) == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from jointscope.robots.files.robot_file import ready_robots
+from jointscope.robots.model.command_words import ready_robots
 from jointscope.tools.command_line import main
 
 

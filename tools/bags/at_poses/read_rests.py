@@ -12,7 +12,8 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.rests import LoadHistory, Rests, find_rests
+from jointscope.robots.rests.load_history import LoadHistory
+from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.messages.open_bag import Progress, open_bag
 from jointscope.tools.bags.read_recording import read_recording

@@ -38,7 +38,7 @@ def sent_earlier(
     less = f", less the {duration(shift)} that other messages take" if shift else ""
     text = (
         f"{name}: {why}; the time of reception stands in for it{less}; if the model does not "
-        "fit, look for a delay: jointscope add ROBOT command_delay@robot -o ROBOT"
+        "fit, look for a delay: jointscope add ROBOT command_delay@robot -o ROBOT_command_delay.yaml"
     )
     if name != "command":
         text = text.partition("; if")[0]

@@ -17,8 +17,9 @@ from jointscope.graphs.starts.drive_regression import (
     GAIN,
     INERTIA,
     PLACES,
-    VISCOUS,
     DriveEquation,
+    Driven,
+    Links,
     Value,
     best_width,
     equations_by_width,
@@ -30,6 +31,8 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
 from jointscope.tools.init.estimates.drive_unit import SURE, drive_unit
 from jointscope.tools.init.estimates.gravity_guess import clearer_gravity
+from jointscope.tools.init.estimates.soft_joints import FirstSpring, first_springs
+from jointscope.tools.init.estimates.turning_over import turning_over
 
 Array = NDArray[np.float64]
 
@@ -42,9 +45,6 @@ HEAVY = 0.25  # of the link's inertia; as much below zero the rotor's may be whe
 TRUSTED = 0.95  # of the driving torque that must be explained before a unit is concluded from its constant
 EXPLAINED = 0.9  # of the driving torque that must be explained before anything is concluded from it
 SHARPNESS = 1e4  # [s/rad] of the sign of a velocity
-USUAL = 0.005  # [rad/s] within which the dry friction of a joint that turns is thought to turn over
-MATTERS = 0.02  # of the rms speed, from which that is a good part of the motion
-TURNS_OVER = 0.1  # of the rms speed at most, for a start
 TYPED = "as you said"
 SOFT = 0.24  # [s] of windows at least, where a spring may be: below its resonance a joint is rigid
 
@@ -65,6 +65,8 @@ class DriveValues:
         sharpness: k in tanh(k v) of dry friction, from which a calibration may look for it [s/rad]; None where the
             encoder does not show how the joint turns over, or the joint is so fast that it does not matter.
         limit: what the drive gives at the most; None where it gives what was commanded.
+        spring: behind it, where encoders on both sides tell it.
+        own_links: whether the torques of the links come from encoders of their own, so that no spring is in the way.
     """
 
     start: Mapping[str, float]
@@ -76,6 +78,8 @@ class DriveValues:
     unknown_scale: bool = False
     sharpness: float | None = None
     limit: CommandLimit | None = None
+    spring: FirstSpring | None = None
+    own_links: bool = False
 
     @property
     def is_impossible(self) -> bool:
@@ -121,6 +125,7 @@ def find_drives(
     held: bool = True,
     elastic: Sequence[str] = (),
     unit: str = "",
+    links: Links | None = None,
 ) -> Drives:
     """Unit of the command and the drive of every joint.
 
@@ -132,12 +137,16 @@ def find_drives(
         held: whether a command acts until the next one; else it was measured and is linear between samples.
         elastic: joints with a spring between motor and link.
         unit: of the command, if it is known.
+        links: what encoders on links behind springs saw; the equation then holds whatever the springs are.
     """
-    cells = motion_cells(encoder, command, sigmas, held)
-    M = tree.mass_matrix(cells.q[:1])[0]
+    cells, of_links = Driven(encoder, command, links=links).cells(sigmas, held)
+    M = tree.mass_matrix(of_links.q[:1])[0]
+    springs = elastic
+    if links is not None:
+        elastic = ()
 
     def equations_of(tree: RigidTree) -> list[DriveEquation]:
-        by_width = equations_by_width(cells, load_of(tree, cells), M, sigmas, SHARPNESS)
+        by_width = equations_by_width(cells, load_of(tree, of_links), M, sigmas, SHARPNESS, links)
         return [
             best_width({w: e for w, e in some.items() if w >= SOFT or joint not in elastic})
             for joint, some in zip(tree.joints, by_width, strict=True)
@@ -146,10 +155,10 @@ def find_drives(
     tree, equations, reason = clearer_gravity(tree, equations_of)
     directions = [_direction(equation.direction(), equation.solve().get(GAIN)) for equation in equations]
     gains = [_gain(equation, sign) for equation, (sign, _) in zip(equations, directions, strict=True)]
-    links = np.diag(M).tolist()
+    inertias = np.diag(M).tolist()
     heavy = [
         joint
-        for joint, equation, (sign, _), link in zip(tree.joints, equations, directions, links, strict=True)
+        for joint, equation, (sign, _), link in zip(tree.joints, equations, directions, inertias, strict=True)
         if _needs_more_than_newton_metres(equation, sign, link)
     ]
     largest = float(np.nanmax(np.abs(command.values), initial=0.0))
@@ -161,14 +170,17 @@ def find_drives(
         drives = [
             _drive(equation, known, direction, link, joint in elastic, own)
             for joint, equation, direction, link, own in zip(
-                tree.joints, equations, directions, links, like, strict=True
+                tree.joints, equations, directions, inertias, like, strict=True
             )
         ]
         if not any(drive.unknown_scale for drive in drives):
             break
         like = _like_neighbours(drives)
-    shown = _turn_over(tree, equations, slope_noise(encoder, sigmas), elastic)
+    shown = turning_over(tree, equations, slope_noise(encoder, sigmas), springs)
     drives = [replace(drive, sharpness=k) for drive, k in zip(drives, shown, strict=True)]
+    if links is not None:
+        told_springs = first_springs(cells, of_links, load_of(tree, of_links))
+        drives = [replace(drive, spring=s, own_links=True) for drive, s in zip(drives, told_springs, strict=True)]
     return Drives(told, drives, tree.gravity, reason, held)
 
 
@@ -176,19 +188,6 @@ def _like_neighbours(drives: Sequence[DriveValues]) -> list[float]:
     """Constant of the nearest joint whose own is told, shape (n,); 0 without any. Drives of one arm are alike."""
     told = [j for j, drive in enumerate(drives) if not drive.unknown_scale]
     return [drives[min(told, key=lambda k: abs(k - j))].start[GAIN] if told else 0.0 for j in range(len(drives))]
-
-
-def _turn_over(
-    tree: RigidTree, equations: Sequence[DriveEquation], noise: Array, elastic: Sequence[str]
-) -> list[float | None]:
-    """First guess of k in tanh(k v) where it matters and can be seen; see `DriveValues.sharpness`."""
-    found: list[float | None] = []
-    for joint, equation, rough in zip(tree.joints, equations, noise.tolist(), strict=True):
-        speed = float(equation.rms[PLACES[VISCOUS]])
-        width = min(TURNS_OVER * speed, USUAL)
-        matters = joint in tree.slides or speed < USUAL / MATTERS
-        found.append(1.0 / width if matters and joint not in elastic and rough < width else None)
-    return found
 
 
 def _needs_more_than_newton_metres(equation: DriveEquation, sign: float, link: float) -> bool:

@@ -55,7 +55,8 @@ def drive_table(guess: RobotGuess) -> list[str]:
             f"{IMPOSSIBLE_CELL.strip()}: below zero, which no inertia and no friction can be: not a result; masses, "
             "units, names or stamps are wrong there, or something else acts"
         )
-    return ["drives by regression with rigid joints, sigmas from blocks of the recording:", *(f"  {x}" for x in lines)]
+    how = "the links' own encoders" if any(drive.own_links for drive in guess.drives) else "rigid joints"
+    return [f"drives by regression with {how}, sigmas from blocks of the recording:", *(f"  {x}" for x in lines)]
 
 
 def _head(guess: RobotGuess, name: str) -> str:

@@ -167,9 +167,14 @@ def _why_lost(drive: DriveValues, found: Value | None) -> str:
 
 
 def _spring_rows(drive: DriveValues | None) -> list[_Row]:
-    """A spring at a plain frequency, where a gyroscope will tell the right one."""
+    """A spring as both encoders show it, or at a plain frequency, where a gyroscope will tell the right one."""
     if drive is None:
         return []
     omega = 2.0 * np.pi * RESONANCE
-    stiffness, damping = drive.link * omega**2, 2.0 * DAMPING_RATIO * drive.link * omega
-    return [_Row("stiffness", stiffness, "N m/rad", "", False), _Row("damping", damping, "N m s/rad", "", False)]
+    stiffness, said = drive.link * omega**2, ""
+    if drive.spring is not None:
+        stiffness, said = drive.spring.stiffness, "torque of the links over the difference of both encoders"
+    damping = 2.0 * DAMPING_RATIO * np.sqrt(drive.link * stiffness)
+    if drive.spring is not None and drive.spring.damping > 0.0:
+        damping = drive.spring.damping
+    return [_Row("stiffness", stiffness, "N m/rad", said, False), _Row("damping", damping, "N m s/rad", "", False)]

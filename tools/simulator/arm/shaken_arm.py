@@ -130,9 +130,9 @@ class ShakenArm:
             dry = self._smooth if self._plain else self._dry(qpos[links] - q, qvel[links] - v, v)
             passive[motors] += drive(q, v) - dry * np.tanh(self._sharpness * v)
             if not self._linear:
-                pull, turned = self._more_pull(qpos[links] - q, q)
+                pull, felt = self._more_pull(qpos[links] - q, qvel[links] - v, q, v)
                 passive[links] += pull
-                passive[motors] -= pull * turned
+                passive[motors] -= felt
 
         found = []
         samples = periods * len(torque) // (2 * every)
@@ -161,16 +161,26 @@ class ShakenArm:
         passed = np.abs(self._k * d + self._damping * rate)
         return np.asarray(self._smooth + part["torque"] * np.exp(-(slow**2)) + part["coefficient"] * passed)
 
-    def _more_pull(self, d: Array, q: Array) -> tuple[Array, Array]:
-        """Torque on the links beyond that of linear springs at deflections d, and what the motors feel of all of it."""
+    def _more_pull(self, d: Array, rate: Array, q: Array, v: Array) -> tuple[Array, Array]:
+        """Torque on the links beyond that of linear springs and dampers, and what the motors feel beyond it.
+
+        A wavy gear turns the link by q + off(q), so its power balance levers all that the drive passes on by 1 + off'.
+
+        Args:
+            d: links over motors [rad].
+            rate: of it [rad/s].
+            q: of the motors [rad].
+            v: of the motors [rad/s].
+        """
         part = self._size
         wave = part["order"] * q + part["phase"]
-        off = part["amplitude"] * np.cos(wave)
+        off, slope = part["amplitude"] * np.cos(wave), -part["amplitude"] * part["order"] * np.sin(wave)
         apart = d - off
         gap = np.abs(part["half_gap"]) * np.sign(apart)
         taken = np.where(np.abs(apart) < np.abs(gap), 0.0, apart - gap)
-        pull = -self._k * taken - part["stiffness"] * taken**3 + self._k * d
-        return pull, 1.0 - part["amplitude"] * part["order"] * np.sin(wave)
+        plain = -self._k * d - self._damping * rate
+        passed = -self._k * taken - part["stiffness"] * taken**3 - self._damping * (rate - slope * v)
+        return passed - plain, passed * (1.0 + slope) - plain
 
     def _at_rest(self) -> Array:
         """Puts the arm where it hangs in its springs, and returns what its motors hold, shape (n,) [N m]."""

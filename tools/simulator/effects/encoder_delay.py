@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Encoder readings are older than their stamps; the controller gets the old ones."""
+"""Positions are older than their stamps; the controller gets the old ones of encoders."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ Array = NDArray[np.float64]
 
 
 class EncoderDelay(SimulatedEffect):
-    """The encoder of one joint, or those of all, are late."""
+    """The encoder of one joint, or those of all, or a tracker with its target are late."""
 
     id = "encoder_delay"
-    acts_on = ("joint", "robot")
+    acts_on = ("joint", "robot", "target")
     defaults: ClassVar[Mapping[str, float]] = {"delay": 2e-3}  # [s]
     never_negative = ("delay",)
 
     def age(self, sensor: Sensor) -> Array:
         """The delay of the owner's channels [s]."""
+        if sensor.name == self.owner:
+            return np.full(len(sensor.channels), self.parameters["delay"])
         age = np.zeros(len(sensor.channels))
         age[self.encoder_channels(sensor)] = self.parameters["delay"]
         return age

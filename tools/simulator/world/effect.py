@@ -51,7 +51,7 @@ class SimulatedEffect:
     Attributes:
         parameters: all values by name.
         id: name of the effect, that of its file.
-        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "robot", "upright robot"
+        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "target", "robot", "upright robot"
             and "weighed elastic joint".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
@@ -196,6 +196,8 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
     """Names of the owners of a kind; an upright robot feels gravity along -z of its base, a weighed joint any."""
     if kind == "imu":
         return tuple(gyro.name for gyro in robot.gyros)
+    if kind == "target":
+        return tuple(target.name for target in robot.targets)
     elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
     upright = ("robot",) if robot.tree.gravity[2] < 0.0 and not robot.tree.gravity[:2].any() else ()
     joints = {"joint": robot.joints, "elastic joint": elastic, "last joint": robot.joints[-1:]}

@@ -50,7 +50,7 @@ def run_arm_search(
         discover_arm,
     )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
-    from jointscope.tools.terminal.arm_discovery_text import (
+    from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
         ranking_text,
         recordings_said,
@@ -108,7 +108,7 @@ def candidate_json(c: Any) -> dict[str, Any]:
 
 def _page(found: Any, **options: Any) -> str:
     """The report of the last model with the steps that led to it."""
-    from jointscope.tools.report.arm_search_report import arm_search_report
+    from jointscope.tools.report.searches.arm_search_report import arm_search_report
 
     return arm_search_report(found, **options)
 

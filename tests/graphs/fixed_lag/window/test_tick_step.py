@@ -196,3 +196,11 @@ def test_independent_position_noise_is_kept_apart():
     Q, layout = G @ G.T, robot.layout
     assert not Q[layout.positions][:, layout.velocities].any()
     np.testing.assert_allclose(np.sqrt(np.diag(Q))[layout.positions], 1e-5 * np.sqrt(H))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e9, 1e150, 1e300])
+def test_a_step_under_torques_of_no_robot_is_no_number_and_no_overflow(robot, rule, size):
+    model, x0 = StateRates(robot), states(robot, 1)[0]
+    step = take_step(model, rule, x0, size * np.array([1.0, -1.0, 1.0]), H)
+    assert np.isnan(step.x1).all() and np.isnan(step.transition).all()

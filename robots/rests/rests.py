@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rests of a robot: stretches in which motors, links and load stand, each with its means and how far they may be off.
 
-A motor stands where its encoder stays within its noise. Links swing on for seconds, so the end of a stretch counts,
-and what parts of it differ by says how well its mean is known; the creep after a stop is cut off.
+A motor stands where its encoder stays within its noise, or creeps (creep.py). Links swing on for seconds, so the end
+of a stretch counts, and what parts of it differ by says how well its mean is known.
 """
 
 from __future__ import annotations
@@ -15,49 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
+from jointscope.robots.rests.creep import PARTS, creep_of, creeping_stretches
+from jointscope.robots.rests.load_history import LoadHistory
 
 Array = NDArray[np.float64]
-WITHIN = 6.0  # [sigma] that the readings of something at rest lie apart
-SHORTEST = 0.5  # [s] of a stretch that is a rest
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
-PARTS = 4  # of what is looked at, whose means are compared
-SWINGING = 12.0  # [sigma] of a link encoder that these means may differ by
-FEWEST, OFTEN = 3, 0.25  # rests, and part of the time that motors stand, below both of which it is motion
-LONG_PAUSE = 0.5  # [s] without a sample
-
-
-@dataclass(frozen=True)
-class LoadHistory:
-    """A known force on the arm over time; each holds until the next.
-
-    Attributes:
-        times: shape (k,) [s].
-        forces: in the axes of the base, shape (k, 3) [N].
-        links: name of the link at whose origin each acts.
-    """
-
-    times: Array
-    forces: Array
-    links: tuple[str, ...]
-
-    @staticmethod
-    def none() -> LoadHistory:
-        """Nothing hangs on the arm."""
-        return LoadHistory(np.zeros(1), np.zeros((1, 3)), ("",))
-
-    @property
-    def changes(self) -> Array:
-        """Times at which another force begins [s]."""
-        other = np.any(np.diff(self.forces, axis=0) != 0.0, axis=1)
-        other |= np.array([a != b for a, b in zip(self.links[1:], self.links[:-1], strict=True)], dtype=bool)
-        return self.times[1:][other]
-
-    def at(self, time: float) -> tuple[Array, str]:
-        """Force and link at a time."""
-        k = int(np.searchsorted(self.times, time, side="right")) - 1
-        return (np.zeros(3), "") if k < 0 else (self.forces[k], self.links[k])
+SWINGING = 12.0  # [sigma] of a link encoder that the means of parts may differ by
+ARRAYS = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved", "creep")
+FEWEST = 3  # rests; fewer, where motors do not stand often, are motion
 
 
 @dataclass(frozen=True)
@@ -72,7 +41,8 @@ class Rests:
         u: mean command in its SI unit, shape (m, n).
         motor_scatter, link_scatter, u_scatter: by how much parts of each rest differ, shape (m, n).
         forces, links: known load of each rest, shape (m, 3) [N], and the link that it acts on.
-        moved: whether each motor has moved since the last rest, shape (m, n).
+        moved: whether each motor has moved since the last rest, and its friction tells something, shape (m, n).
+        creep: velocity of motors that slide on slowly, shape (m, n) [rad/s]; 0 where they stand.
         notices: what was left out.
     """
 
@@ -88,6 +58,7 @@ class Rests:
     forces: Array
     links: tuple[str, ...]
     moved: NDArray[np.bool_]
+    creep: Array
     notices: tuple[Notice, ...] = ()
 
     def __len__(self) -> int:
@@ -95,10 +66,20 @@ class Rests:
 
     def only(self, kept: NDArray[np.bool_]) -> Rests:
         """Some of the rests."""
-        arrays = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved")
-        some = {name: getattr(self, name)[kept] for name in arrays}
+        some = {name: getattr(self, name)[kept] for name in ARRAYS}
         links = tuple(link for link, keep in zip(self.links, kept.tolist(), strict=True) if keep)
         return replace(self, q_link=None if self.q_link is None else self.q_link[kept], links=links, **some)
+
+
+def joined_rests(recordings: Sequence[Rests]) -> Rests:
+    """The rests of some recordings of one robot, one after the other."""
+    if len(recordings) == 1:
+        return recordings[0]
+    together = {name: np.concatenate([getattr(rests, name) for rests in recordings]) for name in ARRAYS}
+    seen = [rests.q_link for rests in recordings if rests.q_link is not None]
+    links, notices = (sum((getattr(rests, name) for rests in recordings), ()) for name in ("links", "notices"))
+    paths = ", ".join(rests.path for rests in recordings)
+    return Rests(paths, "", q_link=np.concatenate(seen) if seen else None, links=links, notices=notices, **together)
 
 
 def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
@@ -113,8 +94,8 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         RecordingError: there is none, with the reason.
     """
     motor, link = robot.motor_encoder, robot.link_encoder
-    stream, standing = recording.streams[motor.name], _standing(recording, robot)
-    stretches = _split(standing, loads.changes)
+    stream, still = recording.streams[motor.name], standing(recording, robot)
+    stretches = _split(sorted([*still, *creeping_stretches(recording, robot, still)]), loads.changes)
     found, swinging = [], 0
     for t0, t1 in stretches:
         a = _most_settled(recording, motor.name if link is None else link.name, t0, t1)
@@ -125,69 +106,33 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
             swinging += 1
             continue
         zero = 0.0 if link is None else link.zero
-        found.append(
-            (np.array([a, t1]), q_motor - motor.zero, q_link - zero, u, motor_scatter, link_scatter, u_scatter)
-        )
+        creep, known = creep_of(stream, motor.sigmas, a, t1)
+        positions, scatters = (q_motor - motor.zero, q_link - zero, u), (motor_scatter, link_scatter, u_scatter)
+        found.append((known, creep, np.array([a, t1]), *positions, *scatters))
     if not found:
-        raise RecordingError(_why_none(recording, standing, stretches, swinging))
-    share = _share(standing, stream.times)
+        raise RecordingError(_why_none(recording, still, stretches, swinging))
+    share = share_of(still, stream.times)
     if len(found) < FEWEST and share < OFTEN:
         raise RecordingError(
             f"{recording.path}: the motors stand {100 * share:.0f} % of the time only; expected rests; a recording of "
-            f"motion stands before the first option: jointscope calibrate ROBOT {recording.path} -o OUT.yaml"
+            f"motion stands before the first option: jointscope calibrate {robot_argument(robot)} {recording.path} "
+            f"-o {edited_argument(robot, 'calibrated')}"
         )
-    times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = (np.array(p) for p in zip(*found, strict=True))
+    known, creep, times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = map(
+        np.array, zip(*found, strict=True)
+    )
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]
     first = stream.values[0] - motor.zero
     moved = _moved(first, q_motor, WITHIN * motor.sigmas)
     forces, links = np.array([force for force, _ in hung]), tuple(name for _, name in hung)
     rests = Rests(
         recording.path, recording.sha256, times, q_motor, None if link is None else q_link, u,
-        motor_scatter, link_scatter, u_scatter, forces, links, moved, _notices(len(found), swinging),
+        motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, _notices(len(found), swinging),
     )  # fmt: skip
-    rests = rests.only(_last_of_each(rests))
-    return replace(rests, moved=_moved(first, rests.q_motor, WITHIN * motor.sigmas))
-
-
-def standing_share(recording: Recording, robot: Robot) -> float:
-    """Part of a recording in which all motors stand."""
-    return _share(_standing(recording, robot), recording.streams[robot.motor_encoder.name].times)
-
-
-def _share(stretches: Sequence[tuple[float, float]], times: Array) -> float:
-    return float(sum(t1 - t0 for t0, t1 in stretches)) / max(float(np.ptp(times)), 1e-9)
-
-
-def _standing(recording: Recording, robot: Robot) -> list[tuple[float, float]]:
-    """Stretches in which all motors stand [s]."""
-    motor = robot.motor_encoder
-    stream = recording.streams[motor.name]
-    return still_stretches(stream.times, stream.values - motor.zero, WITHIN * motor.sigmas)
-
-
-def still_stretches(times: Array, values: Array, within: Array) -> list[tuple[float, float]]:
-    """Longest stretches in which every channel stays within a range [s].
-
-    Args:
-        times: shape (k,) [s].
-        values: shape (k, c).
-        within: of each channel, shape (c,).
-    """
-    found, start = [], 0
-    low, high = values[0].copy(), values[0].copy()
-    for k in range(1, len(times) + 1):
-        ends = k == len(times) or times[k] - times[k - 1] > LONG_PAUSE
-        if not ends:
-            lower, upper = np.minimum(low, values[k]), np.maximum(high, values[k])
-            ends = bool(np.any(upper - lower > within))
-        if not ends:
-            low, high = lower, upper
-            continue
-        if times[k - 1] - times[start] >= SHORTEST:
-            found.append((float(times[start]), float(times[k - 1])))
-        if k < len(times):
-            start, low, high = k, values[k].copy(), values[k].copy()
-    return found
+    last = _last_of_each(rests)
+    rests = rests.only(last)
+    moved = _moved(first, rests.q_motor, WITHIN * motor.sigmas) | (rests.creep != 0.0)
+    return replace(rests, moved=moved & known[last])
 
 
 def _split(stretches: Sequence[tuple[float, float]], changes: Array) -> list[tuple[float, float]]:

@@ -12,7 +12,10 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.robots.recordings.rests import LoadHistory, find_rests, still_stretches
+from jointscope.robots.recordings.still_stretches import still_stretches
+from jointscope.robots.rests.creep import creep_of, creeping_stretches, fastest_creep
+from jointscope.robots.rests.load_history import LoadHistory
+from jointscope.robots.rests.rests import find_rests
 
 ROBOT = load_robot("biorob")
 RATE = 100.0
@@ -107,3 +110,34 @@ def test_encoders_with_another_zero_read_the_same():
     moved = replace(ROBOT.motor_encoder, zero=zero)
     rests = find_rests(recording(steps(0.3, 0.7)), ROBOT.with_sensors({"motor_encoder": moved}), LoadHistory.none())
     np.testing.assert_allclose(rests.q_motor[:, 0], [0.0, 0.4], atol=1e-12)
+
+
+def creeping(speed, seconds=1.5, stops=False):
+    """Stands at 0.4 rad, goes on with a velocity [rad/s], and stops halfway or creeps on to the end."""
+    t = np.arange(int(seconds * RATE)) / RATE
+    on = 0.4 + speed * np.minimum(t, 0.5 * seconds if stops else seconds)
+    return np.concatenate([steps(0.0, 0.4), on, np.linspace(on[-1], 0.8, 50), np.full(200, 0.8)])
+
+
+@pytest.mark.parametrize("speed", (1e-3, -2e-3))
+def test_a_motor_that_creeps_to_the_end_of_a_stretch_is_a_rest_with_its_velocity(speed):
+    rests = find_rests(recording(creeping(speed)), ROBOT, LoadHistory.none())
+    assert rests.q_motor[:, 0] == pytest.approx([0.0, 0.4, 0.4 + 0.75 * speed, 0.8], abs=1.1 * abs(speed))
+    assert rests.creep[:, 0] == pytest.approx([0.0, 0.0, speed, 0.0], rel=0.03)
+    assert rests.moved[:, 0].tolist() == [False, True, True, True] and not rests.moved[:, 1:].any()
+
+
+def test_a_motor_too_fast_to_be_at_rest_or_that_stops_halfway_tells_nothing_of_its_friction():
+    assert fastest_creep(ROBOT)[0] == pytest.approx(0.05 * 0.05 / 0.5808)  # damping is a twentieth of dry friction
+    fast = find_rests(recording(creeping(6e-3)), ROBOT, LoadHistory.none())
+    assert fast.q_motor[:, 0] == pytest.approx([0.0, 0.4, 0.8], abs=1e-5) and not fast.creep.any()
+    # from 0.3 s before it stops until 0.3 s after
+    stream = Stream("m", np.arange(60) / RATE, np.interp(np.arange(60), [0, 30], [0, 6e-4])[:, None], ("m",), "rad")
+    speed, known = creep_of(stream, np.array([3.85e-5]), 0.0, 0.6)
+    assert speed == [0.0] and not known[0]
+
+
+def test_springs_whose_links_no_encoder_sees_have_no_creep():
+    blind = replace(ROBOT, sensors={"motor_encoder": ROBOT.motor_encoder})
+    assert blind.link_encoder is None
+    assert creeping_stretches(recording(creeping(1e-3)), blind, []) == []

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Regression of a rigid joint's commands on its motion and on what an effect would add.
+
+    u = (M a + c + g + b a + d v + mu sign(v) - law) / k
+
+under smooth windows, joint by joint, see `graphs/starts/drive_regression.py`. Effects that the robot has already are
+regressed on, too, each by its columns at nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.torque_columns import TorqueColumns, has_columns
+from jointscope.graphs.starts.drive_regression import GAIN, PLACES, VISCOUS, load_of
+from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
+from jointscope.graphs.starts.motion_cells import motion_cells
+from jointscope.graphs.starts.windowed_sums import joint_signals, windowed_rows
+from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+DELAY, DELAY_NAME = "command_delay@robot", "robot.command_delay.delay"  # commands are moved by it
+FEWEST_ROWS = 60  # windows
+
+
+def joint_rows(robot: Robot, recordings: Sequence[Recording]) -> JointRows | None:
+    """The rows of a robot's regression; None where it does not apply, or streams do not overlap: others say so.
+
+    Args:
+        robot: the model.
+        recordings: of it, at least one.
+    """
+    if not _applies(robot):
+        return None
+    try:
+        return JointRows(robot.in_posture(recordings[0].posture), recordings)
+    except RecordingError:
+        return None
+
+
+def _applies(robot: Robot) -> bool:
+    """Whether all joints are rigid, with known masses, and with effects that columns tell."""
+    if robot.layout.motors or robot.choices.link_dynamics != "model" or robot.transmission is not None:
+        return False
+    return all(has_columns(here.effect) for here in robot.effects if here.label != DELAY)
+
+
+class Since(NamedTuple):
+    """From when on something acts: a time [s] in one of the recordings."""
+
+    recording: int
+    time: float
+
+
+class JointRows:
+    """Windowed rows of the regression, with columns of effects.
+
+    Args:
+        robot: in the posture of the recordings.
+        recordings: of it.
+    """
+
+    def __init__(self, robot: Robot, recordings: Sequence[Recording]):
+        self.robot, sigmas = robot, robot.motor_encoder.sigmas
+        delay = robot.parameter(DELAY_NAME).value if any(h.label == DELAY for h in robot.effects) else 0.0
+        driven = driven_joints(robot, recordings, delay)
+        more = [h for h in robot.effects if h.label != DELAY and h.effect.id not in (PLAIN, LIMIT)]
+        self._own = [_as_it_is(robot, here) for here in more]
+        cells = [motion_cells(d.encoder, d.command, sigmas, robot.command_held, d.left_out) for d in driven]
+        self._plain = [joint_signals(c, load_of(robot.tree, c), robot.friction_sharpness()) for c in cells]
+        self._columns = [TorqueColumns(robot, c) for c in cells]
+
+    def of(
+        self, joint: int, width: float, hypothesis: EffectHypothesis | None = None, since: Since | None = None
+    ) -> Array | None:
+        """Signals, columns of the robot's own effects and of another one under all windows, shape (w, 5 + e + k).
+
+        None where the other one does not act, or there are too few windows.
+
+        Args:
+            joint: index.
+            width: of the windows [s].
+            hypothesis: the other effect.
+            since: from when on it acts; always where None.
+        """
+        added = []
+        for i, columns in enumerate(self._columns):
+            own = [column for here in self._own for column in columns.of(here, joint) or ()]
+            more = [] if hypothesis is None else columns.of(hypothesis, joint)
+            if more is None:
+                return None
+            if since is not None:
+                acts = (columns.cells.times >= since.time) & (i == since.recording)
+                more = [column * acts for column in more]
+            added.append([*own, *more])
+        found = self.beside(joint, width, added)
+        return None if found is None else found[0]
+
+    def beside(
+        self, joint: int, width: float, columns: Sequence[Sequence[Array]]
+    ) -> tuple[Array, NDArray[np.intp]] | None:
+        """Signals of a joint and other columns under all windows, shape (w, 5 + k), and the block of each, shape (w,).
+
+        None where there are too few windows.
+
+        Args:
+            joint: index.
+            width: of the windows [s].
+            columns: for each recording k of them, shape (m,).
+        """
+        rows, blocks, first = list[Array](), list[NDArray[np.intp]](), 0
+        for plain, here, more in zip(self._plain, self._columns, columns, strict=True):
+            signals = np.column_stack([plain[:, joint], *more])[:, None, :]
+            for part, block, count in windowed_rows(here.alone(joint), signals, width)[0]:
+                rows.append(part)
+                blocks.append(block + first)
+                first += count
+        return (np.vstack(rows), np.concatenate(blocks)) if sum(map(len, rows)) >= FEWEST_ROWS else None
+
+    def motions(self, joint: int) -> list[tuple[Array, Array]]:
+        """Signals of a joint, shape (m, 5), and the weight that it carries, shape (m,) [N m], of each recording."""
+        pairs = zip(self._plain, self._columns, strict=True)
+        return [(plain[:, joint], columns.weight[:, joint]) for plain, columns in pairs]
+
+    def spans(self) -> list[tuple[float, float]]:
+        """First and last time of each recording [s]."""
+        return [(float(c.cells.times[0]), float(c.cells.times[-1])) for c in self._columns]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A regression with one effect, or none.
+
+    Attributes:
+        left: mean square that is left, in squares of the command.
+        values: factors of load and of the signals of PLACES, in units of the command.
+        more: factors of the columns beside them, shape (e + k,).
+        hypothesis: the effect.
+        sizes: how many it has.
+    """
+
+    left: float
+    values: dict[str, float]
+    more: Array
+    hypothesis: EffectHypothesis | None = None
+    sizes: int = 0
+
+    @property
+    def gain(self) -> float:
+        """Torque of one unit of the command; 1 where that is known [N m]."""
+        return 1.0 / self.values[GAIN] if self.values.get(GAIN) else 1.0
+
+    def laws(self) -> dict[str, float]:
+        """What was found, by law."""
+        laws = {law: self.values[law] * self.gain for law in PLACES if law in self.values}
+        return {**laws, GAIN: self.gain} if GAIN in self.values else laws
+
+
+def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | None = None) -> Fit:
+    """The regression of commands on motion and on the columns of an effect."""
+    parts = parts_of(robot, robot.joints[joint])
+    held = {law: sum(f * p.value for p, f in some) for law, some in parts.items() if all(p.fixed for p, _ in some)}
+    held = {VISCOUS: 0.0, **held} if VISCOUS not in parts else held
+    if GAIN not in parts:
+        held[GAIN] = 1.0
+    load = rows[:, 1] + sum((held[law] * rows[:, place] for law, place in PLACES.items() if law in held), np.zeros(1))
+    free = [law for law in PLACES if law not in held]
+    columns, more = [rows[:, PLACES[law]] for law in free], rows[:, 5:]
+    target = rows[:, 0]
+    if GAIN in held:
+        target = target - load / held[GAIN]
+    else:
+        free, columns = [GAIN, *free], [load, *columns]
+    X = np.column_stack([*columns, more])
+    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    found = np.linalg.lstsq(X / size, target, rcond=1e-10)[0] / size
+    values = dict(zip(free, found.tolist(), strict=False))
+    sizes = 0 if hypothesis is None else len(hypothesis.sizes)
+    return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
+
+
+def changes_between(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:
+    """By which factor each value changes from one regression to another, if it is no other joint's, by name."""
+    before, after, found = plain.laws(), best.laws(), dict[str, float]()
+    for law, some in parts_of(robot, joint).items():
+        free = [p for p, _ in some if not p.fixed]
+        if law in before and before[law] and len(some) == 1 and free and free[0].name.startswith(f"{joint}."):
+            found[free[0].name] = after[law] / before[law]
+    return found
+
+
+def _as_it_is(robot: Robot, here: EffectAt) -> EffectHypothesis:
+    """An effect that the robot has, with its shapes."""
+    parameters = here.effect.parameters_at(robot, here.owner)
+    shapes = {p.name: robot.parameter(here.parameter(p.name)).value for p in parameters if p.is_shape}
+    return EffectHypothesis(here, tuple(p for p in parameters if not p.is_shape), shapes)
