@@ -47,9 +47,12 @@ def settled_from(problem: BagProblem) -> float:
 def are_judged(problem: BagProblem, start: NDArray[np.intp], horizon: float) -> NDArray[np.bool_]:
     """Whether predictions from these ticks are the model's own: nothing left out in them, nor just before, shape (s,).
 
-    Where a stretch that is left out ends, the filter knows no more than at a start in motion.
+    Where a stretch that is left out ends, the filter knows no more than at a start in motion. Where a motor stands
+    whose friction is stiff, no equation holds its speed: what its encoder alone tells of it is no model's.
     """
-    return problem.recording.are_judged(problem.timeline.ticks[start] + horizon, horizon + SETTLING)
+    judged = problem.recording.are_judged(problem.timeline.ticks[start] + horizon, horizon + SETTLING)
+    told = judged & ~problem.motor_stands(start)
+    return told if np.any(told) else judged
 
 
 def channel_floors(problem: BagProblem, x: Array, calibration: Calibration, horizon: float) -> dict[str, float]:

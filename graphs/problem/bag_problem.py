@@ -125,6 +125,13 @@ class BagProblem:
         """The same piece of the same recording, of which something else is left out."""
         return replace(BagProblem.of(self.robot, recording), owner=self.owner).with_noise(self.dynamics.steps.noise)
 
+    def motor_stands(self, ticks: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether a motor stands whose friction is stiff (see `holding_motors`), at each of these ticks, shape (s,)."""
+        slides = self.dynamics.steps.at_ticks
+        if slides is None:
+            return np.zeros(len(ticks), bool)
+        return np.asarray(np.any(slides[ticks] < 1.0, axis=1))
+
     @property
     def as_predicted(self) -> BagProblem:
         """The same problem with the noise that predictions have: about a motor that sticks nothing is open."""
