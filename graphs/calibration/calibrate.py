@@ -25,12 +25,17 @@ from jointscope.graphs.calibration.encoder_filters import (
 )
 from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
-from jointscope.graphs.calibration.friction_at_standstill import asked_at_standstill, sticking_joints
+from jointscope.graphs.calibration.friction_at_standstill import (
+    asked_at_standstill,
+    noise_with_standstills,
+    sticking_joints,
+    with_standstills,
+)
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
-from jointscope.graphs.noise.lasting_noise import states_in, without_lasting
-from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, not_below, scaled
+from jointscope.graphs.noise.lasting_noise import without_lasting
+from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
@@ -69,7 +74,6 @@ TOLD_OF_WHITE = (
     "changed",
     "inertia_shifts",
 )  # what torques that last would hide
-STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
 
 @in_solver_context
@@ -184,9 +188,10 @@ def _calibrated(
         result = replace(result, regressed=regressed, findings=said)
     if any(recording.sticking for recording in told):
         if near is not None and robot.noise.estimate:  # the noise at hand is that of another model
-            noise = _noise_with_standstills(recordings, solved, noise)
-        factors = _standing(solved.problems[0].dynamics.steps.noise, noise, result.noise.n_lasting)
-        result = replace(result, robot=replace(result.robot, noise=scaled(result.noise, factors)))
+            noise = noise_with_standstills(recordings, solved, noise)
+        moving = solved.problems[0].dynamics.steps.noise
+        noise = with_standstills(result.noise, moving, noise)
+        result = replace(result, robot=replace(result.robot, noise=noise))
     return result
 
 
@@ -281,31 +286,6 @@ def _windows_stage(
         noise, estimate = estimate_noise(windows, estimate, hold=hold, progress=_part(progress, 0.3, 1.0))
     found = estimate.calibrations[0]
     return noise, [bag.with_points(found.common) for bag in bags]
-
-
-def _noise_with_standstills(recordings: Sequence[Recording], solved: Solved, begin: ProcessNoise) -> ProcessNoise:
-    """What windows ask for, with what joints do where they stand, at values that are known.
-
-    Args:
-        recordings: all of them.
-        solved: values and states near those of the windows.
-        begin: noise with which the estimation begins.
-    """
-    found, problems = solved.solution.estimate, solved.problems
-    pieces = windows_of(recordings)
-    calibrations = tuple(found.calibrations[i] for i, _ in pieces)
-    windows = anchored([BagProblem.of(problems[0].robot, piece) for _, piece in pieces], calibrations)
-    windows = [window.with_noise(begin) for window in windows]
-    whole = [(problems[i], found.states[i]) for i, _ in pieces]
-    states = tuple(states_in(window, *of) for window, of in zip(windows, whole, strict=True))
-    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in problems[0].robot.gyros))
-    return estimate_noise(windows, Estimate(states, calibrations), hold=hold)[0]
-
-
-def _standing(moving: ProcessNoise, all_of_it: ProcessNoise, lasting: int) -> Array:
-    """Factors on densities for a filter that goes through standstills, too, where these ask for far more."""
-    more = densities(all_of_it) / densities(moving)
-    return np.concatenate([np.where(more > STANDING, more, 1.0), np.ones(lasting)])
 
 
 def _loose(noise: ProcessNoise) -> ProcessNoise:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_summary import Solved
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.calibration.whole_stage import (
@@ -27,16 +27,19 @@ from jointscope.graphs.calibration.whole_stage import (
     WholeStage,
     anchored,
 )
-from jointscope.graphs.noise.noise_estimation import densities, scaled
+from jointscope.graphs.noise.lasting_noise import states_in
+from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import SATURATED, asked_joints, holding_sharpness, slowest_seen
+from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
-from jointscope.robots.recordings.recording import Notice
+from jointscope.robots.recordings.recording import Notice, Recording
 
 SEEN = 1.0  # of a law tanh(x), the x of the slowest speed that the encoder tells from none
+STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 CONTRADICTS = 2.0  # times the noise that motion alone asks for, where standstill contradicts the law
 
 
@@ -141,3 +144,35 @@ def _held_as_a_sign(
     known = [c.carried_to(Calibration.of(sharp)) for c in estimate.calibrations[:motions]]
     start = stage.with_sets(Estimate(estimate.states[:motions], tuple(known)))
     return stage.finished(anchored([problem.of_robot(sharp) for problem in problems], known), noise, start)
+
+
+def noise_with_standstills(recordings: Sequence[Recording], solved: Solved, begin: ProcessNoise) -> ProcessNoise:
+    """What windows ask for, with what joints do where they stand, at values that are known.
+
+    Args:
+        recordings: all of them.
+        solved: values and states near those of the windows.
+        begin: noise with which the estimation begins.
+    """
+    found, problems = solved.solution.estimate, solved.problems
+    pieces = windows_of(recordings)
+    calibrations = tuple(found.calibrations[i] for i, _ in pieces)
+    windows = anchored([BagProblem.of(problems[0].robot, piece) for _, piece in pieces], calibrations)
+    windows = [window.with_noise(begin) for window in windows]
+    whole = [(problems[i], found.states[i]) for i, _ in pieces]
+    states = tuple(states_in(window, *of) for window, of in zip(windows, whole, strict=True))
+    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in problems[0].robot.gyros))
+    return estimate_noise(windows, Estimate(states, calibrations), hold=hold)[0]
+
+
+def with_standstills(noise: ProcessNoise, moving: ProcessNoise, all_of_it: ProcessNoise) -> ProcessNoise:
+    """Noise of a filter that goes through standstills, too, where these ask for far more than motion does.
+
+    Args:
+        noise: what was found.
+        moving: the same without what lasts, as motion asks for it.
+        all_of_it: what motion and standstills ask for.
+    """
+    more = densities(all_of_it) / densities(moving)
+    factors = np.where(more > STANDING, more, 1.0)
+    return scaled(noise, np.concatenate([factors, np.ones(noise.n_lasting)]))

@@ -128,7 +128,7 @@ def what_came_in(candidate: Candidate, robot: Robot, before: float, after: float
     if after < before:
         return f"{what}: the training error falls from {before:.3g} to {after:.3g} sigma.{why}"
     return (
-        f"{what}: less torque is missing on blocks left out, although the training error goes from {before:.3g} to "
+        f"{what}: less torque is missing on blocks left out, although the training error rises from {before:.3g} to "
         f"{after:.3g} sigma: something else is missing, too.{why}"
     )
 
