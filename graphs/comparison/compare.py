@@ -7,7 +7,7 @@ model's own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -79,7 +79,21 @@ def compared(
         if progress:
             progress(f"comparing {label}", i / len(robots))
         models.append(one(label, robot, recording))
-    return ComparisonResult(recording, tuple(models))
+    return ComparisonResult(recording, _with_one_floor(models))
+
+
+def _with_one_floor(models: Sequence[ModelComparison]) -> tuple[ModelComparison, ...]:
+    """The models with the floor of the best: random torques are the machine's, whichever model looks at it.
+
+    What a worse one calls noise is in part what it lacks; beside its own floor it would look as good as the best.
+    Models that predict other channels keep their own.
+    """
+    best = min(models, key=lambda model: model.error)
+    same = [model.floors.keys() == best.floors.keys() for model in models]
+    return tuple(
+        replace(model, floor=best.floor, floors=best.floors) if shared else model
+        for model, shared in zip(models, same, strict=True)
+    )
 
 
 def compare_model(label: str, robot: Robot, recording: Recording) -> ModelComparison:

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from jointscope.graphs.comparison.compare import compare_model, smooth
+from jointscope.graphs.comparison.compare import compare_model, compared, smooth
+from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.noise.lasting_noise import separate_noise
 from jointscope.graphs.noise.linear_smoother import LinearSmoother
 from jointscope.graphs.noise.noise_estimation import densities, scaled
@@ -51,6 +52,18 @@ def test_white_densities_never_exceed_the_models_own_and_known_values_smooth_as_
     assert np.all(densities(separate.white) <= densities(own) * (1.0 + 1e-12))
     again = LinearSmoother.of(problem, x, calibration).smooth(own, {}).x
     np.testing.assert_allclose(again, x, atol=1e-5)
+
+
+def test_a_worse_model_stands_beside_the_floor_of_the_best_and_not_beside_its_own():
+    def one(label, robot, recording):
+        error, floor, names = robot
+        return ModelComparison(label, None, error, floor, {}, (), {}, dict.fromkeys(names, floor))
+
+    models = {"useless": (50.0, 49.9, "ab"), "exact": (1.03, 1.0, "ab"), "of other channels": (7.0, 2.0, "bc")}
+    found = compared(models, None, one, None).models
+    assert [model.floor for model in found] == [1.0, 1.0, 2.0]
+    assert [model.error for model in found] == [50.0, 1.03, 7.0]
+    assert found[0].floors == {"a": 1.0, "b": 1.0}
 
 
 def test_torques_that_last_are_scaled_and_memories_of_effects_are_not():
