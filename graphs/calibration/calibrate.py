@@ -42,6 +42,7 @@ from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.scoring.unsteady_gains import explain_more, unsteady_gains
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -208,7 +209,7 @@ def _asked_for_causes(
 def _asked_by_regression(
     result: CalibrationResult, test: ScoreTest, recordings: Sequence[Recording]
 ) -> CalibrationResult:
-    """With what regression says of each rigid joint: a load that changes, effects, friction by torque; the first."""
+    """With what regression says of each rigid joint: a load, a gain, or friction that changes, or effects."""
     if result.saturated:
         return result
     # noise of encoders as it was before a model that lacks something took a part of it
@@ -218,7 +219,9 @@ def _asked_by_regression(
         return result
     if changed := changed_load(rows, [recording.path for recording in recordings]):
         return replace(result, changed=changed)
-    causes = confirmed(regressed_causes(rows), test)
+    causes, gains = confirmed(regressed_causes(rows), test), unsteady_gains(rows)
+    if explain_more(gains, causes):
+        return replace(result, gains=gains)
     return replace(result, causes=causes, load_frictions=() if causes else load_frictions(rows))
 
 

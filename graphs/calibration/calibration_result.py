@@ -17,6 +17,7 @@ from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.load_friction import LoadFriction
 from jointscope.graphs.scoring.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.unsteady_gains import UnsteadyGain
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
@@ -177,6 +178,7 @@ class CalibrationResult:
         lacking: effects of the catalogue that the recordings ask for, surest first.
         causes: effects that regression names, joint by joint, and the calibration asks for, too.
         changed: when the robot takes up or sets down a load; None where nothing tells of it.
+        gains: drives whose constant falls with speed, command or time, which no effect of the catalogue knows.
         load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
@@ -209,6 +211,7 @@ class CalibrationResult:
     lacking: tuple[LackingEffect, ...] = ()
     causes: tuple[RegressedCause, ...] = ()
     changed: ChangedLoad | None = None
+    gains: tuple[UnsteadyGain, ...] = ()
     load_frictions: tuple[LoadFriction, ...] = ()
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
@@ -226,7 +229,7 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        named = bool(self.causes or self.load_frictions) or self.changed is not None
+        named = bool(self.causes or self.gains or self.load_frictions) or self.changed is not None
         return late or heavy or named or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:

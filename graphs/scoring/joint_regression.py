@@ -189,6 +189,17 @@ def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | No
     return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
 
 
+def with_sigma(
+    robot: Robot, joint: int, rows: Array, blocks: NDArray[np.intp], fewest: int
+) -> tuple[Fit, float] | None:
+    """The regression and the sigma of its last column's factor, from blocks left out in turn; None with too few."""
+    names = np.unique(blocks)
+    if len(names) < fewest:
+        return None
+    others = np.array([fit(robot, joint, rows[blocks != name]).more[-1] for name in names])
+    return fit(robot, joint, rows), float(np.sqrt((len(names) - 1.0) * np.var(others)))
+
+
 def changes_between(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:
     """By which factor each value changes from one regression to another, if it is no other joint's, by name."""
     before, after, found = plain.laws(), best.laws(), dict[str, float]()
