@@ -9,6 +9,7 @@ import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 
 RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, and what it did between them is not known
@@ -65,4 +66,4 @@ def _two_loads(result: CalibrationResult) -> str:
 
 
 def _bags(result: CalibrationResult) -> str:
-    return " ".join(shlex.quote(bag.recording.path) for bag in result.bags)
+    return recording_arguments([bag.recording for bag in result.bags])

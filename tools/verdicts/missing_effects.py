@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
@@ -13,6 +12,7 @@ from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.graphs.scoring.unsteady_gains import COMMAND, COMMANDS, SPEED, SPEEDS, TIME, UnsteadyGain
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.one_step import would_be
@@ -143,9 +143,11 @@ def _next(result: CalibrationResult, effect: LackingEffect) -> str:
 
 def _discover(result: CalibrationResult) -> str:
     """The command that looks for effects, with a part of one recording, or the last of several, held out."""
-    start, bags = result.start, [shlex.quote(bag.recording.path) for bag in result.bags] or ["BAG"]
-    *learnt, last = bags
-    held = f"{' '.join(learnt)} --holdout {last}" if learnt else f"{last} --holdout-share 0.33"
+    start, recordings = result.start, [bag.recording for bag in result.bags]
+    if len(recordings) > 1:
+        held = f"{recording_arguments(recordings[:-1])} --holdout {recording_arguments(recordings[-1:])}"
+    else:
+        held = f"{recording_arguments(recordings)} --holdout-share 0.33"
     return f"jointscope discover {robot_argument(start)} {held} -o {edited_argument(start, 'better')}"
 
 
