@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simulated_arm import SHARP, Arm, moved, robot_file
+from simulated_arm import SHARP, Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import regressed_causes
+from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -49,6 +50,14 @@ def dead_band(_, u, __, ___):
     return np.sign(u) * np.maximum(np.abs(u) - np.array([0.0, 0.25, 0.0]), 0.0)
 
 
+def drag(_, u, __, data):
+    return u - np.array([0.0, 0.3, 0.0]) * data.qvel * np.abs(data.qvel)
+
+
+def more_at_rest(_, u, __, data):
+    return u - np.array([0.0, 0.8, 0.0]) * np.exp(-((data.qvel / 0.3) ** 2)) * np.tanh(SHARP * data.qvel)
+
+
 def growing(share):
     def drive(_, u, __, data):
         return u - share * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
@@ -80,12 +89,23 @@ def test_nothing_is_named_where_nothing_is_missing(robot, how):
         (offset, "torque_offset@j1", "asymmetric_friction"),
         (unlike_both_ways, "asymmetric_friction@j0", "torque_offset"),
         (dead_band, "pwm_deadband@j1", "truncated_command"),
+        (drag, "quadratic_damping@j1", ""),
+        (more_at_rest, "motor_stribeck@j1", ""),
     ],
 )
 def test_what_one_joint_lacks_has_its_name_at_that_joint(robot, drive, label, look_alike):
     (cause,) = regressed_causes(joint_rows(robot, [recording(drive=drive)]))
     assert cause.label == label and set(cause.alike) <= {look_alike}
     assert cause.explained > 0.8 and cause.size > 0.01
+
+
+def test_drag_that_is_named_is_found_with_its_size_and_all_else_is_right(robot):
+    with_it = add_effects(robot, ["quadratic_damping@j1"]).robot
+    result = calibrate(with_it, [recording(drive=drag)])
+    assert_right(ARM, result.parameters, rel=0.01)
+    table = {p.name: p.value for p in result.parameters}
+    assert table["j1.quadratic_damping.coefficient"] == pytest.approx(0.3, rel=0.02)
+    assert result.causes == () and result.gains == ()
 
 
 def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_need_it(robot):
