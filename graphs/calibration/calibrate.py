@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
+from jointscope.graphs.calibration.asked_by_regression import asked_by_regression
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import Solved, summarize
 from jointscope.graphs.calibration.encoder_filters import (
@@ -35,14 +36,9 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
-from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.drive_timing import drive_timing
-from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
-from jointscope.graphs.scoring.load_friction import load_frictions
-from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.unsteady_gains import explain_more, unsteady_gains
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -203,26 +199,7 @@ def _asked_for_causes(
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
     result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
-    return _asked_by_regression(result, test, recordings) if stage else result
-
-
-def _asked_by_regression(
-    result: CalibrationResult, test: ScoreTest, recordings: Sequence[Recording]
-) -> CalibrationResult:
-    """With what regression says of each rigid joint: a load, a gain, or friction that changes, or effects."""
-    if result.saturated:
-        return result
-    # noise of encoders as it was before a model that lacks something took a part of it
-    robot = replace(result.robot, sensors=result.start.sensors)
-    rows = joint_rows(robot, recordings)
-    if rows is None:
-        return result
-    if changed := changed_load(rows, [recording.path for recording in recordings]):
-        return replace(result, changed=changed)
-    causes, gains = confirmed(regressed_causes(rows), test), unsteady_gains(rows)
-    if explain_more(gains, causes):
-        return replace(result, gains=gains)
-    return replace(result, causes=causes, load_frictions=() if causes else load_frictions(rows))
+    return asked_by_regression(result, test, recordings) if stage else result
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

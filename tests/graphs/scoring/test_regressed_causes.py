@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, assert_right, moved, robot_file
@@ -14,6 +16,7 @@ from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import regressed_causes
 from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.recordings.recording import Recording
 
 ARM = Arm()
@@ -130,5 +133,33 @@ def test_friction_that_grows_with_torque_is_told_with_its_share(robot):
 
 def test_a_load_that_is_taken_up_is_told_with_its_time(robot):
     found = changed_load(joint_rows(robot, [recording(drive=taken_up_at(4.3, 0.6))]), ["here"])
-    assert found.time == pytest.approx(4.3, abs=0.15)
+    assert found.start == pytest.approx(4.3, abs=0.05) and found.stop == found.end and found.push == 0.0
     assert found.size > 0.02
+
+
+def test_a_load_that_is_taken_up_and_set_down_is_told_with_both_times(robot):
+    def carried(t, u, model, _):
+        model.body_mass[-1] = 3.0 * 0.6**2 + (0.6 if 3.1 <= t < 6.7 else 0.0)
+        return u
+
+    found = changed_load(joint_rows(robot, [recording(drive=carried)]), ["here"])
+    assert (found.start, found.stop) == pytest.approx((3.1, 6.7), abs=0.05) and found.push == 0.0
+
+
+@pytest.mark.parametrize(
+    ("push", "torque"), [((4.0, 4.8, 1, 6.0), 6.0), ((5.5, 99.0, 0, -4.0), -4.0), ((-1.0, 3.3, 2, 1.5), 1.5)]
+)
+def test_what_pushes_from_outside_is_no_load_and_is_told_with_its_torque(robot, push, torque):
+    found = changed_load(joint_rows(robot, [recording(push=push)]), ["here"])
+    assert found.joint == f"j{push[2]}" and found.push == pytest.approx(torque, rel=0.05)
+    ends = max(push[0], 0.0), min(push[1], found.end)
+    assert (found.start, found.stop) == pytest.approx(ends, abs=0.05)
+
+
+def test_a_target_that_is_seen_late_does_not_hide_what_drives_carry(robot):
+    encoder = robot.motor_encoder
+    target = PositionTarget(
+        "marker", replace(encoder.source, names=()), "of_j2", np.zeros(3), None, np.eye(4), "marker", 1e-3
+    )
+    with_it = add_effects(robot.with_sensors({**robot.sensors, "marker": target}), ["encoder_delay@marker"]).robot
+    assert changed_load(joint_rows(with_it, [recording(drive=taken_up_at(4.3, 0.6))]), ["here"]) is not None
