@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
-from jointscope.graphs.calibration.asked_by_regression import asked_by_regression
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import Solved, summarize
 from jointscope.graphs.calibration.encoder_filters import (
@@ -36,6 +35,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.scoring.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.score_test import ScoreTest
@@ -199,7 +199,11 @@ def _asked_for_causes(
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
     result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
-    return asked_by_regression(result, test, recordings) if stage else result
+    if stage is None or result.saturated:
+        return result
+    return replace(
+        result, asked=asked_by_regression(replace(result.robot, sensors=result.start.sensors), recordings, test)
+    )
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

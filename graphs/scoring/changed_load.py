@@ -203,11 +203,12 @@ class _Search:
 
     def _inside_and_beside(self, joint: int, stretch: _Stretch) -> tuple[int, int]:
         """Windows of a joint that are for the most part in a stretch, and those that are not."""
-        flags = []
+        flags = list[list[Array]]()
         for i in range(len(self._columns[joint])):
             times = self._rows.times(i)
-            flags.append([1.0 * ((times >= stretch.start) & (times < stretch.stop) & (i == stretch.recording))])
+            inside = (times >= stretch.start) & (times < stretch.stop) & (i == stretch.recording)
+            flags.append([np.where(inside, 1.0, 0.0)])
         found = self._rows.beside(joint, self._width[joint], flags)
         assert found is not None
-        inside = int(np.count_nonzero(found[0][:, -1] > 0.5))
-        return inside, len(found[0]) - inside
+        count = int(np.count_nonzero(found[0][:, -1] > 0.5))
+        return count, len(found[0]) - count

@@ -22,7 +22,7 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
     found = []
     if result.saturated:
         found.append(("Drives that give what is commanded", result.saturated))
-    if (changed := result.changed) is not None:
+    if (changed := result.asked.changed) is not None:
         name, sentence = ("Nothing pushes", _push) if changed.push else ("One load throughout", _two_loads)
         found.append((name, sentence(changed, result)))
     if rare := rare_samples(result):

@@ -40,11 +40,11 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Without masses this cannot be checked."
     if given(result):
         return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
-    if result.causes:
+    if result.asked.causes:
         return _named(result)
-    if result.gains:
+    if result.asked.gains:
         return "bad", _falling_gains(result)
-    if result.load_frictions:
+    if result.asked.load_frictions:
         return "bad", _growing_friction(result)
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
@@ -64,7 +64,7 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
 
 def _named(result: CalibrationResult) -> tuple[str, str]:
     """Effects that regression names and the calibration asks for: they are what is missing, or look like it."""
-    causes, catalogued = result.causes, catalogue()
+    causes, catalogued = result.asked.causes, catalogue()
     by_effect: dict[str, list[RegressedCause]] = {}
     for cause in causes:
         by_effect.setdefault(cause.effect, []).append(cause)
@@ -83,7 +83,7 @@ def _named(result: CalibrationResult) -> tuple[str, str]:
 
 def _falling_gains(result: CalibrationResult) -> str:
     """Gains that fall, which no effect of the catalogue knows: what it does to the values, and what is left to do."""
-    told = result.gains
+    told = result.asked.gains
     listed = ", ".join(
         f"{one.joint} ({significant(100.0 * one.lost, 2)} ± {significant(100.0 * one.sigma, 1)} % at the most)"
         for one in told
@@ -107,7 +107,7 @@ def _factors(result: CalibrationResult, told: Sequence[UnsteadyGain] | Sequence[
 
 def _growing_friction(result: CalibrationResult) -> str:
     """Friction that no effect of rigid joints knows: what it does to the values, and what is left to do."""
-    told = result.load_frictions
+    told = result.asked.load_frictions
     shares = [(one.joint, significant(100.0 * one.share, 2), significant(100.0 * one.sigma, 1)) for one in told]
     listed = ", ".join(f"{joint} ({share} ± {sigma} % of it)" for joint, share, sigma in shares)
     return (

@@ -68,7 +68,7 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    named = result.causes or given(result)  # to one linear step these look like masses
+    named = result.asked.causes or given(result)  # to one linear step these look like masses
     for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:

@@ -108,7 +108,7 @@ def test_drag_that_is_named_is_found_with_its_size_and_all_else_is_right(robot):
     assert_right(ARM, result.parameters, rel=0.01)
     table = {p.name: p.value for p in result.parameters}
     assert table["j1.quadratic_damping.coefficient"] == pytest.approx(0.3, rel=0.02)
-    assert result.causes == () and result.gains == ()
+    assert result.asked.causes == () and result.asked.gains == ()
 
 
 def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_need_it(robot):
@@ -116,7 +116,7 @@ def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_
     rows = joint_rows(robot, [coarse])
     assert regressed_causes(rows), "joints turn over within a count, which looks like Stribeck friction"
     result = calibrate(robot, [coarse])
-    assert result.causes == () and result.changed is None and result.load_frictions == ()
+    assert result.asked.causes == () and result.asked.changed is None and result.asked.load_frictions == ()
 
 
 def test_cables_are_springs_at_all_joints(robot):
