@@ -37,6 +37,7 @@ OF_SLIDES: dict[str, str] = {
     "N m/rad": "N/m",
     "N m/rad^3": "N/m^3",
     "N m s/rad": "N s/m",
+    "N m s^2/rad^2": "N s^2/m^2",
     "kg m2": "kg",
     "s/rad": "s/m",
 }

@@ -40,12 +40,9 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
-from jointscope.graphs.scoring.changed_load import changed_load
+from jointscope.graphs.scoring.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.drive_timing import drive_timing
-from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
-from jointscope.graphs.scoring.load_friction import load_frictions
-from jointscope.graphs.scoring.regressed_causes import confirmed, regressed_causes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
@@ -70,9 +67,8 @@ TOLD_OF_WHITE = (
     "timing",
     "masses",
     "lacking",
-    "causes",
-    "changed",
     "inertia_shifts",
+    "asked",
 )  # what torques that last would hide
 
 
@@ -209,24 +205,11 @@ def _asked_for_causes(
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
     result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
-    return _asked_by_regression(result, test, recordings) if stage else result
-
-
-def _asked_by_regression(
-    result: CalibrationResult, test: ScoreTest, recordings: Sequence[Recording]
-) -> CalibrationResult:
-    """With what regression says of each rigid joint: a load that changes, effects, friction by torque; the first."""
-    if result.saturated:
+    if stage is None or result.saturated:
         return result
-    # noise of encoders as it was before a model that lacks something took a part of it
-    robot = replace(result.robot, sensors=result.start.sensors)
-    rows = joint_rows(robot, recordings)
-    if rows is None:
-        return result
-    if changed := changed_load(rows, [recording.path for recording in recordings]):
-        return replace(result, changed=changed)
-    causes = confirmed(regressed_causes(rows), test)
-    return replace(result, causes=causes, load_frictions=() if causes else load_frictions(rows))
+    return replace(
+        result, asked=asked_by_regression(replace(result.robot, sensors=result.start.sensors), recordings, test)
+    )
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

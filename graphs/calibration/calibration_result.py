@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
-from jointscope.graphs.scoring.changed_load import ChangedLoad
+from jointscope.graphs.scoring.asked_by_regression import Asked
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
-from jointscope.graphs.scoring.load_friction import LoadFriction
-from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
@@ -175,9 +173,7 @@ class CalibrationResult:
         masses: what the recordings say about the mass of each link, surest first.
         timing: what the recordings say about a delay of the drive signal that the model lacks; None where nothing does.
         lacking: effects of the catalogue that the recordings ask for, surest first.
-        causes: effects that regression names, joint by joint, and the calibration asks for, too.
-        changed: when the robot takes up or sets down a load; None where nothing tells of it.
-        load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
+        asked: what a regression of each joint alone says.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
@@ -207,9 +203,7 @@ class CalibrationResult:
     timing: DriveTiming | None = None
     masses: tuple[WrongMass, ...] = ()
     lacking: tuple[LackingEffect, ...] = ()
-    causes: tuple[RegressedCause, ...] = ()
-    changed: ChangedLoad | None = None
-    load_frictions: tuple[LoadFriction, ...] = ()
+    asked: Asked = field(default_factory=Asked)
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
@@ -226,7 +220,7 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        named = bool(self.causes or self.load_frictions) or self.changed is not None
+        named = self.asked != Asked()
         return late or heavy or named or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import SolveError
-from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 
@@ -33,13 +33,12 @@ def next_commands(message: str, robot: Robot, recordings: Sequence[Recording]) -
     """A failure with the commands that look for its reason, unless it names one already."""
     if "jointscope " in message or not recordings:
         return message
-    name, bag = robot_argument(robot), shlex.quote(recordings[0].path)
+    name, bag = robot_argument(robot), bag_arguments([recordings[0].path])
     text = f"{message}; `jointscope info {bag} --robot {name}` says whether they fit each other"
     if robot.effects:
         last, output = shlex.quote(robot.effects[-1].label), edited_argument(robot, "without")
         return f"{text}, `jointscope remove {name} {last} -o {output}` takes out the effect that was added last"
-    urdf, output = shlex.quote(str(robot.tree.urdf)), edited_argument(robot, "anew")
-    return f"{text}, `jointscope init {urdf} {bag} -o {output}` finds start values"
+    return f"{text}, `{init_command(robot, recordings[0].path, 'anew')}` finds start values"
 
 
 def names_notices(

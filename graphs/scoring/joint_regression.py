@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,14 +51,13 @@ def _applies(robot: Robot) -> bool:
     """Whether all joints are rigid, with known masses, and with effects that columns tell."""
     if robot.layout.motors or robot.choices.link_dynamics != "model" or robot.transmission is not None:
         return False
-    return all(has_columns(here.effect) for here in robot.effects if here.label != DELAY)
+    return all(has_columns(here.effect) for here in of_drives(robot) if here.label != DELAY)
 
 
-class Since(NamedTuple):
-    """From when on something acts: a time [s] in one of the recordings."""
-
-    recording: int
-    time: float
+def of_drives(robot: Robot) -> list[EffectAt]:
+    """Effects that reach the motion of motors, or what is measured of it: not those of other sensors."""
+    others = [name for name in robot.sensors if name != robot.motor_encoder.name]
+    return [here for here in robot.effects if here.owner not in others]
 
 
 class JointRows:
@@ -74,15 +72,13 @@ class JointRows:
         self.robot, sigmas = robot, robot.motor_encoder.sigmas
         delay = robot.parameter(DELAY_NAME).value if any(h.label == DELAY for h in robot.effects) else 0.0
         driven = driven_joints(robot, recordings, delay)
-        more = [h for h in robot.effects if h.label != DELAY and h.effect.id not in (PLAIN, LIMIT)]
+        more = [h for h in of_drives(robot) if h.label != DELAY and h.effect.id not in (PLAIN, LIMIT)]
         self._own = [_as_it_is(robot, here) for here in more]
         cells = [motion_cells(d.encoder, d.command, sigmas, robot.command_held, d.left_out) for d in driven]
         self._plain = [joint_signals(c, load_of(robot.tree, c), robot.friction_sharpness()) for c in cells]
         self._columns = [TorqueColumns(robot, c) for c in cells]
 
-    def of(
-        self, joint: int, width: float, hypothesis: EffectHypothesis | None = None, since: Since | None = None
-    ) -> Array | None:
+    def of(self, joint: int, width: float, hypothesis: EffectHypothesis | None = None) -> Array | None:
         """Signals, columns of the robot's own effects and of another one under all windows, shape (w, 5 + e + k).
 
         None where the other one does not act, or there are too few windows.
@@ -91,20 +87,34 @@ class JointRows:
             joint: index.
             width: of the windows [s].
             hypothesis: the other effect.
-            since: from when on it acts; always where None.
         """
-        added = []
-        for i, columns in enumerate(self._columns):
-            own = [column for here in self._own for column in columns.of(here, joint) or ()]
-            more = [] if hypothesis is None else columns.of(hypothesis, joint)
-            if more is None:
-                return None
-            if since is not None:
-                acts = (columns.cells.times >= since.time) & (i == since.recording)
-                more = [column * acts for column in more]
-            added.append([*own, *more])
-        found = self.beside(joint, width, added)
+        more = [[] for _ in self._columns] if hypothesis is None else self.columns(joint, hypothesis)
+        found = None if more is None else self.beside(joint, width, self.with_own(joint, more))
         return None if found is None else found[0]
+
+    def columns(self, joint: int, hypothesis: EffectHypothesis) -> list[list[Array]] | None:
+        """What an effect adds to a joint in each recording, shape (m,) each; None where it does not act there."""
+        found = [columns.of(hypothesis, joint) for columns in self._columns]
+        return None if any(some is None for some in found) else [some or [] for some in found]
+
+    def constant(self) -> list[list[Array]]:
+        """What a torque adds that stays, in each recording, shape (m,)."""
+        return [[np.ones(len(columns.cells.times))] for columns in self._columns]
+
+    def with_own(self, joint: int, more: Sequence[Sequence[Array]]) -> list[list[Array]]:
+        """Columns of each recording behind those of the effects that the robot has."""
+        pairs = zip(self._columns, more, strict=True)
+        return [
+            [*(own for here in self._own for own in columns.of(here, joint) or ()), *some] for columns, some in pairs
+        ]
+
+    def own_count(self, joint: int) -> int:
+        """How many columns the effects have that the robot has."""
+        return len(self.with_own(joint, [[] for _ in self._columns])[0])
+
+    def times(self, recording: int) -> Array:
+        """Middles of the cells of a recording, shape (m,) [s]."""
+        return self._columns[recording].cells.times
 
     def beside(
         self, joint: int, width: float, columns: Sequence[Sequence[Array]]
@@ -187,6 +197,17 @@ def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | No
     values = dict(zip(free, found.tolist(), strict=False))
     sizes = 0 if hypothesis is None else len(hypothesis.sizes)
     return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
+
+
+def with_sigma(
+    robot: Robot, joint: int, rows: Array, blocks: NDArray[np.intp], fewest: int
+) -> tuple[Fit, float] | None:
+    """The regression and the sigma of its last column's factor, from blocks left out in turn; None with too few."""
+    names = np.unique(blocks)
+    if len(names) < fewest:
+        return None
+    others = np.array([fit(robot, joint, rows[blocks != name]).more[-1] for name in names])
+    return fit(robot, joint, rows), float(np.sqrt((len(names) - 1.0) * np.var(others)))
 
 
 def changes_between(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:

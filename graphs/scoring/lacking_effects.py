@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypot
 from jointscope.graphs.scoring.hypothesis_score import HypothesisStep, best_shapes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.model.robot import Robot
 
@@ -46,6 +47,7 @@ class LackingEffect:
         worth: score less what its sizes cost.
         with_it: each parameter with the effect beside it, in the parameter's unit.
         tried: whether the values were found with the effect in the model, not by one linear step.
+        uncertain: standard deviation of what the effect changes of each, where one linear step tells it.
     """
 
     effect: str
@@ -54,6 +56,7 @@ class LackingEffect:
     worth: float
     with_it: dict[str, float]
     tried: bool = False
+    uncertain: dict[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -70,6 +73,7 @@ class LackingEffect:
         if self.p_value > BY_CHANCE:
             return {}
         told = {n: self.with_it[n] - v.value for n, v in found.items() if n in self.with_it and v.value}
+        told = {n: d for n, d in told.items() if abs(d) > SURE * self.uncertain.get(n, 0.0)}
         told = {n: d for n, d in told.items() if not n.endswith(".delay") and abs(d) > sigmas * found[n].sigma}
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
@@ -118,4 +122,7 @@ def _is_possible(step: HypothesisStep) -> bool:
 
 def _lacking(test: ScoreTest, step: HypothesisStep, tried: int, worth: float) -> LackingEffect:
     here = step.hypothesis.here
-    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), worth, test.values_with(step))
+    p_value, values, uncertain = min(tried * step.p_value, 1.0), test.values_with(step), test.change_sigmas(step)
+    if isinstance(here.effect, InertiaEffect):  # a link and its rotor share their inertia, and only the sum is told
+        values = {name: value for name, value in values.items() if not name.endswith(".inertia")}
+    return LackingEffect(here.effect.id, here.owner, p_value, worth, values, uncertain=uncertain)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit
+from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit, of_drives
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
@@ -54,7 +54,7 @@ def load_frictions(rows: JointRows) -> tuple[LoadFriction, ...]:
     """
     robot = rows.robot
     # what else a robot has is regressed on to first order only, which a few percent of a torque do not bear
-    if any(here.effect.id not in (PLAIN, LIMIT) and here.label != DELAY for here in robot.effects):
+    if any(here.effect.id not in (PLAIN, LIMIT) and here.label != DELAY for here in of_drives(robot)):
         return ()
     found = []
     for joint in range(robot.n):

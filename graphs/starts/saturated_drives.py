@@ -12,7 +12,7 @@ from jointscope.graphs.starts.command_limits import CommandLimit, limits_in, win
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
 from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_limit
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
@@ -103,7 +103,7 @@ def _without(robot: Robot, recordings: Sequence[Recording], told: dict[str, Unev
         whole += float(np.ptp(recording.command.times))
     if out > MOST_LEFT_OUT * whole or len(options) > MOST_STRETCHES:
         return ""
-    bags = " ".join(shlex.quote(recording.path) for recording in recordings)
+    bags = bag_arguments(recording.path for recording in recordings)
     output = edited_argument(robot, "unsaturated")
     return (
         f"`jointscope calibrate {robot_argument(robot)} {bags} -o {output} {' '.join(options)}` leaves these moments "

@@ -42,6 +42,7 @@ EFFECT = JointTorque(
             "hysteresis": "both act just after a reversal",
             "load_dependent_friction": "at a reversal speed is low and load is high at once",
             "motor_viscous": "within one range of speeds a falling curve is a negative viscous coefficient",
+            "quadratic_damping": "beside viscous friction both bend the curve of friction over speed",
             "pwm_deadband": "both take torque away where the command is small",
         },
     ),

@@ -33,6 +33,7 @@ EFFECT = JointTorque(
         excitation="fast motion in both directions at several speeds",
         look_alikes={
             "link_viscous": "with a stiff spring both sides move alike",
+            "quadratic_damping": "within a narrow range of speeds any drag looks alike",
             "motor_stribeck": "at speeds below the Stribeck velocity both change friction with speed",
         },
     ),

@@ -7,9 +7,11 @@ Advice is typed as it stands: a file that is read by a command and written by th
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.position_target import PositionTarget
 
 READY_ROOT = Path(__file__).parents[1] / "ready"
 
@@ -38,4 +40,52 @@ def edited_argument(robot: Robot, edit: str) -> str:
 
 def edited_path(path: Path, edit: str) -> str:
     """The same of the path of a robot file, or of a file that has not become a robot."""
-    return shlex.quote(str(path.with_name(f"{path.stem}_{edit}.yaml")))
+    return shlex.quote(str(edited_file(path, edit)))
+
+
+def edited_file(path: Path, edit: str) -> Path:
+    """The file that an edit makes of a robot file, beside it."""
+    return path.with_name(f"{path.stem}_{edit}.yaml")
+
+
+def bag_arguments(paths: Iterable[str | Path], otherwise: str = "") -> str:
+    """What a user types to name bags, in their order.
+
+    Args:
+        paths: of the bags.
+        otherwise: what stands for them where there are none.
+    """
+    return " ".join(shlex.quote(str(path)) for path in paths) or otherwise
+
+
+def init_command(robot: Robot, bag: str | Path, edit: str, joints: Sequence[str] = (), unit: str = "") -> str:
+    """What a user types to have a robot's file written anew, with all that he said of it when it was written.
+
+    Args:
+        robot: as it is.
+        bag: the recording.
+        edit: a word for what is done to it, see `edited_argument`.
+        joints: those to use, if others than now.
+        unit: of the command, if another one than now, in words of `jointscope init --unit`.
+    """
+    begin = f"jointscope init {bag_arguments([robot.tree.urdf, bag])}"
+    return " ".join([begin, *_as_said(robot, joints, unit), "-o", edited_argument(robot, edit)])
+
+
+def _as_said(robot: Robot, joints: Sequence[str], unit: str) -> list[str]:
+    """Options of `jointscope init` that say what the file of a robot says."""
+    called = dict(zip(robot.joints, robot.motor_encoder.source.names, strict=False))
+    used = [f"{joint}={called[joint]}" if called.get(joint, joint) != joint else joint for joint in joints]
+    if not joints and (robot.tree.other_joints or any(name != joint for joint, name in called.items())):
+        return _as_said(robot, robot.joints, unit)
+    options = ["--joints", ",".join(used)] if joints else []
+    if robot.name != robot.tree.urdf.stem:
+        options += ["--name", robot.name]
+    if robot.held_at_mean:
+        options += ["--lock", ",".join(robot.held_at_mean)]
+    if unit or robot.command.confirmed:
+        options += ["--unit", unit or robot.command.unit.replace(" ", "")]
+    targets = [sensor for sensor in robot.sensors.values() if isinstance(sensor, PositionTarget)]
+    for target in targets:
+        options += ["--target", f"{target.source.topic}={target.body}"]
+    return [shlex.quote(word) for word in options]

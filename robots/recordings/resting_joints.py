@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.command_words import edited_argument
+from jointscope.robots.model.command_words import init_command
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -60,7 +60,6 @@ def _locked(robot: Robot, recording: Recording, resting: Sequence[str]) -> str:
     encoder = robot.motor_encoder
     at = np.median(recording.streams[encoder.name].values, axis=0) - encoder.zero
     places = ", ".join(f"{joint}: {at[robot.joints.index(joint)]:.6g}" for joint in resting)
-    moving = ",".join(joint for joint in robot.joints if joint not in resting)
-    command = f"jointscope init {robot.tree.urdf} {recording.path} --joints {moving}"
-    output = edited_argument(robot, "locked")
-    return f"it where it stands, `locked: {{{places}}}` and out of `joints`: {command} -o {output}"
+    moving = [joint for joint in robot.joints if joint not in resting]
+    command = init_command(robot, recording.path, "locked", joints=moving)
+    return f"it where it stands, `locked: {{{places}}}` and out of `joints`: {command}"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.command_words import edited_argument
+from jointscope.robots.model.command_words import init_command
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.encoder_gyro_scale import check_scales
 from jointscope.robots.recordings.held_joints import about_bodies
@@ -211,8 +211,7 @@ def _one_joint_hint(robot: Robot, others: list[str]) -> str:
     return (
         "all other joints keep theirs: look whether its samples jump, whether it alone has another unit (`unit: "
         f"[{now}]` of sensors.{encoder.name} has one for each joint), or whether the URDF allows it too little; "
-        f"without it: jointscope init {robot.tree.urdf} BAG --joints {','.join(others)} "
-        f"-o {edited_argument(robot, 'without')}"
+        f"without it: {init_command(robot, 'BAG', 'without', joints=others)}"
     )
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.model.command_words import edited_argument
+from jointscope.robots.model.command_words import init_command
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor, si_unit
@@ -109,11 +109,10 @@ def unit_of_other(robot: Robot, joint: str) -> str:
 
 def _refuse(moving: dict[str, tuple[float, str]], robot: Robot, bag: str) -> None:
     said = ", ".join(f"{joint} moves by {span:.2g} {unit}" for joint, (span, unit) in moving.items())
-    joints = ",".join([*robot.joints, *moving])
+    command = init_command(robot, bag, "with_them", joints=[*robot.joints, *moving])
     raise RecordingError(
         f"{bag}: {said}, but the robot file has {'it' if len(moving) == 1 else 'them'} not in `joints`; expected the "
-        f"other joints to stand still: jointscope init {robot.tree.urdf} {bag} --joints {joints} "
-        f"-o {edited_argument(robot, 'with_them')}, or use a recording in which they are held"
+        f"other joints to stand still: {command}, or use a recording in which they are held"
     )
 
 

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.command_words import bag_arguments
 from jointscope.robots.recordings.recording import Recording
 
 FORM = "[BAG:]T0:T1"
@@ -48,6 +50,12 @@ def leave_out(recordings: Sequence[Recording], texts: Sequence[str]) -> list[Rec
 def left_out_arguments(recordings: Sequence[Recording]) -> list[str]:
     """What --leave-out has to be given to leave the same stretches out again."""
     return [f"{recording.path}:{t0:g}:{t1:g}" for recording in recordings for t0, t1 in recording.left_out]
+
+
+def recording_arguments(recordings: Sequence[Recording]) -> str:
+    """What a user types to name recordings, without the stretches that he left out of them."""
+    options = [f"--leave-out {shlex.quote(stretch)}" for stretch in left_out_arguments(recordings)]
+    return " ".join([bag_arguments((recording.path for recording in recordings), otherwise="BAG"), *options])
 
 
 def _parts(text: str) -> tuple[str, float, float]:

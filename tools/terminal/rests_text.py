@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import Counter
 from collections.abc import Mapping
 
@@ -11,7 +10,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult, 
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.robots.model.command_words import robot_argument
+from jointscope.robots.model.command_words import bag_arguments, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
@@ -113,7 +112,7 @@ def _misfit(result: RestCalibration) -> str:
 
 def _diagnosis(result: RestCalibration) -> str:
     """The command that looks for it."""
-    bags = " ".join(shlex.quote(problem.rests.path) for problem in result.problems)
+    bags = bag_arguments(problem.rests.path for problem in result.problems)
     return f"`jointscope diagnose {robot_argument(result.start)} --rests {bags}`"
 
 

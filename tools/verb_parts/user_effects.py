@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,11 @@ def add_effects_option(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="a physical effect of your own; may be repeated",
     )
+
+
+def effects_words(files: Sequence[Path]) -> list[str]:
+    """--effects as it was typed, for a command that is to be typed next."""
+    return [f"--effects {shlex.quote(str(file))}" for file in files]
 
 
 def load_user_effects(files: Sequence[Path]) -> None:

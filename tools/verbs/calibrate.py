@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.acceptance.evaluation import AcceptedBy
 from jointscope.tools.acceptance.limits import Limit
-from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
+from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out, recording_arguments
 from jointscope.tools.terminal.progress import Progress, progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
 from jointscope.tools.verb_parts.frequency_runs import (
@@ -24,7 +23,7 @@ from jointscope.tools.verb_parts.frequency_runs import (
 from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
-from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
+from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs
 
 if TYPE_CHECKING:
@@ -87,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
         inputs=[*args.bags, *args.poses, *args.rests, *args.frequency, *args.effects],
     )
     from jointscope.robots.files.robot_file import load_robot
+    from jointscope.robots.model.command_words import bag_arguments
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.notebook.calls import calibrate
     from jointscope.tools.terminal.calibration_text import calibration_text
@@ -122,8 +122,8 @@ def run(args: argparse.Namespace) -> int:
     print(calibration_text(result, judgement))
     files.tell()
     if judgement.level != "good":
-        bags = " ".join(shlex.quote(str(bag)) for bag in args.bags)
-        print(f"What it may lack: jointscope diagnose {shlex.quote(str(args.output))} {bags} --report diagnosis.html")
+        words = [bag_arguments([args.output]), recording_arguments(recordings), *effects_words(args.effects)]
+        print(f"What it may lack: jointscope diagnose {' '.join(words)} --report diagnosis.html")
     return print_acceptance(result.acceptance)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
     from jointscope.tools.init.robot_guess import RobotGuess
     from jointscope.tools.init.streams.named_signal import Wish
+    from jointscope.tools.init.streams.other_joints import Typed
 
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     if not description.usable:
         print(f"\nWrote {args.output}; the recording cannot be used with it: {description.problem}")
         return 0
-    _say_whether_usable(args, guess)
+    _say_whether_usable(args, guess, typed)
     calibrated = args.output.with_name(f"{args.output.stem}_calibrated.yaml")
     better = args.output.with_name(f"{args.output.stem}_better.yaml")
     print(f"Check the lines marked GUESS, then: jointscope calibrate {args.output} {args.bag} -o {calibrated}")
@@ -137,10 +138,13 @@ def _with_position_hints(guess: RobotGuess, robot: Robot, bag: Path, targets: Se
     return replace(guess, left_out=[*guess.left_out, *position_hints(list(position_topics(bag)), targets, links)])
 
 
-def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:
+def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Typed) -> None:
     """Whether the regression explains the recording; what to look at where it does not."""
-    from jointscope.robots.model.command_words import edited_path
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.robots.model.command_words import edited_file
+    from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
+    from jointscope.tools.init.what_is_missing import what_is_missing
 
     poor = [
         joint
@@ -148,17 +152,15 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess) -> None:
         if drive.explained < EXPLAINED or drive.is_impossible
     ]
     if poor and not guess.free_links:
+        robot = load_robot(args.output)
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
-            f"{', '.join(poor)} (table above): names, units, signs, gravity or masses are wrong there, or a spring is "
-            "missing; look at it first (a base that is not level: jointscope add "
-            f"{args.output} gravity_direction@robot "
-            f"-o {edited_path(args.output, 'gravity_direction')})"
+            f"{', '.join(poor)} (table above): {what_is_missing(robot, read_recording(args.bag, robot), poor)}"
         )
         if guess.exchanged is not None:
             print(
                 guess.exchanged.sentence(
-                    str(args.urdf), str(args.bag), edited_path(args.output, "exchanged"), guess.roles.joints
+                    replace(typed, output=edited_file(args.output, "exchanged")), guess.roles.joints
                 )
             )
     else:

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.scoring.changed_load import ChangedLoad
 from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 
 RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, and what it did between them is not known
@@ -19,8 +22,9 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
     found = []
     if result.saturated:
         found.append(("Drives that give what is commanded", result.saturated))
-    if result.changed is not None:
-        found.append(("One load throughout", _two_loads(result)))
+    if (changed := result.asked.changed) is not None:
+        name, sentence = ("Nothing pushes", _push) if changed.push else ("One load throughout", _two_loads)
+        found.append((name, sentence(changed, result)))
     if rare := rare_samples(result):
         found.append(("Samples often enough", rare))
     return found
@@ -44,25 +48,43 @@ def rare_samples(result: CalibrationResult) -> str:
     )
 
 
-def _two_loads(result: CalibrationResult) -> str:
-    """A sentence with the commands for both parts; empty where the load stays."""
-    changed = result.changed
-    if changed is None:
-        return ""
-    begin = f"jointscope calibrate {robot_argument(result.start)} {_bags(result)} -o"
-    parts = {"before": (changed.time, changed.end), "after": (0.0, changed.time)}
-    commands = [
-        f"`{begin} {edited_argument(result.start, part)} --leave-out "
-        f"{shlex.quote(f'{changed.path}:{t0:.2f}:{t1:.2f}')}`"
-        for part, (t0, t1) in parts.items()
-    ]
+def _two_loads(changed: ChangedLoad, result: CalibrationResult) -> str:
+    """A sentence with the commands for the stretch with another load and for the rest."""
+    rest, stretch = ((changed.start, changed.stop),), ((0.0, changed.start), (changed.stop, changed.end))
+    names = ("before", "after") if changed.stop >= changed.end else ("without", "with")
+    one, other = _leaving(changed, result, names[0], rest), _leaving(changed, result, names[1], stretch)
     return (
-        f"From {changed.time:.2f} s of {changed.path} on the arm carries something else than before, as if a payload "
-        f"were taken up or set down: at {changed.joint} {significant(100.0 * changed.size, 2)} % of the drive's torque."
-        f" Calibrate the part alone whose load {result.robot.tree.urdf.name} has, before with {commands[0]}, or after "
-        f"with {commands[1]}."
+        f"{_when(changed)} the arm carries something else than in the rest, as if a payload were taken up or set down, "
+        f"or a force acted from outside: at {changed.joint} {significant(100.0 * changed.size, 2)} % of the drive's "
+        f"torque. Calibrate the part alone whose load {result.robot.tree.urdf.name} has, the rest with {one}, or that "
+        f"stretch with {other}."
     )
 
 
+def _push(changed: ChangedLoad, result: CalibrationResult) -> str:
+    """A sentence with the command for the rest of the recording."""
+    unit = result.robot.unit_at(changed.joint, "N m")
+    command = _leaving(changed, result, "without", ((changed.start, changed.stop),))
+    return (
+        f"{_when(changed)} something pushes on the arm from outside, or pulls, as a hand, a cable or a wall does: at "
+        f"{changed.joint} with {significant(changed.push, 2)} {unit} that stay while it moves, "
+        f"{significant(100.0 * changed.size, 2)} % of the drive's torque. Leave that stretch out: {command}."
+    )
+
+
+def _when(changed: ChangedLoad) -> str:
+    until = "on" if changed.stop >= changed.end else f"to {changed.stop:.2f} s"
+    return f"From {changed.start:.2f} s {until} in {changed.path}"
+
+
+def _leaving(
+    changed: ChangedLoad, result: CalibrationResult, name: str, stretches: Sequence[tuple[float, float]]
+) -> str:
+    """The command that calibrates without some stretches."""
+    begin = f"jointscope calibrate {robot_argument(result.start)} {_bags(result)} -o"
+    out = [shlex.quote(f"{changed.path}:{t0:.2f}:{t1:.2f}") for t0, t1 in stretches if t1 > t0]
+    return f"`{' '.join([begin, edited_argument(result.start, name), *(f'--leave-out {one}' for one in out)])}`"
+
+
 def _bags(result: CalibrationResult) -> str:
-    return " ".join(shlex.quote(bag.recording.path) for bag in result.bags)
+    return recording_arguments([bag.recording for bag in result.bags])

@@ -3,18 +3,32 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
+from jointscope.graphs.scoring.load_friction import LoadFriction
 from jointscope.graphs.scoring.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.unsteady_gains import COMMAND, COMMANDS, SPEED, SPEEDS, TIME, UnsteadyGain
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.one_step import would_be
 
+MEASURED = "Record the effort that the drives report, measured currents or torques, instead of commands"
+FALLS_WITH = {  # how a gain falls, with what reason, and what helps
+    SPEED: ("the faster the joint goes", "a voltage that its back-EMF uses up, or a supply that sags", MEASURED),
+    SPEEDS: ("the faster all joints go", "a supply that sags", MEASURED),
+    COMMAND: ("the more is commanded", "a motor that saturates, or a supply that sags", MEASURED),
+    COMMANDS: ("the more all drives are asked for", "a supply that sags", MEASURED),
+    TIME: (
+        "as time goes by",
+        "a motor that warms, or a battery that runs down",
+        "Record when it is warm, or calibrate shorter recordings one by one",
+    ),
+}
 MOST_ALIKE = 2
 MOST_CHANGES = 3
 MATTERS = 0.01  # of the rms torque of a drive that an effect explains, from which values cannot be relied on
@@ -26,9 +40,11 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Without masses this cannot be checked."
     if given(result):
         return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
-    if result.causes:
+    if result.asked.causes:
         return _named(result)
-    if result.load_frictions:
+    if result.asked.gains:
+        return "bad", _falling_gains(result)
+    if result.asked.load_frictions:
         return "bad", _growing_friction(result)
     found = result.found
     asked = [(effect, shares) for effect in result.lacking if (shares := effect.moved(found))]
@@ -48,7 +64,7 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
 
 def _named(result: CalibrationResult) -> tuple[str, str]:
     """Effects that regression names and the calibration asks for: they are what is missing, or look like it."""
-    causes, catalogued = result.causes, catalogue()
+    causes, catalogued = result.asked.causes, catalogue()
     by_effect: dict[str, list[RegressedCause]] = {}
     for cause in causes:
         by_effect.setdefault(cause.effect, []).append(cause)
@@ -65,21 +81,39 @@ def _named(result: CalibrationResult) -> tuple[str, str]:
     )
 
 
-def _growing_friction(result: CalibrationResult) -> str:
-    """Friction that no effect of rigid joints knows: what it does to the values, and what is left to do."""
-    told = result.load_frictions
-    shares = [(one.joint, significant(100.0 * one.share, 2), significant(100.0 * one.sigma, 1)) for one in told]
-    listed = ", ".join(f"{joint} ({share} ± {sigma} % of it)" for joint, share, sigma in shares)
+def _falling_gains(result: CalibrationResult) -> str:
+    """Gains that fall, which no effect of the catalogue knows: what it does to the values, and what is left to do."""
+    told = result.asked.gains
+    listed = ", ".join(
+        f"{one.joint} ({significant(100.0 * one.lost, 2)} ± {significant(100.0 * one.sigma, 1)} % at the most)"
+        for one in told
+    )
+    what, reason, cure = FALLS_WITH[told[0].form]
+    return (
+        f"By regression a unit of the command makes less torque {what}, at {listed}: {reason}. With it "
+        f"{_factors(result, told)}. No effect of the catalogue knows this. {cure}, then calibrate again."
+    )
+
+
+def _factors(result: CalibrationResult, told: Sequence[UnsteadyGain] | Sequence[LoadFriction]) -> str:
+    """The values that change most, as they would be and as they are."""
     found = result.found
     factors = {n: f for one in told for n, f in one.with_it.items() if n in found}
-    changed = "; ".join(
+    return "; ".join(
         f"{name} {significant(factor * found[name].value)} instead of {significant(found[name].value)}"
         for name, factor in sorted(factors.items(), key=lambda item: -abs(item[1] - 1.0))[:MOST_CHANGES]
     )
+
+
+def _growing_friction(result: CalibrationResult) -> str:
+    """Friction that no effect of rigid joints knows: what it does to the values, and what is left to do."""
+    told = result.asked.load_frictions
+    shares = [(one.joint, significant(100.0 * one.share, 2), significant(100.0 * one.sigma, 1)) for one in told]
+    listed = ", ".join(f"{joint} ({share} ± {sigma} % of it)" for joint, share, sigma in shares)
     return (
         f"By regression the dry friction of {listed} grows with the torque that the drive passes on, as that of gears "
-        f"does; with it {changed}. Effects of rigid joints know friction that grows with the weight alone. Which "
-        f"comes nearest: `{_discover(result)}`."
+        f"does; with it {_factors(result, told)}. Effects of rigid joints know friction that grows with the weight "
+        f"alone. Which comes nearest: `{_discover(result)}`."
     )
 
 
@@ -109,9 +143,11 @@ def _next(result: CalibrationResult, effect: LackingEffect) -> str:
 
 def _discover(result: CalibrationResult) -> str:
     """The command that looks for effects, with a part of one recording, or the last of several, held out."""
-    start, bags = result.start, [shlex.quote(bag.recording.path) for bag in result.bags] or ["BAG"]
-    *learnt, last = bags
-    held = f"{' '.join(learnt)} --holdout {last}" if learnt else f"{last} --holdout-share 0.33"
+    start, recordings = result.start, [bag.recording for bag in result.bags]
+    if len(recordings) > 1:
+        held = f"{recording_arguments(recordings[:-1])} --holdout {recording_arguments(recordings[-1:])}"
+    else:
+        held = f"{recording_arguments(recordings)} --holdout-share 0.33"
     return f"jointscope discover {robot_argument(start)} {held} -o {edited_argument(start, 'better')}"
 
 

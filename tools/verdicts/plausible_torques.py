@@ -9,14 +9,12 @@ with a load that the URDF lacks, leaves a little in the residuals, and `graphs/s
 
 from __future__ import annotations
 
-import shlex
-
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
-from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, init_command, robot_argument
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
 
@@ -70,7 +68,7 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    named = result.causes or given(result)  # to one linear step these look like masses
+    named = result.asked.causes or given(result)  # to one linear step these look like masses
     for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:
@@ -79,7 +77,7 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
             return "bad", _another_place(result, mass.joint)
         worst = max(shares, key=lambda name: abs(shares[name]))
         torques = mass.mass < 0.0 and constants and max(p.value for p in constants) < 1.0
-        other = f" Or its commands are torques, and it carries more: {_again(result, ' --unit Nm')}." if torques else ""
+        other = f" Or its commands are torques, and it carries more: {_again(result, 'Nm')}." if torques else ""
         return "bad", (
             f"The recording asks for another mass behind {mass.joint}, by {mass.mass:+.2g} ± "
             f"{significant(mass.sigma, 1)} kg if all of it were in the link there: a load that "
@@ -114,7 +112,7 @@ def _torques(result: CalibrationResult) -> tuple[str, str] | None:
     known = [v.value for v in found.values() if v is not None]
     alike = _one_factor(known) if len(off) == len(known) else ""  # of one that is off the others say nothing
     far = all(_factor(value) > 1.0 + MASSES[1] for value in off.values())
-    unit = f" Only if the command is no torque: {_again(result, ' --unit A')}." if far else ""
+    unit = f" Only if the command is no torque: {_again(result, 'A')}." if far else ""
     text = (
         f"The command is in N m, but with the masses of {robot.tree.urdf.name} one moves as "
         f"{', '.join(f'{significant(v.value)} ({j})' for j, v in off.items())} N m would: masses or torques are wrong "
@@ -142,8 +140,7 @@ def _one_factor(values: list[float]) -> str:
     return f"; alike at all joints, so masses times {significant(1.0 / middle)} would fit" if alike and middle else ""
 
 
-def _again(result: CalibrationResult, option: str = "") -> str:
+def _again(result: CalibrationResult, unit: str = "") -> str:
     """The command that begins anew."""
-    bag = shlex.quote(result.bags[0].recording.path) if result.bags else "BAG"
-    urdf, output = shlex.quote(str(result.robot.tree.urdf)), edited_argument(result.start, "anew")
-    return f"`jointscope init {urdf} {bag} -o {output}{option}`"
+    bag = result.bags[0].recording.path if result.bags else "BAG"
+    return f"`{init_command(result.start, bag, 'anew', unit=unit)}`"

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from simulated_arm import SHARP, Arm, moved, robot_file
+from simulated_arm import SHARP, Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.scoring.changed_load import changed_load
 from jointscope.graphs.scoring.joint_regression import joint_rows
 from jointscope.graphs.scoring.load_friction import load_frictions
 from jointscope.graphs.scoring.regressed_causes import regressed_causes
+from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.recordings.recording import Recording
 
 ARM = Arm()
@@ -49,6 +53,14 @@ def dead_band(_, u, __, ___):
     return np.sign(u) * np.maximum(np.abs(u) - np.array([0.0, 0.25, 0.0]), 0.0)
 
 
+def drag(_, u, __, data):
+    return u - np.array([0.0, 0.3, 0.0]) * data.qvel * np.abs(data.qvel)
+
+
+def more_at_rest(_, u, __, data):
+    return u - np.array([0.0, 0.8, 0.0]) * np.exp(-((data.qvel / 0.3) ** 2)) * np.tanh(SHARP * data.qvel)
+
+
 def growing(share):
     def drive(_, u, __, data):
         return u - share * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
@@ -80,6 +92,8 @@ def test_nothing_is_named_where_nothing_is_missing(robot, how):
         (offset, "torque_offset@j1", "asymmetric_friction"),
         (unlike_both_ways, "asymmetric_friction@j0", "torque_offset"),
         (dead_band, "pwm_deadband@j1", "truncated_command"),
+        (drag, "quadratic_damping@j1", ""),
+        (more_at_rest, "motor_stribeck@j1", ""),
     ],
 )
 def test_what_one_joint_lacks_has_its_name_at_that_joint(robot, drive, label, look_alike):
@@ -88,12 +102,21 @@ def test_what_one_joint_lacks_has_its_name_at_that_joint(robot, drive, label, lo
     assert cause.explained > 0.8 and cause.size > 0.01
 
 
+def test_drag_that_is_named_is_found_with_its_size_and_all_else_is_right(robot):
+    with_it = add_effects(robot, ["quadratic_damping@j1"]).robot
+    result = calibrate(with_it, [recording(drive=drag)])
+    assert_right(ARM, result.parameters, rel=0.01)
+    table = {p.name: p.value for p in result.parameters}
+    assert table["j1.quadratic_damping.coefficient"] == pytest.approx(0.3, rel=0.02)
+    assert result.asked.causes == () and result.asked.gains == ()
+
+
 def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_need_it(robot):
     coarse = recording(counts=8192)
     rows = joint_rows(robot, [coarse])
     assert regressed_causes(rows), "joints turn over within a count, which looks like Stribeck friction"
     result = calibrate(robot, [coarse])
-    assert result.causes == () and result.changed is None and result.load_frictions == ()
+    assert result.asked.causes == () and result.asked.changed is None and result.asked.load_frictions == ()
 
 
 def test_cables_are_springs_at_all_joints(robot):
@@ -110,5 +133,33 @@ def test_friction_that_grows_with_torque_is_told_with_its_share(robot):
 
 def test_a_load_that_is_taken_up_is_told_with_its_time(robot):
     found = changed_load(joint_rows(robot, [recording(drive=taken_up_at(4.3, 0.6))]), ["here"])
-    assert found.time == pytest.approx(4.3, abs=0.15)
+    assert found.start == pytest.approx(4.3, abs=0.05) and found.stop == found.end and found.push == 0.0
     assert found.size > 0.02
+
+
+def test_a_load_that_is_taken_up_and_set_down_is_told_with_both_times(robot):
+    def carried(t, u, model, _):
+        model.body_mass[-1] = 3.0 * 0.6**2 + (0.6 if 3.1 <= t < 6.7 else 0.0)
+        return u
+
+    found = changed_load(joint_rows(robot, [recording(drive=carried)]), ["here"])
+    assert (found.start, found.stop) == pytest.approx((3.1, 6.7), abs=0.05) and found.push == 0.0
+
+
+@pytest.mark.parametrize(
+    ("push", "torque"), [((4.0, 4.8, 1, 6.0), 6.0), ((5.5, 99.0, 0, -4.0), -4.0), ((-1.0, 3.3, 2, 1.5), 1.5)]
+)
+def test_what_pushes_from_outside_is_no_load_and_is_told_with_its_torque(robot, push, torque):
+    found = changed_load(joint_rows(robot, [recording(push=push)]), ["here"])
+    assert found.joint == f"j{push[2]}" and found.push == pytest.approx(torque, rel=0.05)
+    ends = max(push[0], 0.0), min(push[1], found.end)
+    assert (found.start, found.stop) == pytest.approx(ends, abs=0.05)
+
+
+def test_a_target_that_is_seen_late_does_not_hide_what_drives_carry(robot):
+    encoder = robot.motor_encoder
+    target = PositionTarget(
+        "marker", replace(encoder.source, names=()), "of_j2", np.zeros(3), None, np.eye(4), "marker", 1e-3
+    )
+    with_it = add_effects(robot.with_sensors({**robot.sensors, "marker": target}), ["encoder_delay@marker"]).robot
+    assert changed_load(joint_rows(with_it, [recording(drive=taken_up_at(4.3, 0.6))]), ["here"]) is not None

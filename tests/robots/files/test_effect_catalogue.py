@@ -24,7 +24,7 @@ truncated_command parallel_spring integration_error torque_constant_error link_m
 friction_by_direction encoder_filter command_limit""".split()
 UNITS = {
     *("kg", "kg m", "1", "s", "s^2", "s/s", "rad", "rad/s", "rad/s^2", "rad/rad", "V", "kg m2"),
-    *("N m", "N m/rad", "N m/rad^2", "N m/rad^3", "N m s/rad", "rad/(N m)", "1/(N m)"),
+    *("N m", "N m/rad", "N m/rad^2", "N m/rad^3", "N m s/rad", "N m s^2/rad^2", "rad/(N m)", "1/(N m)"),
 }
 DOGGY = load_robot("doggy")
 EFFECTS = list(catalogue().values())

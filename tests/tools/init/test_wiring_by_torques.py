@@ -72,7 +72,8 @@ def test_joints_with_each_others_names_are_named_with_the_command_that_mends_it(
     command = next(line for line in said.splitlines() if "seem to be exchanged" in line).partition("jointscope init ")[
         2
     ]
-    options = command.split("-o ")[1].split()[1:]
+    *options, _, written = command.split()[2:]
+    assert written == str(tmp_path / "own_exchanged.yaml")
     assert_true(begun(arm[0], bag, tmp_path / "own.yaml", *options)["drives"])
     assert "can be used" in capsys.readouterr().out
 

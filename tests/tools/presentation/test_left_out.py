@@ -9,7 +9,7 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.command_line import main
-from jointscope.tools.presentation.left_out import leave_out, left_out_arguments
+from jointscope.tools.presentation.left_out import leave_out, left_out_arguments, recording_arguments
 from jointscope.tools.verb_parts.discovery_state import hashes_of
 
 
@@ -75,3 +75,9 @@ def test_every_verb_that_judges_models_has_the_option(verb, capsys):
     with pytest.raises(SystemExit):
         main([verb, "--help"])
     assert "--leave-out" in capsys.readouterr().out
+
+
+def test_recordings_are_named_without_what_was_left_out_of_them():
+    first, second = recording("a b.mcap").leaving_out([(1.0, 2.5)]), recording("c.mcap")
+    assert recording_arguments([first, second]) == "'a b.mcap' c.mcap --leave-out 'a b.mcap:1:2.5'"
+    assert recording_arguments([]) == "BAG"

@@ -30,6 +30,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "torque_offset": ("joint", "torque"),
     "motor_lag": ("joint, robot", "time_constant"),
     "command_delay": ("joint, robot", "delay"),
+    "quadratic_damping": ("joint", "coefficient"),
     "pwm_deadband": ("joint", "width"),
     "truncated_command": ("joint", "lost"),
     "command_limit": ("joint", "lost limit"),

@@ -53,6 +53,7 @@ LAWS = {
     "parallel_spring": (lambda q, v, p, w: 0.5 - 2.0 * q[1], None),
     "gravity_imbalance": (lambda q, v, p, w: 1.8 * np.cos(q[1]) + 2.4 * np.sin(q[1]), None),
     "motor_viscous": (None, lambda q, v, p, w: -2.0 * w[1]),
+    "quadratic_damping": (None, lambda q, v, p, w: -1.0 * w[1] * abs(w[1])),
     "motor_stribeck": (None, lambda q, v, p, w: -1.5 * np.exp(-((w[1] / 0.1) ** 2)) * tanh(w[1])),
     "load_dependent_friction": (
         None,

@@ -175,7 +175,7 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
 @pytest.mark.parametrize(
     ("value", "mass", "said"),
     [
-        (0.6, -0.9, "Add the load .*own_anew.yaml`. Or its commands are torques, .* -o \\S*/own_anew.yaml --unit Nm`"),
+        (0.6, -0.9, "Add the load .*own_anew.yaml`. Or its commands are torques, .* --unit Nm -o \\S*/own_anew.yaml`"),
         (0.6, 0.9, "another mass behind elbow, by +0.9 ± 0.03 kg.*-o \\S*/own_anew.yaml`.$"),
         (8.0, -0.9, "another mass behind elbow, by -0.9 ± 0.03 kg.*-o \\S*/own_anew.yaml`.$"),
         (

@@ -20,6 +20,7 @@ from jointscope.robots.recordings.recording import Stream
 from jointscope.tools.init.estimates.drive_values import is_impossible
 from jointscope.tools.init.estimates.joint_signs import SignGuess, Signs
 from jointscope.tools.init.estimates.open_share import equations_of, open_share
+from jointscope.tools.init.streams.other_joints import Typed
 
 Array = NDArray[np.float64]
 
@@ -42,14 +43,13 @@ class Exchange:
     joints: tuple[str, str]
     columns: tuple[str, ...]
 
-    def sentence(self, urdf: str, bag: str, output: str, joints: Sequence[str]) -> str:
-        """What was seen, and what to do; `joints` are those of the robot file."""
+    def sentence(self, typed: Typed, joints: Sequence[str]) -> str:
+        """What was seen, and what to do; `joints` are those of the robot file, `typed` what writes it."""
         a, b = self.joints
-        other = {a: b, b: a}
-        now = ",".join(f"{joint}={other[joint]}" if joint in other else joint for joint in joints)
+        wish = replace(typed.wish, joints=tuple(joints), names={**typed.wish.names, a: b, b: a})
         seen = f"{' and '.join(self.columns)} of {a} and {b} seem to be exchanged: so the regression explains them"
         if len(self.columns) == 2:
-            return f"{seen}; if that is so: jointscope init {urdf} {bag} -o {output} --joints {now}"
+            return f"{seen}; if that is so: {replace(typed, wish=wish).command()}"
         where = "sensors.motor_encoder" if self.columns == (POSITIONS,) else "command"
         return f"{seen}; if that is so, exchange them in `names` of {where}"
 

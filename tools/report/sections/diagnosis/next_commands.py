@@ -12,14 +12,14 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.model.command_words import edited_argument, edited_path, robot_argument
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.presentation.left_out import left_out_arguments
+from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.model_answer import missing_numerics, of_verdict
 from jointscope.tools.report.page.page import Section
 
 
 def after_diagnosis(result: Diagnosis) -> Section:
     """Add the missing effect and calibrate, or let discover do it; or use the model."""
-    robot, bags, held = robot_argument(result.robot), _paths(result.recordings), _holdout(result.heldout)
+    robot, bags, held = robot_argument(result.robot), recording_arguments(result.recordings), _holdout(result.heldout)
     calibrated = edited_argument(result.robot, "calibrated")
     missing = of_verdict(result, "missing") or missing_numerics(result)
     found = [c.label for c in missing or of_verdict(result, "possible")]
@@ -31,7 +31,7 @@ def after_diagnosis(result: Diagnosis) -> Section:
         effect, added = _quoted(found[0]), edited_argument(result.robot, found[0].partition("@")[0])
         commands = [f"jointscope add {robot} {effect} -o {added}", _calibrate(added, bags, calibrated)]
         if result.heldout is not None:
-            commands.append(f"jointscope compare {robot} {calibrated} {_paths([result.heldout])}")
+            commands.append(f"jointscope compare {robot} {calibrated} {recording_arguments([result.heldout])}")
         blocks.append(("Add the first effect, calibrate, and see whether the error falls:", commands))
     better = edited_argument(result.robot, "better")
     discover = f"jointscope discover {robot} {bags}{held} -o {better} --report discovery.html"
@@ -42,7 +42,7 @@ def after_diagnosis(result: Diagnosis) -> Section:
 def after_discovery(result: Discovery) -> Section:
     """Look at the model that was found, and undo its last step."""
     file = _quoted(result.robot_file or "found.yaml")
-    bag = _paths([result.heldout]) if result.heldout is not None else "ANOTHER_BAG"
+    bag = recording_arguments([result.heldout]) if result.heldout is not None else "ANOTHER_BAG"
     first = _quoted(result.steps[0].robot_file) if result.steps[0].robot_file else robot_argument(result.steps[0].robot)
     blocks = [("Compare the first and the last model on any recording:", [f"jointscope compare {first} {file} {bag}"])]
     last = result.steps[-1].added
@@ -50,7 +50,9 @@ def after_discovery(result: Discovery) -> Section:
         without = edited_path(Path(result.robot_file or "found.yaml"), "without")
         blocks.append(("Take the last effect out again:", [f"jointscope remove {file} {_quoted(last)} -o {without}"]))
     if not result.adequate:
-        blocks.append(("See what is still missing:", [f"jointscope diagnose {file} {_paths(result.recordings)}"]))
+        blocks.append(
+            ("See what is still missing:", [f"jointscope diagnose {file} {recording_arguments(result.recordings)}"])
+        )
     return _section(blocks)
 
 
@@ -64,15 +66,7 @@ def _calibrate(robot: str, bags: str, output: str) -> str:
 
 
 def _holdout(recording: Recording | None) -> str:
-    return f" --holdout {_paths([recording])}" if recording is not None else ""
-
-
-def _paths(recordings: Sequence[Recording]) -> str:
-    return " ".join([*(_quoted(recording.path) for recording in recordings), *_left_out(recordings)]) or "BAG"
-
-
-def _left_out(recordings: Sequence[Recording]) -> list[str]:
-    return [f"--leave-out {_quoted(stretch)}" for stretch in left_out_arguments(recordings)]
+    return f" --holdout {recording_arguments([recording])}" if recording is not None else ""
 
 
 def _quoted(text: str) -> str:

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Drives whose constant is none: it falls with speed, with what they give, or as time goes by.
+
+    k (1 - c s) u = M a + c + g + b a + d v + mu sign(v),      s >= 0
+
+with s the speed of the joint, the speed of all (a supply that sags), |u| of the drive (magnetic saturation), |u| of
+all, or time (a motor that warms). The mean of such a gain is what a calibration takes for the constant, and it leaves
+so little open that residuals hardly tell. Beside the motion, s u is a column of the regression; its factor is c.
+No effect of the catalogue is like this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit, with_sigma
+from jointscope.graphs.scoring.regressed_causes import RegressedCause
+from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
+
+Array = NDArray[np.float64]
+
+SPEED, SPEEDS, COMMAND, COMMANDS, TIME = "speed", "speeds", "command", "commands", "time"
+FORMS = (SPEED, COMMAND, TIME, SPEEDS, COMMANDS)  # simplest first
+LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left where it is most clear ...
+ALSO = 0.5  # ... and at the other drives; friction or loads that change leave 0.33 or more
+AS_GOOD = 1.2  # times the mean square that the best form leaves, or a named effect, up to which another is as good
+SURE = 4.5  # [sigma], over some 20 blocks: one joint in ten thousand by chance
+SMALL = 0.01  # share of the gain that is lost at the most, below which it matters to nobody
+MOST = 0.5  # share of the gain, beyond which it is something else: drives that lose more saturate
+FEWEST_BLOCKS = 8
+
+
+@dataclass(frozen=True)
+class UnsteadyGain:
+    """A drive whose gain falls.
+
+    Attributes:
+        joint: whose drive.
+        form: one of FORMS: with what it falls.
+        lost, sigma: share of the gain that is lost where that is largest.
+        explained: share of the mean square that the plain regression leaves.
+        with_it: parameters of the joint with it over those without, by name; the constant is that without loss.
+    """
+
+    joint: str
+    form: str
+    lost: float
+    sigma: float
+    explained: float
+    with_it: dict[str, float]
+
+
+def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
+    """The drives whose gain surely falls, all with the same; nothing where a drive would need another reason.
+
+    Args:
+        rows: of the regression.
+    """
+    found = {form: [one for j in range(rows.robot.n) if (one := _of(rows, j, form)) is not None] for form in FORMS}
+    least = {form: min((1.0 - one.explained for one in some), default=1.0) for form, some in found.items()}
+    clearest = min(least.values())
+    if clearest > LEFT:
+        return ()
+    as_good = [form for form in FORMS if least[form] <= AS_GOOD * clearest]
+    form = max(as_good, key=lambda name: (len(found[name]), -FORMS.index(name)))
+    return tuple(found[form])
+
+
+def explain_more(gains: tuple[UnsteadyGain, ...], causes: tuple[RegressedCause, ...]) -> bool:
+    """Whether gains that fall leave less open than the effects that regression names, where they do so most clearly."""
+    first = max(gains, key=lambda one: one.explained, default=None)
+    if first is None:
+        return False
+    named = max((cause.explained for cause in causes if cause.joint == first.joint), default=0.0)
+    return AS_GOOD * (1.0 - first.explained) < 1.0 - named
+
+
+def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
+    """What the windows in which it is clearest say of one drive; None where they say nothing."""
+    motions = rows.motions(joint)
+    if form in (SPEEDS, COMMANDS) and rows.robot.n == 1:  # the same as those of one
+        return None
+    scales = [_scale(rows, i, joint, form) for i in range(len(motions))]
+    most = max(float(np.max(scale)) for scale in scales)
+    driving = [signals[:, SIGNALS.index("command")] for signals, _ in motions]
+    columns = [[scale * u] for scale, u in zip(scales, driving, strict=True)]
+    told = [one for width in WIDTHS if (one := _under(rows, joint, width, columns)) is not None]
+    if not told or most <= 0.0:
+        return None
+    plain, best, sigma = min(told, key=lambda one: one[1].left / max(one[0].left, 1e-300))
+    factor, left = float(best.more[-1]), best.left / max(plain.left, 1e-300)
+    lost = factor * most
+    if left > ALSO or factor < SURE * sigma or not SMALL < lost < MOST:
+        return None
+    name = rows.robot.joints[joint]
+    changes = changes_between(rows.robot, name, plain, best)
+    if min(changes.values(), default=1.0) <= 0.0:  # a constant of that sign is none
+        return None
+    return UnsteadyGain(name, form, lost, sigma * most, 1.0 - left, changes)
+
+
+def _scale(rows: JointRows, recording: int, joint: int, form: str) -> Array:
+    """What a gain may fall with, shape (m,)."""
+    signals = [rows.motions(j)[recording][0] for j in range(rows.robot.n)]
+    of = SIGNALS.index("viscous" if form in (SPEED, SPEEDS) else "command")
+    if form == TIME:
+        return np.linspace(0.0, 1.0, len(signals[joint]))
+    if form in (SPEED, COMMAND):
+        return np.abs(signals[joint][:, of])
+    sizes = [np.abs(one[:, of]) for one in signals]
+    if form == COMMANDS:  # as shares of the largest: drives differ
+        sizes = [size / max(float(size.max()), 1e-300) for size in sizes]
+    return np.asarray(np.sum(sizes, axis=0))
+
+
+def _under(rows: JointRows, joint: int, width: float, columns: list[list[Array]]) -> tuple[Fit, Fit, float] | None:
+    """The regression without and with it in windows of one width [s], and the sigma of its factor."""
+    without, beside = rows.beside(joint, width, [[] for _ in columns]), rows.beside(joint, width, columns)
+    if without is None or beside is None:
+        return None
+    told = with_sigma(rows.robot, joint, *beside, fewest=FEWEST_BLOCKS)
+    return None if told is None else (fit(rows.robot, joint, without[0]), *told)

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Drives whose constant falls have it named, with what it falls and what it is without loss; others have not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from simulated_arm import SHARP, Arm, divided, moved, robot_file
+
+from jointscope.graphs.scoring.joint_regression import joint_rows
+from jointscope.graphs.scoring.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.unsteady_gains import COMMAND, SPEED, SPEEDS, TIME, explain_more, unsteady_gains
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
+
+ARM, SECONDS = Arm(), 10.0
+CONSTANTS = (8.0, 5.0, 2.0)  # [N m/A]
+HOW = {"seconds": SECONDS, "encoder_rate": 250.0, "command_rate": 250.0}
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory):
+    """The robot with commands in N m, and in A."""
+    path = robot_file(ARM, tmp_path_factory.mktemp("arm"))
+    constants = "".join(f"\n  {joint}.torque_constant: {{value: 4.0, unit: N m/A}}" for joint in ARM.joints)
+    amperes = path.with_name("amperes.yaml")
+    text = path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
+    amperes.write_text(text + constants.lstrip("\n") + "\n", encoding="utf-8")
+    return {"N m": load_robot(path), "A": load_robot(amperes)}
+
+
+def rows_of(robots, unit, **how):
+    encoder, command = moved(ARM, **{**HOW, **how})
+    if unit == "A":
+        command = divided(command, CONSTANTS)
+    return joint_rows(robots[unit], [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
+
+
+def with_all_speeds(_, u, __, data):
+    return u * (1.0 - 0.015 * np.abs(data.qvel).sum())
+
+
+def with_own_speed(_, u, __, data):
+    return u * (1.0 - np.array([0.04, 0.0, 0.0]) * np.abs(data.qvel))
+
+
+def with_command(_, u, __, ___):
+    return u * (1.0 - np.array([0.0, 0.006, 0.0]) * np.abs(u))
+
+
+def with_time(t, u, _, __):
+    return u * (1.0 - 0.06 * t / SECONDS)
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+@pytest.mark.parametrize(
+    ("drive", "form", "joints"),
+    [
+        (with_all_speeds, SPEEDS, ("j0", "j1", "j2")),
+        (with_own_speed, SPEED, ("j0",)),
+        (with_command, COMMAND, ("j1",)),
+        (with_time, TIME, ("j0", "j1", "j2")),
+    ],
+)
+def test_what_a_gain_falls_with_is_told_and_the_constant_without_loss(robots, unit, drive, form, joints):
+    rows = rows_of(robots, unit, drive=drive)
+    found = unsteady_gains(rows)
+    assert {one.form for one in found} == {form} and tuple(one.joint for one in found) == joints
+    assert explain_more(found, regressed_causes(rows))
+    if unit == "A" and form != TIME:
+        for one in found:
+            assert one.with_it[f"{one.joint}.torque_constant"] > 1.005, "the plain one has a mean loss"
+    if form == TIME:
+        assert [one.lost for one in found] == pytest.approx([0.06] * 3, abs=0.01)
+
+
+def growing_friction(_, u, __, data):
+    return u - 0.06 * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
+
+
+def friction_that_falls(t, u, _, data):
+    return u - np.array([0.6, 0.3, 0.1]) * (0.5 - t / SECONDS) * np.tanh(SHARP * data.qvel)
+
+
+def dead_band(_, u, __, ___):
+    return np.sign(u) * np.maximum(np.abs(u) - np.array([0.0, 0.25, 0.0]), 0.0)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"seed": 1},
+        {"seed": 2},
+        {"seed": 3, "noise": 3e-4},
+        {"sticks": True},
+        {"pause": 0.3},
+        {"encoder_rate": 100.0, "command_rate": 100.0},
+        {"counts": 8192},
+        {"cable": 3.0},
+        {"push": (4.0, 4.6, 1, 8.0)},
+        {"drive": growing_friction},
+        {"drive": friction_that_falls},
+        {"drive": dead_band},
+    ],
+    ids=lambda how: " ".join(f"{key} {getattr(value, '__name__', value)}" for key, value in how.items()),
+)
+def test_gains_that_stay_are_not_said_to_fall(robots, how):
+    rows = rows_of(robots, "A", **how)
+    assert not explain_more(unsteady_gains(rows), regressed_causes(rows))
