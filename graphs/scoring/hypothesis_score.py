@@ -101,6 +101,7 @@ class HypothesisStep:
         sigmas: their standard deviations, those from blocks where these scatter more, shape (k,).
         response: of the shared values to each size, shape (shared, k).
         p_value: block-robust.
+        covariances: of the sizes, by white noise and by the scatter of blocks, shape (2, k, k).
     """
 
     hypothesis: EffectHypothesis
@@ -108,6 +109,7 @@ class HypothesisStep:
     sigmas: Array
     response: Array
     p_value: float
+    covariances: Array
 
 
 def best_shapes(scores: Iterable[HypothesisScore]) -> dict[str, HypothesisScore]:

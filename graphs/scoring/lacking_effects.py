@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,7 @@ class LackingEffect:
         worth: score less what its sizes cost.
         with_it: each parameter with the effect beside it, in the parameter's unit.
         tried: whether the values were found with the effect in the model, not by one linear step.
+        uncertain: standard deviation of what the effect changes of each, where one linear step tells it.
     """
 
     effect: str
@@ -54,6 +55,7 @@ class LackingEffect:
     worth: float
     with_it: dict[str, float]
     tried: bool = False
+    uncertain: dict[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -70,6 +72,7 @@ class LackingEffect:
         if self.p_value > BY_CHANCE:
             return {}
         told = {n: self.with_it[n] - v.value for n, v in found.items() if n in self.with_it and v.value}
+        told = {n: d for n, d in told.items() if abs(d) > SURE * self.uncertain.get(n, 0.0)}
         told = {n: d for n, d in told.items() if not n.endswith(".delay") and abs(d) > sigmas * found[n].sigma}
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
@@ -118,4 +121,5 @@ def _is_possible(step: HypothesisStep) -> bool:
 
 def _lacking(test: ScoreTest, step: HypothesisStep, tried: int, worth: float) -> LackingEffect:
     here = step.hypothesis.here
-    return LackingEffect(here.effect.id, here.owner, min(tried * step.p_value, 1.0), worth, test.values_with(step))
+    p_value, values, uncertain = min(tried * step.p_value, 1.0), test.values_with(step), test.change_sigmas(step)
+    return LackingEffect(here.effect.id, here.owner, p_value, worth, values, uncertain=uncertain)

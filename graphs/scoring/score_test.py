@@ -101,7 +101,8 @@ class ScoreTest:
             robust = inverse @ (at_estimate.T @ at_estimate) @ inverse * count / (count - 1.0)
             sigmas = np.maximum(score.sigma, np.sqrt(np.diag(robust)))
             p_value = _robust_p(score, blocks[:, c], own)
-            found.append(HypothesisStep(hypothesis, score.estimate, sigmas, response[:, c], p_value))
+            covariances = np.stack([inverse, robust])
+            found.append(HypothesisStep(hypothesis, score.estimate, sigmas, response[:, c], p_value, covariances))
         return found
 
     def values_with(self, step: HypothesisStep) -> dict[str, float]:
@@ -109,6 +110,17 @@ class ScoreTest:
         start = self.calibration
         moved = start.retract({DYNAMICS: step.response[: len(start.names)] @ step.sizes})
         return dict(zip(start.names, moved.values.tolist(), strict=True))
+
+    def change_sigmas(self, step: HypothesisStep) -> dict[str, float]:
+        """Standard deviation of what a step changes of each shared value, by name.
+
+        Sizes that are badly known take values with them, as moments of inertia of a link take that of its rotor.
+        """
+        start = self.calibration
+        response = step.response[: len(start.names)]
+        variances = np.einsum("ik,nkl,il->ni", response, step.covariances, response)
+        scale = np.where(start.positive, np.abs(start.values), 1.0)  # positive values move as logarithms
+        return dict(zip(start.names, (scale * np.sqrt(variances.max(axis=0))).tolist(), strict=True))
 
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""

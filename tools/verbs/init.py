@@ -140,8 +140,11 @@ def _with_position_hints(guess: RobotGuess, robot: Robot, bag: Path, targets: Se
 
 def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Typed) -> None:
     """Whether the regression explains the recording; what to look at where it does not."""
-    from jointscope.robots.model.command_words import edited_file, edited_path
+    from jointscope.robots.files.robot_file import load_robot
+    from jointscope.robots.model.command_words import edited_file
+    from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
+    from jointscope.tools.init.estimates.what_is_missing import what_is_missing
 
     poor = [
         joint
@@ -149,12 +152,10 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
         if drive.explained < EXPLAINED or drive.is_impossible
     ]
     if poor and not guess.free_links:
+        robot = load_robot(args.output)
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
-            f"{', '.join(poor)} (table above): names, units, signs, gravity or masses are wrong there, or a spring is "
-            "missing; look at it first (a base that is not level: jointscope add "
-            f"{args.output} gravity_direction@robot "
-            f"-o {edited_path(args.output, 'gravity_direction')})"
+            f"{', '.join(poor)} (table above): {what_is_missing(robot, read_recording(args.bag, robot), poor)}"
         )
         if guess.exchanged is not None:
             print(

@@ -84,14 +84,18 @@ def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
     plausible, timing, missing = plausible_torques(result), same_time(result), missing_effects(result)
     held, steps = values_from_data(result), short_steps(result)
-    signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
-    checks = (
-        *(Check("bad", name, text) for name, text in given(result)),
-        *signs,
-        *_agreeing(signs),
+    reasons = [Check("bad", name, text) for name, text in given(result)]
+    about_values = [
         Check(steps[0], "Steps short enough", steps[1]),
         _determined(result),
         Check(held[0], "Values from data, not from priors", held[1]),
+    ]
+    signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
+    checks = (
+        *reasons,
+        *signs,
+        *_agreeing(signs),
+        *(_consequences(about_values) if reasons else about_values),
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         _two_ways(result),
@@ -100,6 +104,12 @@ def judge(result: CalibrationResult) -> Judgement:
         Check(missing[0], "Values that no missing effect would change", missing[1]),
     )
     return Judgement.of(checks)
+
+
+def _consequences(checks: Sequence[Check]) -> list[Check]:
+    """Checks of values that no model could have found: their advice would mend nothing."""
+    told = "That cannot be told as long as drives saturate, a load changes, something pushes, or samples are too rare."
+    return [Check("info", check.name, told) if check.level in ("warn", "bad") else check for check in checks]
 
 
 def _agreeing(signs: Sequence[Check]) -> list[Check]:

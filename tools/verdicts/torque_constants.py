@@ -12,9 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.robots.model.command_words import init_command
 
 ALIKE = 0.1  # relative; masses are not off by exactly one factor, nor are inertias off with them
 UNITS = 1000.0  # from grams to kilograms
+AMPERES = "If the drives take amperes and are alike, write `confirmed: true` below `unit: A` in the robot file"
 NEAR = 0.25  # relative; of a constant of a lone joint to that ratio
 
 
@@ -32,12 +34,19 @@ def suspicious_constants(result: CalibrationResult) -> str:
     grams = abs(abs(np.log(middle)) - np.log(UNITS)) < np.log1p(NEAR)
     if not grams and (len(told) < 2 or np.max(np.abs(values - middle)) > ALIKE * middle):
         return ""
+    bag = result.bags[0].recording.path if result.bags else "BAG"
+    confirmed = init_command(result.start, bag, "anew", unit="A")
     where = f"on all {len(told)} joints" if len(told) > 1 else f"on {robot.joints[0]}"
+    if abs(middle - 1.0) < ALIKE:
+        torque = init_command(result.start, bag, "anew", unit="Nm")
+        return (
+            f"One unit of the command makes {middle:.3g} N m {where}: it is a torque, then, in N m: `{torque}` says "
+            f"so. {AMPERES} (or `{confirmed}`) and calibrate again."
+        )
     masses = f"the masses of {robot.tree.urdf.name} are {middle:.3g} times what they should be"
     gears = "" if grams else f", or torques before gears of that ratio (`unit: N m` and `scale: {middle:.3g}`)"
     return (
         f"One unit of the command makes {middle:.3g} N m {where}. Unlike joints rarely have drives that are alike: if "
         f"commands are in N m, {masses}{' (in grams?)' if grams else ''}{gears}, and all values are wrong by as much. "
-        "If the drives take amperes and are alike, write `confirmed: true` below `unit: A` in the robot file (or "
-        "`jointscope init ... --unit A`) and calibrate again."
+        f"{AMPERES} (or `{confirmed}`) and calibrate again."
     )

@@ -23,10 +23,14 @@ def result(constants, law="torque_constant", confirmed=False):
         n=len(joints),
         drive_gain=law,
         command=SimpleNamespace(confirmed=confirmed),
-        tree=SimpleNamespace(urdf=Path("arm.urdf")),
+        tree=SimpleNamespace(urdf=Path("arm.urdf"), other_joints=()),
+        **{"name": "arm", "path": Path("arm.yaml"), "held_at_mean": (), "sensors": {}},
+        motor_encoder=SimpleNamespace(source=SimpleNamespace(names=joints)),
     )
     told = [SimpleNamespace(name=f"{j}.{law}", value=k) for j, k in zip(joints, constants, strict=True)]
-    return SimpleNamespace(robot=robot, parameters=[*told, SimpleNamespace(name="a.inertia", value=1.0)])
+    return SimpleNamespace(
+        robot=robot, start=robot, bags=(), parameters=[*told, SimpleNamespace(name="a.inertia", value=1.0)]
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,6 +49,10 @@ def test_drives_that_are_unlike_are_believed(constants):
         ((0.00101, 0.00099), "0.001 times"),
         ((0.4946, 0.5124, 0.52), "0.512 times what they should be, or torques before gears of that ratio"),
         ((100.0, 101.0), "`scale: 100`"),
+        (
+            (0.99, 1.02, 1.0),
+            "it is a torque, then, in N m: `jointscope init arm.urdf BAG --unit Nm -o arm_anew.yaml` says",
+        ),
     ],
 )
 def test_one_number_on_all_joints_is_doubted_with_what_it_may_be(constants, words):
