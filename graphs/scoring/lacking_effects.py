@@ -20,6 +20,7 @@ from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypot
 from jointscope.graphs.scoring.hypothesis_score import HypothesisStep, best_shapes
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import Value
+from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.model.robot import Robot
 
@@ -122,4 +123,6 @@ def _is_possible(step: HypothesisStep) -> bool:
 def _lacking(test: ScoreTest, step: HypothesisStep, tried: int, worth: float) -> LackingEffect:
     here = step.hypothesis.here
     p_value, values, uncertain = min(tried * step.p_value, 1.0), test.values_with(step), test.change_sigmas(step)
+    if isinstance(here.effect, InertiaEffect):  # a link and its rotor share their inertia, and only the sum is told
+        values = {name: value for name, value in values.items() if not name.endswith(".inertia")}
     return LackingEffect(here.effect.id, here.owner, p_value, worth, values, uncertain=uncertain)

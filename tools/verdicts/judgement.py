@@ -83,8 +83,7 @@ class Judgement:
 def judge(result: CalibrationResult) -> Judgement:
     """Applies all checks to a calibration."""
     plausible, timing, missing = plausible_torques(result), same_time(result), missing_effects(result)
-    held, steps = values_from_data(result), short_steps(result)
-    reasons = [Check("bad", name, text) for name, text in given(result)]
+    (held, steps), reasons = (values_from_data(result), short_steps(result)), given(result)
     about_values = [
         Check(steps[0], "Steps short enough", steps[1]),
         _determined(result),
@@ -92,7 +91,7 @@ def judge(result: CalibrationResult) -> Judgement:
     ]
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
-        *reasons,
+        *(Check("bad", name, text) for name, text in reasons),
         *signs,
         *_agreeing(signs),
         *(_consequences(about_values) if reasons else about_values),
