@@ -65,7 +65,8 @@ class _Scan:
         one_sided = parameter.positive or _one_sided(robot, self.name)
         # all of them: far from the right one the cost has further valleys
         later = OF_TARGETS if any(self.name.startswith(f"{target.name}.") for target in robot.targets) else ()
-        for value in (parameter.value, *TRIED, *later, *(() if one_sided else -TRIED)):
+        tried = np.array([*TRIED, *later])
+        for value in (parameter.value, *tried, *(() if one_sided else -tried)):
             self._cost(float(value))
         for _ in range(REFINED):
             best = self._best()

@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.time_shift import TimeShift
+
+if TYPE_CHECKING:
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 Array = NDArray[np.float64]
 
@@ -20,7 +25,17 @@ def late(stamps: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]
     return p["delay"] * ones, {"delay": ones}
 
 
-EFFECT = TimeShift(
+@dataclass(frozen=True, kw_only=True)
+class EncoderDelay(TimeShift):
+    """A delay, of a target of either sign: its tracker may have a clock of its own that is ahead."""
+
+    def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
+        """Without a sign where a tracker gives the stamps."""
+        of_target = any(target.name == owner for target in robot.targets)
+        return tuple(replace(p, sign="+-") for p in self.parameters) if of_target else self.parameters
+
+
+EFFECT = EncoderDelay(
     id="encoder_delay",
     owners=("joint", "link_encoder", "target", "robot"),
     late=late,
@@ -33,7 +48,7 @@ EFFECT = TimeShift(
         "p(t - delay)",
         explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
         "joint: its encoder is read later than those of the others. Cameras expose, compute and send for tens of "
-        "milliseconds.",
+        "milliseconds; where they have a clock of their own, it may be ahead, and the delay is below zero.",
         source="Kelly, Sukhatme (2014), A general framework for temporal calibration of multiple proprioceptive and "
         "exteroceptive sensors, in Experimental Robotics, Springer",
         typical="0.1 to 10 ms; of cameras and motion capture 5 to 100 ms",

@@ -38,6 +38,7 @@ LATEST, STEP = 0.2, 0.004  # [s] delays that are looked for
 FEW_ROUNDS = 30  # of a fit where only its delay is asked for
 MIRRORED = 0.5  # times what is left of right-handed positions may be left of mirrored ones
 DELAY = "encoder_delay"  # the effect of a late tracker
+BELOW_ZERO = ", below zero, as where the clocks of two computers differ"
 LATE = 0.7  # times what is left without a delay may be left with it
 ARMS = 0.3  # [m] places of a target on its link to begin with
 
@@ -99,30 +100,31 @@ def fitted_tracker(tree: RigidTree, body: str, at: Array, q: Array, seen: Array)
 
 
 def _late(robot: Robot, target: PositionTarget, motion: JointMotion, stream: Stream) -> tuple[float, list[Notice]]:
-    """Delay of a tracker whose stamps are late, which the robot file does not know [s], and what is said of it.
+    """Delay of a tracker that is late, or early, which the robot file does not know [s], and what is said of it.
 
     Springs put a target elsewhere with the acceleration, a delay with the velocity. Zero where the best delay does not
     leave much less than none.
     """
     if any(here.owner == target.name and isinstance(here.effect, TimeShift) for here in robot.effects):
         return 0.0, []
-    tried = np.arange(0.0, LATEST + 0.5 * STEP, STEP)
     now = _left_at(robot.tree, target, motion, stream, 0.0)
     if now < NOISE * target.sigma:
         return 0.0, []
-    found = np.array([now, *(_left_at(robot.tree, target, motion, stream, float(delay)) for delay in tried[1:])])
+    tried = STEP * np.arange(-round(LATEST / STEP), round(LATEST / STEP) + 1)
+    found = np.array([_left_at(robot.tree, target, motion, stream, float(delay)) if delay else now for delay in tried])
     k = int(np.argmin(found))
-    if k == 0 or found[k] > LATE * now:
+    if tried[k] == 0.0 or found[k] > LATE * now:
         return 0.0, []
     delay = float(tried[k])
-    if k + 1 < len(tried):
+    if 0 < k < len(tried) - 1:
         bend = found[k - 1] ** 2 - 2.0 * found[k] ** 2 + found[k + 1] ** 2
         delay += 0.5 * STEP * float((found[k - 1] ** 2 - found[k + 1] ** 2) / max(bend, 1e-300))
     springs = ", some of which may be due to springs" if robot.layout.motors else ""
+    early, below = ("late", "") if delay > 0.0 else ("early", BELOW_ZERO)
     text = (
-        f"{target.name} is late, by about {1e3 * delay:.2g} ms{springs}: with it {1e3 * found[k]:.3g} mm of "
+        f"{target.name} is {early}, by about {1e3 * abs(delay):.2g} ms{springs}: with it {1e3 * found[k]:.3g} mm of "
         f"{1e3 * now:.3g} mm are left between tracker and motors (rms); put {DELAY}@{target.name} into the robot file "
-        "(`jointscope add`), and the calibration finds the delay"
+        f"(`jointscope add`), and the calibration finds the delay{below}"
     )
     return delay, [Notice(target.name, "timing", len(stream), text)]
 

@@ -144,7 +144,7 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
     from jointscope.robots.model.command_words import edited_file
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
-    from jointscope.tools.init.estimates.what_is_missing import what_is_missing
+    from jointscope.tools.init.what_is_missing import what_is_missing
 
     poor = [
         joint

@@ -11,6 +11,7 @@ import pytest
 from simulated_arm import Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.scoring.asked_by_regression import Asked
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
@@ -34,7 +35,7 @@ def as_advised(robot, streams):
     found = [calibrated(robot, streams)]
     while check(found[-1]).level == "bad" and len(found) <= MOST_STEPS:
         first = next((e for e in found[-1].lacking if e.moved(found[-1].found)), None)
-        for effect in found[-1].causes or filter(None, [first]):
+        for effect in found[-1].asked.causes or filter(None, [first]):
             robot = add_effect(robot, effect.label)
         found.append(calibrated(robot, streams))
     return found
@@ -61,7 +62,7 @@ def test_cables_that_pull_are_asked_for_and_make_the_values_right(robot):
     labels = "parallel_spring@j0 parallel_spring@j1"
     assert f"`jointscope add {file}.yaml {labels} -o {file}_parallel_spring.yaml`" in check(result).text
     # where regression has no name for it, a search is advised
-    result = replace(result, causes=())
+    result = replace(result, asked=Asked())
     asked = f"`jointscope discover {file}.yaml arm.mcap --holdout"
     assert f"{asked}-share 0.33 -o {file}_better.yaml`" in check(result).text
     (bag,) = result.bags

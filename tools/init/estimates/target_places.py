@@ -24,6 +24,7 @@ from jointscope.robots.units import si_factor
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.messages.open_bag import open_bag
 from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.init.estimates.open_target import held_parameters
 from jointscope.tools.init.streams.sensor_noise import NoiseGuess, guess_noise
 
 Array = NDArray[np.float64]
@@ -35,6 +36,7 @@ FIELDS = {
     "geometry_msgs/msg/TransformStamped": "transform.translation",
 }
 """Types of messages with a position, and the field that holds it."""
+PLACE, TURN = 0.1, 0.2  # [m], [rad] by which places fitted without springs may be off
 LARGEST = 5.0  # [m] a target that is farther from its link is in millimetres
 
 
@@ -46,11 +48,13 @@ class GuessedTarget:
         sensor: as a robot file has it.
         noise: of one component, in the unit of the bag.
         left: what remains between measured and predicted positions, root mean square [m]; springs are not in it.
+        held: parameters of which the motion tells nothing beside the others.
     """
 
     sensor: PositionTarget
     noise: NoiseGuess
     left: float
+    held: tuple[str, ...] = ()
 
 
 def position_topics(bag: Path) -> dict[str, str]:
@@ -102,7 +106,9 @@ def _fitted(bag: Path, robot: Robot, source: Topic, link: str, taken: Sequence[s
         if np.linalg.norm(at) < LARGEST:
             break
     fitted = replace(sensor, source=replace(source, unit=unit), at=at, tracker_pose=T)
-    return GuessedTarget(fitted, guess_noise(stream.times, stream.values, unit), left)
+    noise = guess_noise(stream.times, stream.values, unit)
+    sigma, priors = si_factor(unit) * noise.sigma, np.repeat([PLACE, PLACE, TURN], 3)
+    return GuessedTarget(fitted, noise, left, held_parameters(posed.tree, fitted, q, sigma, priors))
 
 
 def _name(topic: str, taken: Sequence[str]) -> str:

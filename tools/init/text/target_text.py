@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from jointscope.tools.init.estimates.target_places import GuessedTarget
+from jointscope.tools.init.estimates.target_places import PLACE, TURN, GuessedTarget
 from jointscope.tools.init.text.robot_line import as_list, line, number
 from jointscope.tools.init.text.source_text import sigma_line
 
-PLACE, TURN = 0.1, 0.2  # [m], [rad] by which places fitted without springs may be off
+HELD = "the motion does not tell it from the others of this target; held where it was fitted"
 
 
 def target_lines(target: GuessedTarget) -> list[str]:
@@ -34,10 +34,15 @@ def target_lines(target: GuessedTarget) -> list[str]:
 def target_parameters(targets: Iterable[GuessedTarget]) -> list[str]:
     """What is to be estimated of them."""
     return [
-        f"  {name}: {{value: 0.0, unit: {unit}, positive: false, prior_sigma: {PLACE if unit == 'm' else TURN}}}"
+        _parameter(name, unit, name in target.held)
         for target in targets
         for name, unit in target.sensor.parameters.items()
     ]
+
+
+def _parameter(name: str, unit: str, held: bool) -> str:
+    text = f"  {name}: {{value: 0.0, unit: {unit}, positive: false, prior_sigma: {PLACE if unit == 'm' else TURN}"
+    return line(f"{text.strip()}, fixed: true}}", HELD, True, 2) if held else f"{text}}}"
 
 
 def position_hints(topics: Sequence[str], used: Iterable[str], links: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from simulated_arm import Arm, moved, robot_file
 
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.init.estimates.what_is_missing import NOTHING, what_is_missing
+from jointscope.tools.init.what_is_missing import NOTHING, what_is_missing
 
 ARM = Arm()
 
