@@ -62,9 +62,8 @@ TOLD_OF_WHITE = (
     "timing",
     "masses",
     "lacking",
-    "causes",
-    "changed",
     "inertia_shifts",
+    "asked",
 )  # what torques that last would hide
 STANDING = 2.0  # times the noise of the motion, from which joints that truly stick explain what windows ask for
 
