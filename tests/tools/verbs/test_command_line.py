@@ -267,7 +267,7 @@ def test_calibrate_says_what_it_found_and_writes_every_file(no_solving, capsys):
     ):
         assert part in text
     doubtful = judge(fake_calibration()).level != "good"
-    assert ("jointscope diagnose o.yaml a.mcap --report diagnosis.html" in text) is doubtful is True
+    assert ("jointscope diagnose o.yaml 'runs/train <1>.mcap' --report diagnosis.html" in text) is doubtful is True
     assert files() == {"o.yaml", "r.html", "f.rrd", "c.json"}
     content = json.loads(Path("c.json").read_text())
     assert content["converged"] is True

@@ -159,9 +159,11 @@ def _need_joints(motors: NamedSignal, urdf_joints: tuple[str, ...], stance: Mapp
         )
     if not motors.names:
         width = signal.values.shape[1]
+        alone = "; topics of one joint each are put together where messages name the joint: let the driver fill `name`"
+        choice = f"choose {width} of them with --joints{alone if width == 1 else ''}"
         raise RecordingError(
             f"{signal.topic} names no joints and has {width} columns for {len(urdf_joints)} joints of the URDF "
-            f"({', '.join(urdf_joints)}); choose {width} of them with --joints"
+            f"({', '.join(urdf_joints)}); {choice}"
         )
     if not any(s.moves for s in stance.values()):
         spans = ", ".join(f"{joint} {s.span:.2g}" for joint, s in stance.items())
