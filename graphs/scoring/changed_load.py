@@ -190,7 +190,8 @@ class _Search:
             found = fit(self._rows.robot, joint, self._acting(joint, parts, 0, 1))
             shares[joint], torques[joint] = found.left / self._plain[joint], float(found.more[-1] * found.gain)
         told = [j for j in self.joints if shares[j] * self._plain[j] < THAN_ALWAYS * self._always[j]]
-        told = [j for j in told if min(self._inside_and_beside(j, stretch)) >= FEWEST]
+        # a drive that gives nothing, as in a damaged recording, says how large nothing is
+        told = [j for j in told if self._driving[j] > 0.0 and min(self._inside_and_beside(j, stretch)) >= FEWEST]
         joint = min(told, key=lambda j: shares[j], default=-1)
         if joint < 0:
             return None
