@@ -57,7 +57,7 @@ def calibrate_beside_motion(
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     alone = calibrate_frequency(robot, shaken, lambda text, share: report(f"responses: {text}", 0.2 * share))
-    summary = alone.summary
+    summary = alone.summary.without_friction()
     for _ in range(MOST_PASSES):
         result = calibrate(robot, recordings, sets=[*sets, summary], progress=report, **options)
         there = summary_at(summary, result.robot)
@@ -71,7 +71,8 @@ def summary_at(summary: FrequencySummary, robot: Robot) -> FrequencySummary:
     """The same responses as a factor that is linearised at the values of a robot, of the same parameters."""
     problems = [problem.of_robot(_of_names(problem.robot, robot, summary.names)) for problem in summary.problems]
     calibration = Calibration.of(problems[0].robot).only([DYNAMICS])
-    return FrequencySummary.of([next_stage(problem, calibration) for problem in problems], calibration)
+    stages = [next_stage(problem, calibration) for problem in problems]
+    return FrequencySummary.of(stages, calibration).without_friction()
 
 
 def moved(result: CalibrationResult, summary: FrequencySummary, there: FrequencySummary) -> float:

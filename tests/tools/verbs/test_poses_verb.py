@@ -186,7 +186,7 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
             ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
             "b.mcap is given with --frequency and held out",
         ),
-        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "not yet with motion or rests"),
+        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "a search takes motion apart from --frequency"),
         (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
         (
             ["discover", "doggy", "a.mcap", "--holdout-poses", "p.csv", "-o", "a.yaml"],
