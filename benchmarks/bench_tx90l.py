@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage] [--json FILE] [--folder DIR] [--table]
+Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways] [--json FILE] [--folder DIR] [--table]
 
 With `kinds` poses and frequency responses in one graph, with `search` what is found with both, with `coverage` how
-often sigmas hold the truth, in sections of their own; an interrupted search goes on where it stopped. Recordings that
+often sigmas hold the truth, with `ways` the same recordings in three ways, in sections of their own; an interrupted search goes on where it stopped. Recordings that
 another program simulated lie in ../shared/data; arms with effects are simulated by MuJoCo.
 """
 
@@ -24,6 +24,7 @@ from tx90l_coverage import coverage_rows
 from tx90l_frequency import frequency_rows
 from tx90l_kinds import kinds_rows
 from tx90l_search import search_rows
+from tx90l_ways import ways_rows
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.joint_kinds.discover_arm import discover_arm
@@ -66,7 +67,7 @@ TOLD: list[str] = []  # what goes into the page, too
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
-    parser.add_argument("part", nargs="?", choices=["kinds", "search", "coverage"], help="measure this alone")
+    parser.add_argument("part", nargs="?", choices=list(PARTS), help="measure this alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
     folder = Path(tempfile.gettempdir()) / "jointscope-bench-tx90l"
     parser.add_argument(
@@ -97,11 +98,13 @@ def main() -> None:
 PARTS: dict[str, Callable[[Robot, argparse.Namespace], dict[str, Any]]] = {
     "kinds": lambda robot, _: kinds_rows(robot, DATA, _tell),
     "search": lambda robot, given: search_rows(robot, given.folder, _tell, not given.table),
+    "ways": lambda robot, _: ways_rows(robot, DATA, _tell),
     "coverage": lambda robot, given: coverage_rows(robot, given.folder, _tell, not given.table),
 }
 TITLES = {
     "kinds": "Poses and frequency responses in one graph",
     "search": "Poses and frequency responses together: what is missing",
+    "ways": "Frequency responses in three ways",
     "coverage": "Frequency responses alone: twenty arms",
 }
 
