@@ -58,9 +58,10 @@ def ways_rows(robot: Robot, data: Path, tell: Tell) -> dict[str, Any]:
         found[way] = groups
     arm, values = FlexibleArm(robot), {n: p.value for n, p in robot.parameters.items()} | truth
     fastest = max(_fastest(arm, pose.pose.q, values) for pose in problems)
+    turn = 2.0 * np.pi * fastest * STEP
     tell(
-        f"\nMotion in the time domain: the fastest mode of motors, drives and bearings is at {fastest:.0f} Hz, far above "
-        f"the lines; a step of {1e3 * STEP:g} ms turns its phase by {2.0 * np.pi * fastest * STEP:.1f} rad.\n"
+        f"\nFor motion in the time domain: the fastest mode of motors, drives and bearings is at {fastest:.0f} Hz; a step "
+        f"of {1e3 * STEP:g} ms turns its phase by {turn:.1f} rad.\n"
     )
     return {"ways": found, "fastest_hz": fastest}
 
