@@ -60,8 +60,8 @@ def ways_rows(robot: Robot, data: Path, tell: Tell) -> dict[str, Any]:
     fastest = max(_fastest(arm, pose.pose.q, values) for pose in problems)
     turn = 2.0 * np.pi * fastest * STEP
     tell(
-        f"\nFor motion in the time domain: the fastest mode of motors, drives and bearings is at {fastest:.0f} Hz; a step "
-        f"of {1e3 * STEP:g} ms turns its phase by {turn:.1f} rad.\n"
+        f"\nFor motion in the time domain: the fastest mode of motors, drives and bearings is at {fastest:.0f} Hz; "
+        f"a step of {1e3 * STEP:g} ms turns its phase by {turn:.1f} rad.\n"
     )
     return {"ways": found, "fastest_hz": fastest}
 
