@@ -30,7 +30,7 @@ def three_axes(folder: Path) -> Robot:
 
 
 def record(folder: Path, seed: int = 3, seconds: float = 6.0, softer: float = 1.0) -> dict[str, float]:
-    """Writes the robot file, `moves.mcap` and `shaken/`; returns the true values.
+    """Writes the robot file, `moves.mcap` and `both/`; returns the true values.
 
     Args:
         folder: where to.
@@ -42,7 +42,7 @@ def record(folder: Path, seed: int = 3, seconds: float = 6.0, softer: float = 1.
     shaking = Shaking(poses=[np.array(pose) for pose in POSES], realisations=1)
     made, _, truth = simulate_frequency(robot, seed, PoseConditions(perfect=True), shaking)
     bags = [(one.name, one.signals, one.command) for one in made]
-    write_shaken(folder / "shaken", robot, bags, made[0].excitation, "")
+    write_shaken(folder / "both", robot, bags, made[0].excitation, "")
     found: dict[str, float] = {name: truth["parameters"][name] for name in robot.parameters}
     own = {n: v for n, v in found.items() if "motor_viscous" not in n}
     own["joint3.stiffness"] /= softer

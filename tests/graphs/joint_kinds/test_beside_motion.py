@@ -31,7 +31,7 @@ def kinds(tmp_path_factory):
     """Folder of the recordings, true values, the motion alone, the responses alone, and both."""
     folder = tmp_path_factory.mktemp("three_axes")
     truth = record(folder)
-    robot, bags = three_axes(folder), [folder / "shaken" / f"frequency_{k}.mcap" for k in (1, 2)]
+    robot, bags = three_axes(folder), [folder / "both" / f"frequency_{k}.mcap" for k in (1, 2)]
     motion = js.calibrate(robot, folder / "moves.mcap")
     responses = calibrate_frequency(robot, [read_shaken(bag, robot) for bag in bags])
     return folder, truth, motion, responses, js.calibrate(robot, folder / "moves.mcap", frequency=bags)
@@ -73,7 +73,7 @@ def test_the_graph_of_both_holds_the_responses_as_a_factor(kinds):
 @pytest.mark.slow
 def test_a_third_kind_adds_what_it_knows(kinds):
     folder, truth, _, _, both = kinds
-    robot, bags = three_axes(folder), [folder / "shaken" / f"frequency_{k}.mcap" for k in (1, 2)]
+    robot, bags = three_axes(folder), [folder / "both" / f"frequency_{k}.mcap" for k in (1, 2)]
     true = truth["joint2.stiffness"]
     torques, sigma = np.linspace(-100.0, 300.0, 10), 1e-8
     dial = torques / true + 2e-3 + sigma * np.random.default_rng(0).standard_normal(10)
@@ -88,7 +88,7 @@ def test_a_third_kind_adds_what_it_knows(kinds):
 @pytest.mark.slow
 def test_a_drive_that_is_softer_in_the_motion_is_a_contradiction(tmp_path):
     record(tmp_path, seconds=5.0, softer=1.03)
-    bags = [tmp_path / "shaken" / f"frequency_{k}.mcap" for k in (1, 2)]
+    bags = [tmp_path / "both" / f"frequency_{k}.mcap" for k in (1, 2)]
     both = js.calibrate(three_axes(tmp_path), tmp_path / "moves.mcap", frequency=bags)
     assert responses_agree(both).doubtful
     (check,) = [c for c in judge(both).checks if c.name == "Kinds that tell the same values"]
