@@ -74,6 +74,8 @@ bench-tx90l: $(VENV)/sim $(VENV)/code
 	$(BIN)/python benchmarks/bench_tx90l.py
 	$(BIN)/python benchmarks/bench_tx90l.py kinds
 	$(BIN)/python benchmarks/bench_tx90l.py search
+	$(BIN)/python benchmarks/bench_tx90l.py coverage
+	$(BIN)/python benchmarks/bench_tx90l.py ways
 
 bench-biorob: $(VENV)/code
 	$(BIN)/python benchmarks/bench_biorob.py

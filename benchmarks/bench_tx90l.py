@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search] [--json FILE] [--folder DIR] [--table]
+Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways] [--json FILE] [--folder DIR] [--table]
 
-With `kinds` poses and frequency responses in one graph, with `search` what is found with both, in sections of their
-own; an interrupted search goes on where it stopped. Recordings that another program simulated lie in ../shared/data;
-arms with effects are simulated by MuJoCo.
+With `kinds` poses and frequency responses in one graph, with `search` what is found with both, with `coverage` how
+often sigmas hold the truth, with `ways` the same recordings in three ways, in sections of their own; an interrupted
+search goes on where it stopped. Recordings that another program simulated lie in ../shared/data; arms with effects are
+simulated by MuJoCo.
 """
 
 from __future__ import annotations
@@ -14,14 +15,17 @@ import argparse
 import json
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from measured_page import environment, write_section
+from tx90l_coverage import coverage_rows
 from tx90l_frequency import frequency_rows
 from tx90l_kinds import kinds_rows
 from tx90l_search import search_rows
+from tx90l_ways import ways_rows
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.joint_kinds.discover_arm import discover_arm
@@ -64,26 +68,20 @@ TOLD: list[str] = []  # what goes into the page, too
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python benchmarks/bench_tx90l.py", description=__doc__)
-    parser.add_argument("part", nargs="?", choices=["kinds", "search"], help="measure this alone")
+    parser.add_argument("part", nargs="?", choices=list(PARTS), help="measure this alone")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures for machines, too")
     folder = Path(tempfile.gettempdir()) / "jointscope-bench-tx90l"
     parser.add_argument(
-        "--folder", type=Path, default=folder, metavar="DIR", help=f"recordings and rows of `search`; {folder}"
+        "--folder", type=Path, default=folder, metavar="DIR", help=f"recordings and rows of long parts; {folder}"
     )
-    parser.add_argument("--table", action="store_true", help="of `search`: measure nothing, tell what is there")
+    parser.add_argument("--table", action="store_true", help="of long parts: measure nothing, tell what is there")
     arguments = parser.parse_args()
     print(f"# Poses\n\n{environment()}\n")
     robot = load_robot("tx90l")
     found: dict[str, Any] = {}
     if arguments.part is not None:
-        together = arguments.part == "kinds"
-        found |= (
-            kinds_rows(robot, DATA, _tell)
-            if together
-            else search_rows(robot, arguments.folder, _tell, not arguments.table)
-        )
-        title = "in one graph" if together else "together: what is missing"
-        write_section("\n".join([f"## Poses and frequency responses {title}", *TOLD]), arguments.part)
+        found |= PARTS[arguments.part](robot, arguments)
+        write_section("\n".join([f"## {TITLES[arguments.part]}", *TOLD]), arguments.part)
         _write(arguments.json, found)
         return
     if DATA.is_dir():
@@ -96,6 +94,20 @@ def main() -> None:
     found |= _simulated(robot)
     write_section("\n".join(["## Poses", *TOLD]))
     _write(arguments.json, found)
+
+
+PARTS: dict[str, Callable[[Robot, argparse.Namespace], dict[str, Any]]] = {
+    "kinds": lambda robot, _: kinds_rows(robot, DATA, _tell),
+    "search": lambda robot, given: search_rows(robot, given.folder, _tell, not given.table),
+    "ways": lambda robot, _: ways_rows(robot, DATA, _tell),
+    "coverage": lambda robot, given: coverage_rows(robot, given.folder, _tell, not given.table),
+}
+TITLES = {
+    "kinds": "Poses and frequency responses in one graph",
+    "search": "Poses and frequency responses together: what is missing",
+    "ways": "Frequency responses in three ways",
+    "coverage": "Frequency responses alone: twenty arms",
+}
 
 
 def _write(path: Path | None, found: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.torque_memory import MEMORIES
+from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice
@@ -88,7 +89,7 @@ def _verdict(result: CalibrationResult) -> str:
     dynamics = [p for p in result.parameters if p.name in result.robot.parameters]
     count = len(dynamics)
     # how well a time is known shows in seconds, not in shares of a delay that may be none
-    dynamics = [p for p in dynamics if p.value and p.unit not in ("s", "s^2")]
+    dynamics = [p for p in dynamics if p.value and p.unit not in ("s", "s^2") and not is_geometry(p.name)]
     relative = [p.sigma / abs(p.value) for p in dynamics]
     if not relative:
         return "no parameter was free"

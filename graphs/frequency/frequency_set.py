@@ -22,7 +22,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.robots.files.frequency_section import COULOMB, VISCOUS
+from jointscope.robots.files.frequency_section import COULOMB, INERTIA, VISCOUS
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import SHARPNESS, Robot
 
@@ -220,6 +220,7 @@ class FrequencySet:
         for i, joint in enumerate(self.arm.joints):
             own = np.eye(len(self.arm.joints))[i]
             by_name[f"{joint}.{VISCOUS}"] = jw * moved.transpose(2, 0, 1) * own
+            by_name[f"{joint}.{INERTIA}"] = jw**2 * moved.transpose(2, 0, 1) * own
             by_name[f"{joint}.{COULOMB}"] = own * (stage.friction[0] + sharper * stage.friction[1])
             by_name[f"{joint}.{SHARPNESS}"] = own * (mu * stage.friction[1] + stage.sharper) * by_sharpness
         return whitened, r, {**by_name, **stage.geometry}
@@ -248,6 +249,7 @@ class FrequencySet:
         for i, joint in enumerate(self.arm.joints):
             column = -jw * (G[:, :, i, None] * G[:, i, None, :]) / G
             by_name |= {f"{joint}.{VISCOUS}": column, f"{joint}.{COULOMB}": np.asarray(self._seeming * column)}
+            by_name[f"{joint}.{INERTIA}"] = np.asarray(jw * column)
         return whitened, np.log(G / self.pose.matrix.G[self.pose.used]), by_name
 
     @property

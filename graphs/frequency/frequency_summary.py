@@ -43,16 +43,20 @@ class FrequencySummary:
 
     Attributes:
         robot: the model.
+        names: of the dynamic parameters that M is of, shape (p,); a robot may have others beside.
         information: M, shape (p, p).
-        preferred: coordinates of the dynamic parameters that the responses alone prefer, shape (p,).
+        preferred: coordinates of these parameters that the responses alone prefer, shape (p,).
         measured: number of measured values that it stands for.
+        problems: the poses at the stage at which they were linearised.
         owner: None, it is whole.
     """
 
     robot: Robot
+    names: tuple[str, ...]
     information: Array
     preferred: Array
     measured: int
+    problems: tuple[FrequencySet, ...] = ()
     owner: int | None = None
 
     kind: str = field(default="frequency", init=False)
@@ -88,7 +92,21 @@ class FrequencySummary:
         )
         M = half @ np.linalg.solve(S, half.T)
         preferred = calibration.dynamics - unit * (root @ (root.T @ g))
-        return FrequencySummary(robot, M / np.outer(unit, unit), preferred, sum(p.measured for p in problems))
+        count = sum(problem.measured for problem in problems)
+        return FrequencySummary(robot, calibration.names, M / np.outer(unit, unit), preferred, count, tuple(problems))
+
+    def without_friction(self) -> FrequencySummary:
+        """What the responses tell where their dry friction may be another one than that of the other kinds.
+
+        Noise of velocities rounds the friction off that responses see, so their size of it is some tenths of a per cent
+        too large, 2 to 3 of its sigmas; held to that of a motion, which knows it better, springs would bend to it.
+        """
+        dry = np.array([name.endswith(DRY) for name in self.names])
+        M = self.information
+        told = M[np.ix_(~dry, dry)] @ np.linalg.pinv(M[np.ix_(dry, dry)], hermitian=True)
+        less = np.zeros_like(M)
+        less[np.ix_(~dry, ~dry)] = M[np.ix_(~dry, ~dry)] - told @ M[np.ix_(dry, ~dry)]
+        return replace(self, information=less)
 
     def of_robot(self, robot: Robot) -> FrequencySummary:
         """The same responses of a robot with other values."""
@@ -101,9 +119,11 @@ class FrequencySummary:
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations of the shared values."""
         system = NormalEquations.zeros(0, 1, calibration.size)
-        away = calibration.dynamics - self.preferred
-        system.C += self.information
-        system.g_p += self.information @ away
+        places = [calibration.names.index(name) for name in self.names]
+        away = calibration.dynamics[places] - self.preferred
+        columns = np.arange(calibration.size)[calibration.columns[DYNAMICS]][places]
+        system.C[np.ix_(columns, columns)] += self.information
+        system.g_p[columns] += self.information @ away
         system.cost += 0.5 * float(away @ self.information @ away)
         return system
 

@@ -40,6 +40,12 @@ def error_names(joints: Sequence[str]) -> tuple[str, ...]:
     return (*names, *(f"{TOOL}.{part}" for part in (*LENGTHS, *ANGLES)))
 
 
+def is_geometry(name: str) -> bool:
+    """Whether a parameter is a geometric error: priors share out combinations of them that move no target."""
+    owner, _, part = name.partition(".")
+    return bool(owner) and part in (*LENGTHS, *ANGLES)
+
+
 def is_length(name: str) -> bool:
     """Whether an error is a length [m]; the others are angles [rad]."""
     return name.rpartition(".")[2] in LENGTHS

@@ -19,6 +19,7 @@ from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
 from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
+from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.transmission.calibrate_links import calibrate_links
@@ -45,7 +46,9 @@ from jointscope.tools.notebook.given import (
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed, Simulated
 from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
 from jointscope.tools.simulator.simulation import simulate as simulate_motion
+from jointscope.tools.verb_parts.frequency_runs import read_all_shaken
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
+from jointscope.tools.verb_parts.pose_runs import weighted_poses
 from jointscope.tools.verb_parts.rest_runs import weighted_rests
 from jointscope.tools.verdicts.judgement import judge
 
@@ -70,6 +73,8 @@ def calibrate(
     recordings: AnyRecording | Sequence[AnyRecording],
     *,
     rests: Sequence[str | Path] = (),
+    poses: Sequence[str | Path] = (),
+    frequency: Sequence[str | Path] = (),
     sets: Sequence[SetProblem] = (),
     accept: AnyLimits = (),
     biases_only: bool = False,
@@ -82,6 +87,8 @@ def calibrate(
         robot: model with start values and priors.
         recordings: of motion; parameters and mountings are shared, states and biases are each recording's own.
         rests: bags in which the robot stands, with weights on it or without, for the same estimate.
+        poses: tables or bags of the arm at rest with a measured target, for the same estimate.
+        frequency: bags in which the arm is shaken, one for each pose, for the same estimate.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
         accept: limits that the result must keep (docs/accept.md); `result.accepted` says whether it does.
         biases_only: leave dynamics and mountings as they are.
@@ -94,12 +101,20 @@ def calibrate(
     """
     model, limits = robot_of(robot), limits_of(accept)
     read_ones = recordings_of(recordings, model)
+    if rests or poses or frequency:
+        model.need_link_dynamics()
     if model.free_links:
         found = calibrate_links(model, read_ones, progress=progress)
     else:
-        all_sets = [*sets, *weighted_rests(model, [Path(path) for path in rests], progress or _quiet)]
+        report, paths = progress or _quiet, [[Path(path) for path in each] for each in (rests, poses, frequency)]
+        placed, at_poses = weighted_poses(model, paths[1], report)
+        all_sets = [*sets, *weighted_rests(placed, paths[0], report), *at_poses]
         options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
-        found = calibrate_motion(model, read_ones, **options)
+        shaken = read_all_shaken(placed, paths[2], report)
+        if shaken:
+            found = calibrate_beside_motion(placed, read_ones, shaken, **options)
+        else:
+            found = calibrate_motion(placed, read_ones, **options)
     content = {model.name: found.to_json() | judge(found).to_json()} if limits else {}
     return Calibrated.of(found, acceptance=check_models(limits, content))
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.calibration.findings import AS_STATED
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
+from jointscope.tools.terminal.beside_motion_text import poses_beside_motion, responses_beside_motion
 from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.judgement import Judgement, judge
@@ -23,6 +24,8 @@ def calibration_text(result: CalibrationResult, judgement: Judgement | None = No
         _weak_directions(result),
         _channels(result),
         rests_beside_motion(result),
+        poses_beside_motion(result),
+        responses_beside_motion(result),
     ]
     return "\n\n".join(part for part in parts if part)
 

@@ -63,7 +63,7 @@ def check_kind(args: argparse.Namespace) -> None:
         "--leave-out": bool(args.leave_out),
     }
     check_rests_alone(args)
-    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
+    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, search=True)
     if args.holdout_poses and not args.poses:
         raise RecordingError("--holdout-poses goes with --poses")
     if args.holdout_frequency and not args.frequency:

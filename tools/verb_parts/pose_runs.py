@@ -49,6 +49,7 @@ def check_one_kind(
     rests: Sequence[Path] | None,
     options: Mapping[str, bool],
     frequency: Sequence[Path] | None = None,
+    search: bool = False,
 ) -> None:
     """Kinds of recordings that go together, and no option of another.
 
@@ -58,6 +59,7 @@ def check_one_kind(
         rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
         frequency: as given; None of a verb that takes none.
+        search: whether effects are looked for, which takes fewer kinds at once.
 
     Raises:
         RecordingError: none, kinds that do not go together, or such an option without motion.
@@ -68,24 +70,22 @@ def check_one_kind(
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
         )
-    if frequency and (bags or rests):
+    if bags and search and (poses or frequency):
+        other = "--poses" if poses else "--frequency"
         raise RecordingError(
-            "frequency responses go with poses in one estimate, and not yet with motion or rests on the command line; "
-            "give --frequency with --poses or alone, and the robot file that it writes as ROBOT with the others"
+            f"a search takes motion apart from {other}; `jointscope calibrate` takes all kinds together: search with "
+            "one of them, and give the robot file that it writes as ROBOT with the other"
         )
-    if poses and rests:
+    if rests and (poses or frequency) and not bags:
+        other = "--poses" if poses else "--frequency"
         raise RecordingError(
-            "poses and rests in one estimate are not on the command line yet; from Python: "
-            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...), RestSet(...)]), see docs/poses.md"
+            f"--rests and {other} go into one estimate where motion is there, too (`jointscope calibrate ROBOT BAG "
+            f"--rests ... {other} ...`); without, give the robot file that {other} writes as ROBOT with --rests"
         )
-    twice = next((path for path in bags if path in (rests or ())), None)
+    still = {"rests": rests or (), "poses": poses, "frequency responses": frequency or ()}
+    twice = next(((path, kind) for kind, paths in still.items() for path in bags if path in paths), None)
     if twice is not None:
-        raise RecordingError(f"{twice} is given as motion and as rests; leave it out once")
-    if bags and poses:
-        raise RecordingError(
-            "recordings of motion and poses in one estimate are not on the command line yet; from Python: "
-            "jointscope.calibrate(robot, recordings, sets=[PoseSet(...)]), see docs/poses.md"
-        )
+        raise RecordingError(f"{twice[0]} is given as motion and as {twice[1]}; leave it out once")
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
         other = "--poses" if poses else "--frequency" if frequency else "--rests"
@@ -119,6 +119,17 @@ def run_pose_calibration(
     page, content = partial(poses_report, result, checked=checked), content | acceptance_json(checked)
     write_still(files, result.robot, pose_origin(result, robot), page, content, urdf_files(result.robot, urdf))
     return pose_calibration_text(result), checked
+
+
+def weighted_poses(robot: Robot, paths: Sequence[Path], progress: Progress) -> tuple[Robot, list[Any]]:
+    """Poses for an estimate with motion, weighted as they repeat, and the robot with the tracker where it stands."""
+    if not paths:
+        return robot, []
+    from jointscope.graphs.poses.calibrate_poses import calibrate_poses
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
+
+    problems = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress).problems
+    return problems[0].robot, list(problems)
 
 
 def urdf_files(robot: Robot, urdf: Path | None) -> dict[Path, str]:

@@ -20,11 +20,11 @@ from jointscope.tools.verb_parts.frequency_runs import (
     run_frequency_calibration,
     run_kinds_calibration,
 )
-from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration
+from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration, urdf_files
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
-from jointscope.tools.writing.whole_file import check_outputs
+from jointscope.tools.writing.whole_file import check_outputs, whole_file
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
@@ -35,6 +35,7 @@ EXAMPLE = """example:
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 -o arm.yaml --report arm.html
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 --poses poses -o arm.yaml --report arm.html
   jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
+  jointscope calibrate arm.yaml train --frequency frequency_P1 frequency_P3 --poses poses -o arm_calibrated.yaml
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
 takes as ROBOT."""
@@ -114,13 +115,17 @@ def run(args: argparse.Namespace) -> int:
         first_look(robot, recordings)
         seen = None if args.incremental else progress  # what is printed and a bar would write into each other
         solver = _solver(args, robot)
-        result = calibrate(robot, recordings, rests=args.rests, accept=limits, solver=solver, progress=seen)
+        kinds = {"rests": args.rests, "poses": args.poses, "frequency": args.frequency}
+        result = calibrate(robot, recordings, **kinds, accept=limits, solver=solver, progress=seen)
         if files.pictures:
             progress("writing", 1.0)
         result.write(files)
+        for path, content in urdf_files(result.robot, args.urdf).items():
+            with whole_file(path) as written:
+                written.write_text(content, encoding="utf-8")
     judgement = judge(result)
     print(calibration_text(result, judgement))
-    files.tell()
+    files.tell(args.urdf)
     if judgement.level != "good":
         words = [bag_arguments([args.output]), recording_arguments(recordings), *effects_words(args.effects)]
         print(f"What it may lack: jointscope diagnose {' '.join(words)} --report diagnosis.html")
@@ -131,11 +136,13 @@ def _still_kinds(
     args: argparse.Namespace, robot: Robot, files: ResultFiles, limits: Sequence[Limit]
 ) -> Callable[[Progress], tuple[str, AcceptedBy]] | None:
     """What calibrates from poses, frequency responses or rests alone; None where there is motion."""
+    if args.bags:
+        return None
     if args.poses and args.frequency:
         return partial(run_kinds_calibration, robot, args.frequency, args.poses, files, args.urdf, limits)
     if args.poses:
         return partial(run_pose_calibration, robot, args.poses, files, args.urdf, limits)
-    if args.bags or not (args.rests or args.frequency):
+    if not (args.rests or args.frequency):
         return None
     run_still = run_rest_calibration if args.rests else run_frequency_calibration
     return partial(run_still, robot, args.rests or args.frequency, files, limits)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.robots.model.robot import Robot
 
 HELD = 0.7  # a sigma of more than this share of the prior's tells that the data said little
@@ -32,7 +33,7 @@ def values_from_data(result: CalibrationResult) -> tuple[str, str]:
     if not noted:
         return "good", "No parameter leans on its prior or lies on a bound."
     meant = left_to_priors(result.robot)
-    dynamic = [p for p in noted if not is_mounting_or_bias(p)]
+    dynamic = [p for p in noted if not is_mounting_or_bias(p) and not is_geometry(p.name)]
     doubtful = [p for p in dynamic if not (p.name in meant and _only_held(p))]
     if guessed := _guessed(result, doubtful):
         return "bad", guessed

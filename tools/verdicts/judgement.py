@@ -11,12 +11,14 @@ import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
+from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
+from jointscope.tools.verdicts.same_values import same_values
 from jointscope.tools.verdicts.short_steps import short_steps
 from jointscope.tools.verdicts.torque_constants import suspicious_constants
 from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
@@ -98,6 +100,7 @@ def judge(result: CalibrationResult) -> Judgement:
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         _two_ways(result),
+        *(Check(*each) for each in same_values(result)),
         _constants(result),
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
         Check(missing[0], "Values that no missing effect would change", missing[1]),
@@ -215,7 +218,8 @@ def _determined(result: CalibrationResult) -> Check:
 
 def _typically_open(result: CalibrationResult) -> float:
     """Median relative sigma of the dynamic parameters."""
-    free = [p for p in result.parameters if not is_mounting_or_bias(p) and p.unit not in ("s", "s^2") and p.value]
+    free = [p for p in result.parameters if not (is_mounting_or_bias(p) or is_geometry(p.name)) and p.value]
+    free = [p for p in free if p.unit not in ("s", "s^2")]
     return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
 
 

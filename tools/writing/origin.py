@@ -26,10 +26,13 @@ def provenance(result: Any) -> dict[str, Any]:
 
 
 def other_kinds(result: Any) -> dict[str, Any]:
-    """Rests that a calibration used beside motion."""
-    rests = [problem.rests for problem, *_ in result.sets if problem.kind == "rests"]
-    found = [{"path": each.path, "sha256": each.sha256, "count": len(each)} for each in rests]
-    return {"rests": found} if found else {}
+    """Rests, poses and frequency responses that a calibration used beside motion."""
+    still = [(p.kind, getattr(p, p.kind)) for p, *_ in result.sets if p.kind in ("rests", "poses")]
+    found: dict[str, Any] = {}
+    for kind, each in still:
+        found.setdefault(kind, []).append({"path": each.path, "sha256": each.sha256, "count": len(each)})
+    shaken = [one.pose for p, *_ in result.sets if p.kind == "frequency" for one in p.problems]
+    return found | ({"frequency": [{"path": p.path, "sha256": p.sha256} for p in shaken]} if shaken else {})
 
 
 def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:

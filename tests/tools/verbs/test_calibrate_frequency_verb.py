@@ -35,10 +35,9 @@ def test_a_robot_that_does_not_say_what_is_shaken_is_told_where_to_look(bag, tmp
 
 def test_other_kinds_and_options_of_motion_are_refused(bag, tmp_path, capsys):
     out = ["-o", tmp_path / "o.yaml"]
-    assert "not yet with motion or rests" in refused(["tx90l", bag, OPTION, bag, *out], capsys)
+    assert "given as motion and as frequency responses" in refused(["tx90l", bag, OPTION, bag, *out], capsys)
     both = ["tx90l", OPTION, bag, "--poses", bag, *out]
-    assert "not yet with motion or rests" in refused(["tx90l", bag, *both[1:]], capsys)
-    assert "not yet with motion or rests" in refused([*both, "--rests", bag], capsys)
+    assert "--rests and --poses go into one estimate where motion is there" in refused([*both, "--rests", bag], capsys)
     assert "leave it out with --poses" in refused([*both, "--incremental"], capsys)
     assert "--rrd shows motion" in refused([*both, "--rrd", tmp_path / "o.rrd"], capsys)
     assert "leave it out with --frequency" in refused(["tx90l", OPTION, bag, "--incremental", *out], capsys)

@@ -81,8 +81,8 @@ def test_a_calibrated_file_is_the_start_of_the_next_calibration(calibrated, tmp_
     [
         (["calibrate", "tx90l", "-o", "a.yaml"], "nothing to calibrate from; expected BAG"),
         (
-            ["calibrate", "tx90l", "x.mcap", "--poses", "p.csv", "-o", "a.yaml"],
-            "in one estimate are not on the",
+            ["calibrate", "tx90l", "p.csv", "--poses", "p.csv", "-o", "a.yaml"],
+            "p.csv is given as motion and as poses; leave it out once",
         ),
         (
             ["calibrate", "tx90l", "--poses", "p.csv", "--incremental", "-o", "a.yaml"],
@@ -186,7 +186,7 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
             ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
             "b.mcap is given with --frequency and held out",
         ),
-        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "not yet with motion or rests"),
+        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "a search takes motion apart from --frequency"),
         (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
         (
             ["discover", "doggy", "a.mcap", "--holdout-poses", "p.csv", "-o", "a.yaml"],

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What poses and frequency responses say of a calibration with motion, on the screen."""
+
+from __future__ import annotations
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.frequency.explained import pose_fit
+from jointscope.graphs.frequency.frequency_summary import FrequencySummary
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import tip_errors
+from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.presentation.numbers import percent
+from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.same_values import same_values
+
+
+def poses_beside_motion(result: CalibrationResult) -> str:
+    """How far targets are from where the model has them; empty without poses."""
+    problems = [problem.of_robot(result.robot) for problem, *_ in result.sets if isinstance(problem, PoseSet)]
+    rows = []
+    for problem in problems:
+        mm = tip_errors(problem).to_json()
+        shown = [f"{mm[key]:.3g}" for key in ("mean_mm", "p90_mm", "max_mm")]
+        rows.append([problem.poses.path, str(len(problem.poses)), *shown])
+    head = ["poses in the same estimate", "number", "mean [mm]", "90 % [mm]", "largest [mm]"]
+    return text_table(head, rows, "<>>>>") if rows else ""
+
+
+def responses_beside_motion(result: CalibrationResult) -> str:
+    """What the torque balance leaves, and whether both kinds agree; empty without frequency responses."""
+    problems = [p for s, *_ in result.sets if isinstance(s, FrequencySummary) for p in s.problems]
+    if not problems:
+        return ""
+    at = Calibration.of(result.robot).only([DYNAMICS])
+    left = max(float(pose_fit(problem.of_robot(result.robot), at).left.max()) for problem in problems)
+    lines = [
+        f"{counted(len(problems), 'pose')} that {'was' if len(problems) == 1 else 'were'} shaken in the same estimate: "
+        f"the balance leaves up to {percent(left)} of a motor's torque.",
+        *(f"  {text}" for _, _, text in same_values(result)),
+    ]
+    return "\n".join(lines)
