@@ -7,9 +7,10 @@ Its logarithm pulls s down, and each y outside pushes it up. It is no sum of squ
 
     c = -log(L sigma sqrt(2 pi)) >= 0
 
-with its gradient, and in place of the second derivatives, which vanish inside the band, the information that one rest
-gives on average (Fisher scoring). The largest y of many rests, as Ho and Kisner, eq. (46), take it, is the limit for
-small sigma; it is too small where there are few rests.
+with its gradient, its curvature, and the information that one rest gives on average. -log L falls like log s as long as
+s is wide, and only the few y at the edges bend it: a step by the average information, which is that of the edges, would
+be as long as they are wide, and a band far too wide would hardly move. The largest y of many rests, as Ho and Kisner,
+eq. (46), take it, is the limit for small sigma; it is too small where there are few rests.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ class BandCost:
         cost: never negative.
         by_torque, by_half: gradient by y and by s [1/(N m)].
         torque_information, half_information: expected second derivatives [1/(N m)^2]; the mixed one is zero.
+        curvature: second derivatives by (y, y), (y, s), (s, s) without those of log s, which are negative: a positive
+            semidefinite matrix, since the other part of the cost is convex, shape (3, m) [1/(N m)^2].
     """
 
     cost: Array
@@ -42,6 +45,7 @@ class BandCost:
     by_half: Array
     torque_information: Array
     half_information: Array
+    curvature: Array
 
 
 def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
@@ -61,7 +65,9 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     by_half = -(phi_a + phi_b) / sigma + 1.0 / half
     log_ratio = np.log(np.clip(half / sigma, RATIOS[0], RATIOS[-1]))
     of_y, of_s = (np.interp(log_ratio, np.log(RATIOS), part) for part in _information())
-    return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2)
+    of_a, of_b, of_both = phi_a * (a + phi_a), phi_b * (phi_b - b), -phi_a * phi_b
+    curvature = np.stack([of_a + 2.0 * of_both + of_b, of_a - of_b, of_a - 2.0 * of_both + of_b]) / sigma**2
+    return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
 
 
 def _log_difference(upper: Array, lower: Array) -> Array:

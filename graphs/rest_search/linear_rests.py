@@ -118,11 +118,7 @@ class LinearRests:
         y, half = self.y + self.Y @ d, self.half + self.H @ d
         found = band_cost(y, half, sigma)
         g = self.A @ d + self.b + self.Y.T @ found.by_torque + self.H.T @ found.by_half
-        total, difference = (1.0 / half - found.by_half) * sigma, -found.by_torque * sigma
-        upper, lower = 0.5 * (total + difference), 0.5 * (total - difference)
-        a, b = (y + half) / sigma, (y - half) / sigma
-        of_a, of_b, of_both = upper * (a + upper), lower * (lower - b), -upper * lower
-        yy, hh, yh = (part / sigma**2 for part in (of_a + 2 * of_both + of_b, of_a - 2 * of_both + of_b, of_a - of_b))
+        yy, yh, hh = found.curvature
         Y, H = self.Y, self.H
         mixed = Y.T @ (yh[:, None] * H)
         return g, self.A + Y.T @ (yy[:, None] * Y) + H.T @ (hh[:, None] * H) + mixed + mixed.T

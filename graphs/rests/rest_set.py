@@ -177,11 +177,11 @@ class RestSet:
         x, calibration = self.start(Calibration.of(self.robot))
         return WholeSet(blind, x, calibration, ()).states
 
-    def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
-        """Normal equations at positions of shape (m, d)."""
-        return of_independent_states(*self.rows(x, calibration))
+    def linearize(self, x: Array, calibration: Calibration, expected: bool = False) -> NormalEquations:
+        """Normal equations at positions of shape (m, d); `expected` as of `RestBands.rows`."""
+        return of_independent_states(*self.rows(x, calibration, expected))
 
-    def rows(self, x: Array, calibration: Calibration) -> tuple[Array, Array, Array, Array]:
+    def rows(self, x: Array, calibration: Calibration, expected: bool = False) -> tuple[Array, Array, Array, Array]:
         """What `of_independent_states` makes normal equations of: whitened residuals, derivatives, cost of each rest.
 
         Returns:
@@ -190,7 +190,7 @@ class RestSet:
         torques = self.torques(x, calibration)
         r, J, P = self.equations(x, torques, calibration)
         costs = 0.5 * np.sum(r**2, axis=1)
-        of_bands, band_costs = self.bands(torques, calibration).rows()
+        of_bands, band_costs = self.bands(torques, calibration).rows(expected)
         r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
         return r, J, P, costs + band_costs
 
