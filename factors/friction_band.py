@@ -25,6 +25,7 @@ from scipy.special import log_ndtr, ndtr
 Array = NDArray[np.float64]
 LOG_2PI = float(np.log(2.0 * np.pi))
 RATIOS = np.geomspace(1e-2, 1e4, 61)  # s / sigma of the table of information
+FAR_INSIDE = 6.0  # [sigma] from the edge, where the likelihood is that of a sharp band to 1e-9
 NODES = 4001  # of the integrals behind it
 
 
@@ -68,6 +69,16 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     of_a, of_b, of_both = phi_a * (a + phi_a), phi_b * (phi_b - b), -phi_a * phi_b
     curvature = np.stack([of_a + 2.0 * of_both + of_b, of_a - of_b, of_a - 2.0 * of_both + of_b]) / sigma**2
     return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
+
+
+def likelihood_cost(y: Array, half: Array, sigma: Array) -> Array:
+    """The cost alone, of many torques quickly; arguments as of `band_cost`, all of one shape, which the cost has."""
+    depth = (half - np.abs(y)) / sigma
+    inside = (depth > FAR_INSIDE) | ~(half > 0.0)
+    upper, lower = depth[~inside], -((half + np.abs(y)) / sigma)[~inside]
+    log_p = np.zeros_like(y)
+    log_p[~inside] = _log_difference(upper, lower)
+    return np.asarray(np.log(2.0 * half / sigma) - log_p - 0.5 * LOG_2PI)
 
 
 def _log_difference(upper: Array, lower: Array) -> Array:

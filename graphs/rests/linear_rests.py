@@ -34,6 +34,7 @@ class LinearRests:
         A, b: shape (p, p) and (p,), priors included.
         y, half, Y, H: shape (M,) and (M, p) [N m].
         sigma, scale: of the M bands, noise without the blur of the edges, and what this is relative to [N m].
+        motor: number of the motor of each band, shape (M,).
     """
 
     A: Array
@@ -44,6 +45,7 @@ class LinearRests:
     H: Array
     sigma: Array
     scale: Array
+    motor: Columns
 
     @staticmethod
     def of(problem: RestSet, x: Array, calibration: Calibration, weight: Array, pull: Array) -> LinearRests:
@@ -75,7 +77,9 @@ class LinearRests:
         noise = np.hypot(bands.sigma, np.sqrt(np.einsum("mnd,mde,mne->mn", by_x, covariance, by_x)))
         scale = np.broadcast_to(problem.friction_scale, y.shape)
         half = np.maximum(half, 1e-3 * scale)
-        return LinearRests(0.5 * (A + A.T), b, *(part[kept] for part in (y, half, Y, H, noise, scale)))
+        return LinearRests(
+            0.5 * (A + A.T), b, *(part[kept] for part in (y, half, Y, H, noise, scale)), np.nonzero(kept)[1]
+        )
 
     def minimum(self, columns: Columns) -> tuple[Array, float]:
         """Values and cost where it is smallest, the values of other columns held.
