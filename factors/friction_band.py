@@ -71,14 +71,29 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
 
 
-def likelihood_cost(y: Array, half: Array, sigma: Array) -> Array:
-    """The cost alone, of many torques quickly; arguments as of `band_cost`, all of one shape, which the cost has."""
-    depth = (half - np.abs(y)) / sigma
-    inside = (depth > FAR_INSIDE) | ~(half > 0.0)
-    upper, lower = depth[~inside], -((half + np.abs(y)) / sigma)[~inside]
-    log_p = np.zeros_like(y)
-    log_p[~inside] = _log_difference(upper, lower)
-    return np.asarray(np.log(2.0 * half / sigma) - log_p - 0.5 * LOG_2PI)
+def likelihood_cost(y: Array, half: Array, sigma: Array, at_edge: Array) -> Array:
+    """The cost alone, of many torques quickly, where some share of them lies at the edges.
+
+    A motor that slid to where it rests has all of its friction; one whose torque changed afterwards has any. So
+
+        L = (1 - w) (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s) + w (N(y; s, sigma) + N(y; -s, sigma)) / 2
+
+    Args:
+        y: torques less the middle of their bands, shape (k, m) [N m].
+        half: half widths s > 0, shape (k, m) [N m].
+        sigma: noise of the torques, shape (m,) [N m].
+        at_edge: the share w, between 0 and 1, shape (k,).
+
+    Returns:
+        Shape (k, m).
+    """
+    sigma, w = np.broadcast_to(sigma, y.shape), np.broadcast_to(at_edge[:, None], y.shape)
+    depth, width = (half - np.abs(y)) / sigma, np.log(2.0 * half / sigma)
+    log_l, near = np.log1p(-w) - width, depth < FAR_INSIDE
+    d, across = depth[near], ((half + np.abs(y)) / sigma)[near]
+    edges = np.logaddexp(-0.5 * d * d, -0.5 * across * across) - 0.5 * LOG_2PI
+    log_l[near] = np.logaddexp(log_l[near] + _log_difference(d, -across), np.log(0.5 * w[near]) + edges)
+    return np.asarray(-log_l - 0.5 * LOG_2PI)
 
 
 def _log_difference(upper: Array, lower: Array) -> Array:

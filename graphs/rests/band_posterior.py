@@ -141,20 +141,22 @@ def _sampled(bands: _Bands, T: Array, c: Array, start: Array) -> tuple[Array, Ar
     Y, H = bands.Y @ T, bands.H @ T
     bounded = np.isfinite(bands.least)
 
-    def cost(z: Array) -> Array:
-        half = bands.half + z @ H.T
-        found = np.full(len(z), np.inf)
+    def cost(point: Array) -> Array:
+        z, at_edge = point[:, :r], point[:, r]
+        half, found = bands.half + z @ H.T, np.full(len(z), np.inf)
         inside = np.all(half > 0.0, axis=1) & np.all(z @ T[bounded].T > bands.least[bounded], axis=1)
+        inside &= (at_edge > 0.0) & (at_edge < 1.0)
         if inside.any():
-            y = bands.y + z[inside] @ Y.T
-            band = likelihood_cost(y, half[inside], np.broadcast_to(bands.sigma, y.shape)).sum(axis=1)
-            found[inside] = band + 0.5 * np.sum(z[inside] ** 2, axis=1) + z[inside] @ c
+            z = z[inside]
+            found[inside] = 0.5 * np.log(at_edge[inside] * (1.0 - at_edge[inside]))  # the prior of Jeffreys for a share
+            band = likelihood_cost(bands.y + z @ Y.T, half[inside], bands.sigma, at_edge[inside])
+            found[inside] += band.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ c
         return found
 
-    walkers = rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(start).T
+    walkers = np.column_stack([rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(start).T, rng.random(WALKERS)])
     costs = cost(walkers)
     while np.any(lost := ~np.isfinite(costs)):
-        walkers[lost] *= 0.7
+        walkers[lost, :r] *= 0.7
         costs[lost] = cost(walkers[lost])
     halves = np.split(np.arange(WALKERS), 2)
     total, squares, count = np.zeros(r), np.zeros((r, r)), 0
@@ -164,10 +166,11 @@ def _sampled(bands: _Bands, T: Array, c: Array, start: Array) -> tuple[Array, Ar
             other = walkers[rng.choice(others, len(own))]
             tried = other + stretch[:, None] * (walkers[own] - other)
             there = cost(tried)
-            log_ratio = (r - 1.0) * np.log(stretch) + costs[own] - there
+            log_ratio = r * np.log(stretch) + costs[own] - there
             taken = np.log(rng.random(len(own))) < log_ratio
             walkers[own[taken]], costs[own[taken]] = tried[taken], there[taken]
         if k >= BURN_IN:
-            total, squares, count = total + walkers.sum(axis=0), squares + walkers.T @ walkers, count + WALKERS
+            z = walkers[:, :r]
+            total, squares, count = total + z.sum(axis=0), squares + z.T @ z, count + WALKERS
     mean = total / count
     return mean, squares / count - np.outer(mean, mean)
