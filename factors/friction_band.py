@@ -71,29 +71,36 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
 
 
-def likelihood_cost(y: Array, half: Array, sigma: Array, at_edge: Array) -> Array:
-    """The cost alone, of many torques quickly, where some share of them lies at the edges.
+def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array) -> Array:
+    """The cost alone, where a share w of the torques lies in piles below the edges of the band.
 
-    A motor that slid to where it rests has all of its friction; one whose torque changed afterwards has any. So
+    A motor that slid to where it rests had all of its friction, and lost little of it since; one whose torque changed
+    afterwards has any. Piles reach down from the edges by a part h of s, and are even: what lies deep in them may not
+    push the edge beyond the largest torques.
 
-        L = (1 - w) (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s) + w (N(y; s, sigma) + N(y; -s, sigma)) / 2
+        L = (1 - w) (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s) + w (E(s - y) + E(s + y)) / 2
+        E(d) = (Phi(d / sigma) - Phi((d - h s) / sigma)) / (h s)
 
     Args:
         y: torques less the middle of their bands, shape (k, m) [N m].
         half: half widths s > 0, shape (k, m) [N m].
         sigma: noise of the torques, shape (m,) [N m].
-        at_edge: the share w, between 0 and 1, shape (k,).
+        share: w, between 0 and 1, shape (k,).
+        depth: h, between 0 and 1, shape (k,).
 
     Returns:
         Shape (k, m).
     """
-    sigma, w = np.broadcast_to(sigma, y.shape), np.broadcast_to(at_edge[:, None], y.shape)
-    depth, width = (half - np.abs(y)) / sigma, np.log(2.0 * half / sigma)
-    log_l, near = np.log1p(-w) - width, depth < FAR_INSIDE
-    d, across = depth[near], ((half + np.abs(y)) / sigma)[near]
-    edges = np.logaddexp(-0.5 * d * d, -0.5 * across * across) - 0.5 * LOG_2PI
-    log_l[near] = np.logaddexp(log_l[near] + _log_difference(d, -across), np.log(0.5 * w[near]) + edges)
-    return np.asarray(-log_l - 0.5 * LOG_2PI)
+    half, sigma = np.broadcast_to(half, y.shape), np.broadcast_to(sigma, y.shape)
+    deep = depth[:, None] * half
+    below = (half - np.abs(y)) / sigma
+    spread, pile = np.log(0.5 / half), np.full_like(y, -np.inf)
+    spread += np.log1p(-share)[:, None]
+    near, within = below < FAR_INSIDE, below - deep / sigma < FAR_INSIDE
+    spread[near] += _log_difference(below[near], -((half + np.abs(y)) / sigma)[near])
+    of_pile = _log_difference(below[within], (below - deep / sigma)[within])
+    pile[within] = of_pile + (np.log(0.5 * share)[:, None] - np.log(deep))[within]
+    return np.asarray(-np.logaddexp(spread, pile) - np.log(sigma) - 0.5 * LOG_2PI)
 
 
 def _log_difference(upper: Array, lower: Array) -> Array:

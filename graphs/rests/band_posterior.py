@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What rests say of friction, with sigmas that hold: the likelihood of a band falls off a cliff on one side only.
 
-The largest of n torques lies within s / n below the edge s of the band, and no Gaussian at the most likely s says that:
-it is too small, and what a quarter of a cliff's slope says of its width is no sigma. So mean and covariance are those
-of the posterior itself. Each motor's bands tell of a few combinations of values; over these the posterior is sampled,
+The largest of n torques lies some s / n below the edge s of the band. The most likely s is there, too small, and no
+Gaussian at it says how much wider the band may be. So mean and covariance are those of the posterior itself. Each
+motor's bands tell of a few combinations z of the values; over these it is sampled,
 
     p(z) = exp(-|z|^2 / 2 - c' z - sum of the bands' costs at  y + Y z,  half + H z),    z ~ N(0, 1) without the bands,
 
-by walkers that move along lines to each other (Goodman and Weare, Ensemble samplers with affine invariance, 2010), and
-its two moments stand in the joint Gaussian in place of the bands. Values above zero are taken as they are here, not as
-logarithms: friction that may be zero has no logarithm.
+and its two moments stand in the joint Gaussian in place of the bands. What is not known of the likelihood is sampled
+along: which share of the motors slid to where they rest, how near to the edge they stayed, and how well edges repeat.
+Values above zero are taken as they are here, not as logarithms: friction that may be zero has none.
 """
 
 from __future__ import annotations
@@ -18,19 +18,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.factors.friction_band import band_cost, likelihood_cost
+from jointscope.factors.friction_band import band_cost, piled_cost
 from jointscope.graphs.rests.linear_rests import LinearRests
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.walkers import moments
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
 TOLD = 0.25  # information, over that without bands, of a combination of which a motor's bands tell something
-WALKERS, BURN_IN, ROUNDS = 64, 100, 300  # pairs of half-ensembles' moves before and while moments are taken
-STRETCH = 2.0  # of a walker's move, as the source says
-SEED = 1
+WALKERS, SEED = 64, 1
+MOST_ODDS = 10.0  # logit of a share in piles that is none, or all
+DEPTHS = np.log((0.01, 0.5))  # of the piles below the edges, of the band; deeper ones are spread over it
+BLURS = np.log((0.1 * EDGE, EDGE))  # of the edges, of the friction
 SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
+SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
 
 
 def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Calibration, Array]:
@@ -48,129 +52,119 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
     free = [robot.parameters[name] for name in calibration.names]
     prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
     weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
+    pull = weight * (calibration.dynamics - prior)
     commands = replace(problem, per_command=True)  # what was recorded has the likelihood
-    linear = LinearRests.of(commands, x, calibration, weight, weight * (calibration.dynamics - prior))
+    linear = LinearRests.of(commands, x, calibration, weight, pull)
     values, size = calibration.values, calibration.value_by_coordinate
     friction = calibration.positive & np.any(linear.H != 0.0, axis=0)
-    own = np.array([1.0 / p.prior_sigma**2 for p in free])
-    pull = np.array([p.prior for p in free])
-    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(own * friction)
-    b = np.where(friction, linear.b - weight * (calibration.dynamics - prior), linear.b) / size
-    b += friction * own * (values - pull)
-    scaled = _Bands.of(linear, size, values, friction, problem.edge)
-    mean, covariance = _moments(A, b, scaled)
-    moved = np.where(calibration.positive, np.maximum(values + mean, SMALLEST_SHARE * values), values + mean)
-    coordinates = np.where(calibration.positive, np.log(np.where(calibration.positive, moved, 1.0)), moved)
-    found = calibration.with_points({DYNAMICS: coordinates})
+    own = friction / np.array([p.prior_sigma**2 for p in free])
+    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(own)
+    b = (linear.b - pull * friction) / size + own * (values - np.array([p.prior for p in free]))
+    linear = replace(linear, A=A, b=b, Y=linear.Y / size, H=linear.H / size)
+    change, covariance = _moments(linear, np.where(friction, -values, -np.inf))
+    moved = np.where(calibration.positive, np.maximum(values + change, SMALLEST_SHARE * values), values + change)
+    found = calibration.with_points(
+        {DYNAMICS: np.where(calibration.positive, np.log(np.where(calibration.positive, moved, 1.0)), moved)}
+    )
     return found, covariance / np.outer(found.value_by_coordinate, found.value_by_coordinate)
 
 
-@dataclass(frozen=True)
-class _Bands:
-    """Bands of all motors, linear in the values; arrays as of `LinearRests`.
+def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
+    """Mean and covariance of the change of the values, which may fall to `least`, shape (p,)."""
+    unit = 1.0 / np.sqrt(np.diag(linear.A))
+    L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(linear.A * np.outer(unit, unit))).T  # L L' = A^-1
+    motors = [_MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
+    c = L.T @ linear.b
+    pulled = c + sum((motor.slope for motor in motors), np.zeros_like(c))
+    P, h = np.eye(len(c)), -c
+    for motor in motors:
+        V = motor.V
+        h -= motor.slope - V @ (V.T @ motor.slope)
+        if V.shape[1]:
+            slope = V.T @ (pulled - motor.slope)
+            mean, covariance = motor.moments(slope)
+            inverse = np.linalg.inv(covariance)
+            P += V @ (inverse - np.eye(len(mean))) @ V.T
+            h += V @ (inverse @ mean + slope)
+    information, vectors = np.linalg.eigh(P)
+    covariance = (vectors / np.maximum(information, SMALLEST_INFORMATION)) @ vectors.T
+    return L @ covariance @ h, L @ covariance @ L.T
 
-    `least` says how far each value may fall, shape (p,).
+
+@dataclass(frozen=True)
+class _MotorBands:
+    """Bands of one motor at m rests, over r combinations z of the values.
+
+    Attributes:
+        y, half, noise, scale: shape (m,) [N m].
+        Y, H: slopes, shape (m, r).
+        V: the combinations that they tell of, among whitened changes of the values, shape (p, r).
+        slope: of the cost by these changes, shape (p,).
+        T, least: change of the values that may not fall further than so by z, shape (b, r) and (b,).
+        start: covariance of where to look for z, shape (r, r).
     """
 
     y: Array
     half: Array
+    noise: Array
+    scale: Array
     Y: Array
     H: Array
-    sigma: Array
-    motor: NDArray[np.intp]
+    V: Array
+    slope: Array
+    T: Array
     least: Array
+    start: Array
 
     @staticmethod
-    def of(linear: LinearRests, size: Array, values: Array, friction: NDArray[np.bool_], edge: float) -> _Bands:
-        least = np.where(friction, -values, -np.inf)
-        sigma = np.hypot(edge * linear.scale, linear.sigma)
-        return _Bands(linear.y, linear.half, linear.Y / size, linear.H / size, sigma, linear.motor, least)
-
-    def of_motor(self, j: int) -> _Bands:
-        own = self.motor == j
-        parts = (part[own] for part in (self.y, self.half, self.Y, self.H, self.sigma, self.motor))
-        return _Bands(*parts, self.least)
-
-    def slopes(self) -> tuple[Array, Array, Array]:
-        """Gradient, expected information and curvature."""
-        found = band_cost(self.y, self.half, self.sigma)
-        g = self.Y.T @ found.by_torque + self.H.T @ found.by_half
-        yy, yh, hh = found.curvature
-        mixed = self.Y.T @ (yh[:, None] * self.H)
-        curved = self.Y.T @ (yy[:, None] * self.Y) + self.H.T @ (hh[:, None] * self.H) + mixed + mixed.T
-        of_y, of_s = found.torque_information[:, None], found.half_information[:, None]
-        return g, self.Y.T @ (of_y * self.Y) + self.H.T @ (of_s * self.H), curved
-
-
-def _moments(A: Array, b: Array, bands: _Bands) -> tuple[Array, Array]:
-    """Mean and covariance of the change of the values."""
-    unit = 1.0 / np.sqrt(np.diag(A))
-    L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(A * np.outer(unit, unit))).T  # L L' = A^-1
-    motors = [bands.of_motor(j) for j in np.unique(bands.motor).tolist()]
-    slopes = [own.slopes() for own in motors]
-    pulls = [L.T @ g for g, _, _ in slopes]
-    c = L.T @ b
-    P, h = np.eye(len(A)), -c
-    for own, (_, information, curved), g in zip(motors, slopes, pulls, strict=True):
-        told, vectors = np.linalg.eigh(L.T @ information @ L)
+    def of(linear: LinearRests, j: int, L: Array, least: Array) -> _MotorBands:
+        own, bounded = linear.motor == j, np.isfinite(least)
+        y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
+        Y, H = linear.Y[own] @ L, linear.H[own] @ L
+        found = band_cost(y, half, np.hypot(EDGE * scale, noise))
+        told, vectors = np.linalg.eigh(
+            Y.T @ (found.torque_information[:, None] * Y) + H.T @ (found.half_information[:, None] * H)
+        )
         V = vectors[:, told > TOLD]
-        linear = V.T @ (c + np.sum(pulls, axis=0) - g)
-        h -= g - V @ (V.T @ g)
-        if not V.shape[1]:
-            continue
-        start = np.linalg.inv(np.eye(V.shape[1]) + V.T @ L.T @ curved @ L @ V)
-        mean, covariance = _sampled(own, L @ V, linear, start)
-        inverse = np.linalg.inv(covariance)
-        P += V @ (inverse - np.eye(V.shape[1])) @ V.T
-        h += V @ (inverse @ mean + linear)
-    low, vectors = np.linalg.eigh(P)
-    covariance = (vectors / np.maximum(low, 1e-3)) @ vectors.T
-    return L @ covariance @ h, L @ covariance @ L.T
+        slope, Y, H = Y.T @ found.by_torque + H.T @ found.by_half, Y @ V, H @ V
+        yy, yh, hh = (part[:, None] for part in found.curvature)
+        curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H)
+        start = np.linalg.inv(np.eye(V.shape[1]) + curved)
+        return _MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
 
+    def cost(self, z: Array, odds: Array, depth: Array, blur: Array, slope: Array) -> Array:
+        """Of k points, shape (k,).
 
-def _sampled(bands: _Bands, T: Array, c: Array, start: Array) -> tuple[Array, Array]:
-    """Moments of the posterior over combinations z of the values T z.
-
-    Args:
-        bands: of one motor.
-        T: shape (p, r).
-        c: slope of the cost without bands, shape (r,).
-        start: covariance of where the walkers begin, shape (r, r).
-    """
-    rng, r = np.random.default_rng(SEED), len(c)
-    Y, H = bands.Y @ T, bands.H @ T
-    bounded = np.isfinite(bands.least)
-
-    def cost(point: Array) -> Array:
-        z, at_edge = point[:, :r], point[:, r]
-        half, found = bands.half + z @ H.T, np.full(len(z), np.inf)
-        inside = np.all(half > 0.0, axis=1) & np.all(z @ T[bounded].T > bands.least[bounded], axis=1)
-        inside &= (at_edge > 0.0) & (at_edge < 1.0)
+        Args:
+            z: shape (k, r).
+            odds: logit of the share in piles, shape (k,).
+            depth: logarithm of the depth of the piles, of the band, shape (k,).
+            blur: logarithm of that of the edges, of the friction, shape (k,).
+            slope: of the cost without these bands, shape (r,).
+        """
+        half, found = self.half + z @ self.H.T, np.full(len(z), np.inf)
+        inside = np.all(half > 0.0, axis=1) & np.all(z @ self.T.T > self.least, axis=1) & (np.abs(odds) < MOST_ODDS)
+        for value, (low, high) in ((depth, DEPTHS), (blur, BLURS)):
+            inside &= (value > low) & (value < high)
         if inside.any():
-            z = z[inside]
-            found[inside] = 0.5 * np.log(at_edge[inside] * (1.0 - at_edge[inside]))  # the prior of Jeffreys for a share
-            band = likelihood_cost(bands.y + z @ Y.T, half[inside], bands.sigma, at_edge[inside])
-            found[inside] += band.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ c
+            z, share = z[inside], expit(odds[inside])
+            sigma = np.hypot(np.exp(blur[inside])[:, None] * self.scale, self.noise)
+            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
+            costs = bands + np.log(sigma)  # of densities, whose blur is not the same
+            jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit
+            found[inside] = jeffreys + costs.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ slope
         return found
 
-    walkers = np.column_stack([rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(start).T, rng.random(WALKERS)])
-    costs = cost(walkers)
-    while np.any(lost := ~np.isfinite(costs)):
-        walkers[lost, :r] *= 0.7
-        costs[lost] = cost(walkers[lost])
-    halves = np.split(np.arange(WALKERS), 2)
-    total, squares, count = np.zeros(r), np.zeros((r, r)), 0
-    for k in range(BURN_IN + ROUNDS):
-        for own, others in (halves, halves[::-1]):
-            stretch = ((STRETCH - 1.0) * rng.random(len(own)) + 1.0) ** 2 / STRETCH
-            other = walkers[rng.choice(others, len(own))]
-            tried = other + stretch[:, None] * (walkers[own] - other)
-            there = cost(tried)
-            log_ratio = r * np.log(stretch) + costs[own] - there
-            taken = np.log(rng.random(len(own))) < log_ratio
-            walkers[own[taken]], costs[own[taken]] = tried[taken], there[taken]
-        if k >= BURN_IN:
-            z = walkers[:, :r]
-            total, squares, count = total + z.sum(axis=0), squares + z.T @ z, count + WALKERS
-    mean = total / count
-    return mean, squares / count - np.outer(mean, mean)
+    def moments(self, slope: Array) -> tuple[Array, Array]:
+        """Mean and covariance of z; `slope` as of `cost`."""
+        rng, r = np.random.default_rng(SEED), len(slope)
+        z = rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(self.start).T
+        rest = rng.uniform((-2.0, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
+
+        def cost(point: Array) -> Array:
+            return self.cost(point[:, :r], *point[:, r:].T, slope)
+
+        while np.any(lost := ~np.isfinite(cost(np.hstack([z, rest])))):
+            z[lost] *= 0.7
+        mean, covariance = moments(cost, np.hstack([z, rest]), rng)
+        return mean[:r], covariance[:r, :r]
