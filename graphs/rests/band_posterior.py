@@ -62,11 +62,11 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
     b = (linear.b - pull * friction) / size + own * (values - np.array([p.prior for p in free]))
     linear = replace(linear, A=A, b=b, Y=linear.Y / size, H=linear.H / size)
     change, covariance = _moments(linear, np.where(friction, -values, -np.inf))
-    moved = np.where(calibration.positive, np.maximum(values + change, SMALLEST_SHARE * values), values + change)
-    found = calibration.with_points(
-        {DYNAMICS: np.where(calibration.positive, np.log(np.where(calibration.positive, moved, 1.0)), moved)}
-    )
-    return found, covariance / np.outer(found.value_by_coordinate, found.value_by_coordinate)
+    moved = np.log(np.where(friction, np.maximum(values + change, SMALLEST_SHARE * values), 1.0))
+    coordinates = np.where(friction, moved, calibration.dynamics + change / size)
+    found = calibration.with_points({DYNAMICS: coordinates})
+    scale = np.where(friction, found.value_by_coordinate, size)
+    return found, covariance / np.outer(scale, scale)
 
 
 def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
