@@ -162,7 +162,7 @@ class _MotorBands:
         rest = rng.uniform((-2.0, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
 
         def cost(point: Array) -> Array:
-            return self.cost(point[:, :r], *point[:, r:].T, slope)
+            return self.cost(point[:, :r], point[:, r], point[:, r + 1], point[:, r + 2], slope)
 
         while np.any(lost := ~np.isfinite(cost(np.hstack([z, rest])))):
             z[lost] *= 0.7

@@ -77,9 +77,8 @@ class LinearRests:
         noise = np.hypot(bands.sigma, np.sqrt(np.einsum("mnd,mde,mne->mn", by_x, covariance, by_x)))
         scale = np.broadcast_to(problem.friction_scale, y.shape)
         half = np.maximum(half, 1e-3 * scale)
-        return LinearRests(
-            0.5 * (A + A.T), b, *(part[kept] for part in (y, half, Y, H, noise, scale)), np.nonzero(kept)[1]
-        )
+        y, half, Y, H, noise, scale = (part[kept] for part in (y, half, Y, H, noise, scale))
+        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, np.nonzero(kept)[1])
 
     def minimum(self, columns: Columns) -> tuple[Array, float]:
         """Values and cost where it is smallest, the values of other columns held.
