@@ -7,9 +7,10 @@ Its logarithm pulls s down, and each y outside pushes it up. It is no sum of squ
 
     c = -log(L sigma sqrt(2 pi)) >= 0
 
-with its gradient, and in place of the second derivatives, which vanish inside the band, the information that one rest
-gives on average (Fisher scoring). The largest y of many rests, as Ho and Kisner, eq. (46), take it, is the limit for
-small sigma; it is too small where there are few rests.
+with its gradient, its curvature, and the information that one rest gives on average. -log L falls like log s as long as
+s is wide, and only the few y at the edges bend it: a step by the average information, which is that of the edges, would
+be as long as they are wide, and a band far too wide would hardly move. The largest y of many rests, as Ho and Kisner,
+eq. (46), take it, is the limit for small sigma; it is too small where there are few rests.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scipy.special import log_ndtr, ndtr
 Array = NDArray[np.float64]
 LOG_2PI = float(np.log(2.0 * np.pi))
 RATIOS = np.geomspace(1e-2, 1e4, 61)  # s / sigma of the table of information
+FAR_INSIDE = 6.0  # [sigma] from the edge, where the likelihood is that of a sharp band to 1e-9
 NODES = 4001  # of the integrals behind it
 
 
@@ -35,6 +37,8 @@ class BandCost:
         cost: never negative.
         by_torque, by_half: gradient by y and by s [1/(N m)].
         torque_information, half_information: expected second derivatives [1/(N m)^2]; the mixed one is zero.
+        curvature: second derivatives by (y, y), (y, s), (s, s) without those of log s, which are negative: a positive
+            semidefinite matrix, since the other part of the cost is convex, shape (3, m) [1/(N m)^2].
     """
 
     cost: Array
@@ -42,6 +46,7 @@ class BandCost:
     by_half: Array
     torque_information: Array
     half_information: Array
+    curvature: Array
 
 
 def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
@@ -61,7 +66,41 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     by_half = -(phi_a + phi_b) / sigma + 1.0 / half
     log_ratio = np.log(np.clip(half / sigma, RATIOS[0], RATIOS[-1]))
     of_y, of_s = (np.interp(log_ratio, np.log(RATIOS), part) for part in _information())
-    return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2)
+    of_a, of_b, of_both = phi_a * (a + phi_a), phi_b * (phi_b - b), -phi_a * phi_b
+    curvature = np.stack([of_a + 2.0 * of_both + of_b, of_a - of_b, of_a - 2.0 * of_both + of_b]) / sigma**2
+    return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
+
+
+def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array) -> Array:
+    """The cost alone, where a share w of the torques lies in piles below the edges of the band.
+
+    A motor that slid to where it rests had all of its friction, and lost little of it since; one whose torque changed
+    afterwards has any. Piles reach down from the edges by a part h of s, and are even: what lies deep in them may not
+    push the edge beyond the largest torques.
+
+        L = (1 - w) (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s) + w (E(s - y) + E(s + y)) / 2
+        E(d) = (Phi(d / sigma) - Phi((d - h s) / sigma)) / (h s)
+
+    Args:
+        y: torques less the middle of their bands, shape (k, m) [N m].
+        half: half widths s > 0, shape (k, m) [N m].
+        sigma: noise of the torques, shape (m,) [N m].
+        share: w, between 0 and 1, shape (k,).
+        depth: h, between 0 and 1, shape (k,).
+
+    Returns:
+        Shape (k, m).
+    """
+    half, sigma = np.broadcast_to(half, y.shape), np.broadcast_to(sigma, y.shape)
+    deep = depth[:, None] * half
+    below = (half - np.abs(y)) / sigma
+    spread, pile = np.log(0.5 / half), np.full_like(y, -np.inf)
+    spread += np.log1p(-share)[:, None]
+    near, within = below < FAR_INSIDE, below - deep / sigma < FAR_INSIDE
+    spread[near] += _log_difference(below[near], -((half + np.abs(y)) / sigma)[near])
+    of_pile = _log_difference(below[within], (below - deep / sigma)[within])
+    pile[within] = of_pile + (np.log(0.5 * share)[:, None] - np.log(deep))[within]
+    return np.asarray(-np.logaddexp(spread, pile) - np.log(sigma) - 0.5 * LOG_2PI)
 
 
 def _log_difference(upper: Array, lower: Array) -> Array:

@@ -141,7 +141,7 @@ def diagnosed(
     # scales of torques are those of the values found, not of the start
     problems = [RestSet.of(result.robot, rests) for rests in recordings]
     weight = result.problems[0].repeatability
-    whole = replace(RestSet.joined(problems), repeatability=weight, per_command=True)
+    whole = replace(RestSet.joined(problems), repeatability=weight, per_command=True, scoring=True)
     values = Calibration.of(result.robot).only([DYNAMICS])
     base = fit_rests(whole, np.concatenate(result.states), values)
     return RestStep(added, result, judge_rests(base, folds_of(recordings)))

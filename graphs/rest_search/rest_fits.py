@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.rests.calibrate_rests import repeatability_of
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.settling import settled
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.whole_set import WholeSet
@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 MOST_ITERATIONS = 15  # of a stage of a fit that begins near its end
 MOST_NEAR = 4  # of one that only lost some rests
-PASSES = 4  # of the repeatability
-AGREES = 0.05  # relative change of it that asks for no further pass
 FOLDS = 5
 SMALLEST_FOLD = 2  # rests
 
@@ -89,16 +87,9 @@ def fit_rests(rests: RestSet, x: Array, calibration: Calibration, edges: Sequenc
     Raises:
         SolveError: the fit ran away.
     """
-    estimate = Estimate((x,), (calibration,))
-    for edge in (*edges, *[EDGE] * PASSES):
-        rests = replace(rests, edge=edge)
-        solution = solve([rests], estimate, max_iterations=MOST_ITERATIONS)
-        estimate, cost = solution.estimate, solution.cost + price(rests)
-        scale = repeatability_of(rests, solution)
-        if edge == EDGE and np.all(np.abs(np.log(scale / rests.repeatability)) < AGREES):
-            break
-        rests = replace(rests, repeatability=scale)
-    return RestFit(rests, estimate.states[0], estimate.calibrations[0], cost)
+    found = settled(rests, Estimate((x,), (calibration,)), MOST_ITERATIONS, edges)
+    estimate, cost = found.solution.estimate, found.solution.cost + price(found.rests)
+    return RestFit(found.rests, estimate.states[0], estimate.calibrations[0], cost)
 
 
 def price(rests: RestSet) -> float:

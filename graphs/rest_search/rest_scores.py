@@ -19,8 +19,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rest_search.linear_rests import LinearRests
 from jointscope.graphs.rest_search.rest_hypotheses import at_null, batches
+from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
@@ -136,7 +136,7 @@ class _Linear:
         wide = at_null(robot, hypotheses)
         calibration = Calibration.of(wide).only([DYNAMICS])
         problem = whole.of_robot(wide)
-        system = problem.linearize(x, calibration)
+        system = problem.linearize(x, calibration, expected=True)
         H, g = reduced(system)
         free = [wide.parameters[name] for name in calibration.names]
         weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
@@ -144,7 +144,7 @@ class _Linear:
         # sizes of effects stand behind the values of the base model, in whose order they were added
         n, raw = len(Calibration.of(robot).names), np.diag(system.C)
         creep = np.sign(whole.rests.creep) * SLIPPING
-        slow = replace(problem, rests=replace(problem.rests, creep=creep)).linearize(x, calibration).C
+        slow = replace(problem, rests=replace(problem.rests, creep=creep)).linearize(x, calibration, expected=True).C
         alone, pull = np.diag(H)[n:], weight * (calibration.dynamics - prior)
         H, g = H + np.diag(weight), g + pull
         response = -cho_solve(cho_factor(H[:n, :n]), H[:n, n:])

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Springs, friction bands and weights from rests alone, with sigmas; what rests say nothing of stays as it is.
 
-Bands have sharp edges, and a solver that begins far off sees none of them: the edges are blunt at first. How well link
-encoders repeat is found from the residuals, never better than they say themselves.
+The likeliest values (settling.py) are where the means and sigmas of the posterior (band_posterior.py) are looked for.
 """
 
 from __future__ import annotations
@@ -15,14 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
+from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.settling import settled
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
@@ -31,8 +31,6 @@ from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
 EDGES = (1.0, 0.2, EDGE)  # of the friction: blur of the bands' edges, stage by stage
-PASSES = 6  # of the repeatability
-AGREES = 0.05  # relative change of it that asks for no further pass
 MOST_ITERATIONS = 150
 RAN_AWAY = 10.0  # times what a band has held at most, from which it is no band of these rests
 FEWEST_HELD = 4  # rests of a motor that had moved, for this
@@ -117,10 +115,9 @@ def calibrate_rests(
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     problems, solution, iterations = settled_rests(robot, recordings, report, near)
-    _, covariance = posteriors([RestSet.joined(problems)], solution)
-    calibration = solution.estimate.calibrations[0]
-    index = calibration.columns[DYNAMICS]
-    sigmas, scale = np.sqrt(np.diag(covariance)[index]), calibration.value_by_coordinate
+    (x,), (likeliest,) = solution.estimate.states, solution.estimate.calibrations
+    calibration, covariance = band_posterior(RestSet.joined(problems), robot, x, likeliest)
+    sigmas, scale = np.sqrt(np.diag(covariance)), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
     told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
@@ -140,7 +137,7 @@ def calibrate_rests(
         parameters=tuple(told),
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
-        covariance=covariance[index, index] * np.outer(scale, scale),
+        covariance=covariance * np.outer(scale, scale),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,
@@ -163,17 +160,22 @@ def settled_rests(
     Raises:
         SolveError: no convergence, or a friction that ran away.
     """
-    try:
-        return _settled(robot, recordings, report, near)
-    except SolveError:  # springs that are far off make bands wide, which never come back
-        return _settled(robot, recordings, report, near, links_first=True)
+    # springs that are far off make bands wide, which never come back; models that lack something step by the average
+    attempts = ((False, False), (False, True), (True, False), (True, True))
+    for scoring, links_first in attempts:
+        try:
+            return _settled(robot, recordings, report, near, links_first, scoring)
+        except SolveError:
+            if (scoring, links_first) == attempts[-1]:
+                raise
+    raise AssertionError
 
 
 def _settled(
-    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None, links_first: bool = False
+    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None, links_first: bool, scoring: bool
 ) -> tuple[list[RestSet], Solution, int]:
     """The same from one beginning: bands at once, or links in equilibrium before them."""
-    problems = [RestSet.of(robot, rests) for rests in recordings]
+    problems = [replace(RestSet.of(robot, rests), scoring=scoring) for rests in recordings]
     if near is not None:
         weights = near.repeatability, near.per_command
         problems = [replace(problem, repeatability=weights[0], per_command=weights[1]) for problem in problems]
@@ -185,25 +187,21 @@ def _settled(
         links = replace(whole, rests=replace(whole.rests, moved=nothing.astype(bool), creep=nothing))
         solution = solve([links], estimate, max_iterations=MOST_ITERATIONS)
         estimate, iterations = solution.estimate, len(solution.iterations)
-    for k, edge in enumerate((*edges, *[EDGE] * PASSES)):
-        whole = replace(whole, edge=edge)
-        solution = solve([whole], estimate, max_iterations=MOST_ITERATIONS)
-        estimate, iterations = solution.estimate, iterations + len(solution.iterations)
+
+    def converged(k: int, rests: RestSet, solution: Solution) -> None:
         report(f"rests, pass {k + 1}, cost {solution.cost:.6g}", min((k + 1) / 6.0, 0.95))
         if not (solution.converged or solution.flat):
             raise SolveError(
                 f"no convergence after {len(solution.iterations)} iterations over "
-                f"{len(whole.rests)} rests; loads, units, signs or names may be wrong: "
+                f"{len(rests.rests)} rests; loads, units, signs or names may be wrong: "
                 "look at what `jointscope compare ROBOT --rests BAG` says"
             )
-        scale = repeatability_of(whole, solution)
-        agrees = np.all(np.abs(np.log(scale / whole.repeatability)) < AGREES)
-        if edge == EDGE and agrees:
-            break
-        whole = replace(whole, repeatability=scale)
+
+    found = settled(whole, estimate, MOST_ITERATIONS, edges, converged)
+    whole, solution = found.rests, found.solution
     check_bands(whole, solution.estimate.states[0], solution.estimate.calibrations[0])
     weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]
-    return weighed, solution, iterations
+    return weighed, solution, iterations + found.iterations
 
 
 def check_bands(whole: RestSet, x: Array, calibration: Calibration) -> None:
@@ -234,10 +232,3 @@ def states_of(problems: Sequence[RestSet], solution: Solution) -> tuple[Array, .
     """The states of each recording in the solution of all as one set."""
     ends = np.cumsum([len(problem.rests) for problem in problems])[:-1]
     return tuple(np.split(solution.estimate.states[0], ends))
-
-
-def repeatability_of(whole: RestSet, solution: Solution) -> Array:
-    """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
-    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
-    size = np.sqrt(np.mean(whole.residuals(x, whole.model.named(calibration.values)) ** 2, axis=0))
-    return np.maximum(whole.repeatability * size, 1.0)

@@ -16,6 +16,7 @@ from jointscope.factors.friction_band import band_cost
 
 Array = NDArray[np.float64]
 Rows = tuple[Array, Array, Array]
+SMALLEST_CURVATURE = 1e-4  # of the information on y, where no edge is near
 
 
 @dataclass(frozen=True)
@@ -41,16 +42,29 @@ class RestBands:
     log_gain: Array
     log_gain_slopes: Array
 
-    def rows(self) -> tuple[Rows, Array]:
-        """Rows that have the gradient and the information of the likelihood, and its cost, shape (m,)."""
+    def rows(self, expected: bool = False) -> tuple[Rows, Array]:
+        """Rows that have the gradient and the curvature of the likelihood, and its cost, shape (m,).
+
+        Args:
+            expected: with the information that a rest gives on average in place of the curvature at these ones.
+        """
         found, counts = band_cost(self.y, self.half, self.sigma), self.counts
-        rows = []
-        for slopes, gradient, information in (
-            (self.y_slopes, found.by_torque, found.torque_information),
-            (self.half_slopes, found.by_half, found.half_information),
-        ):
-            J, P = ((counts * np.sqrt(information))[:, :, None] * slope for slope in slopes)
-            rows.append((counts * gradient / np.sqrt(information), J, P))
+        yy, yh, hh = found.curvature
+        least = SMALLEST_CURVATURE * found.torque_information
+        if expected:
+            yy, yh, hh = found.torque_information, 0.0 * yh, found.half_information
+        else:  # the logarithm of half is steep, not bent: a step by the size of half is right for it
+            yy, hh = yy + least, hh + 1.0 / self.half**2
+        root = np.sqrt(yy)
+        both = yh / root
+        rest = np.sqrt(hh - both**2)
+        (y_J, y_P), (half_J, half_P) = self.y_slopes, self.half_slopes
+        w_y, w_both, w_rest = (counts[:, :, None] * part[:, :, None] for part in (root, both, rest))
+        r_y = found.by_torque / root
+        rows = [
+            (counts * r_y, w_y * y_J + w_both * half_J, w_y * y_P + w_both * half_P),
+            (counts * (found.by_half - both * r_y) / rest, w_rest * half_J, w_rest * half_P),
+        ]
         rows.append((-counts, 0.0 * self.y_slopes[0], counts[:, :, None] * self.log_gain_slopes))
         r, J, P = (np.hstack(part) for part in zip(*rows, strict=True))
         return (r, J, P), np.sum(counts * (found.cost - self.log_gain), axis=1)

@@ -30,6 +30,8 @@ class RestErrors:
         friction: what friction holds beyond its band, of motors that had moved, shape (m, n) [N m].
         certain: the same less what noise of the encoders may be, shape (m, n) [N m].
         half: half widths of the bands, shape (m, n) [N m].
+        creeping: torques that are missing where motors creep with their whole friction, shape (m, n) [N m]; zero where
+            they stand.
     """
 
     position: Array
@@ -38,6 +40,13 @@ class RestErrors:
     friction: Array
     certain: Array
     half: Array
+    creeping: Array
+
+    @property
+    def off_creeping(self) -> Array:
+        """Root mean square of what is missing where each motor creeps, shape (n,) [N m]; zero where none does."""
+        count = np.sum(self.creeping != 0.0, axis=0)
+        return np.asarray(np.sqrt(np.sum(self.creeping**2, axis=0) / np.maximum(count, 1)))
 
     @property
     def bands(self) -> Array:
@@ -91,7 +100,8 @@ def _of(problem: RestSet) -> tuple[Array, ...]:
     motor, link = problem.encoder_sigmas()
     certain = np.maximum(friction - SURELY * _noise(problem, held.by_position, motor, link), 0.0)
     sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
-    return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value
+    creeping = np.where(rests.creep != 0.0, torques.sliding.value, 0.0)
+    return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value, creeping
 
 
 def _noise(problem: RestSet, slopes: Array, motor: Array, link: Array) -> Array:

@@ -53,6 +53,8 @@ class RestSet:
         per_command: whether what friction holds is judged by the likelihood of the commands, which were recorded, and
             not by that of the torque: models that make different torques of them can be compared then. A calibration
             that begins far off is better off without.
+        scoring: whether bands step by the information that a rest gives on average, as models that contradict their
+            rests need, and not by their own curvature.
         owner: number of the recording; None for a whole one.
     """
 
@@ -63,6 +65,7 @@ class RestSet:
     friction_scale: Array
     edge: float = EDGE
     per_command: bool = False
+    scoring: bool = False
     owner: int | None = None
 
     kind: str = field(default="rests", init=False)
@@ -177,11 +180,11 @@ class RestSet:
         x, calibration = self.start(Calibration.of(self.robot))
         return WholeSet(blind, x, calibration, ()).states
 
-    def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
-        """Normal equations at positions of shape (m, d)."""
-        return of_independent_states(*self.rows(x, calibration))
+    def linearize(self, x: Array, calibration: Calibration, expected: bool = False) -> NormalEquations:
+        """Normal equations at positions of shape (m, d); `expected` as of `RestBands.rows`."""
+        return of_independent_states(*self.rows(x, calibration, expected))
 
-    def rows(self, x: Array, calibration: Calibration) -> tuple[Array, Array, Array, Array]:
+    def rows(self, x: Array, calibration: Calibration, expected: bool = False) -> tuple[Array, Array, Array, Array]:
         """What `of_independent_states` makes normal equations of: whitened residuals, derivatives, cost of each rest.
 
         Returns:
@@ -190,7 +193,7 @@ class RestSet:
         torques = self.torques(x, calibration)
         r, J, P = self.equations(x, torques, calibration)
         costs = 0.5 * np.sum(r**2, axis=1)
-        of_bands, band_costs = self.bands(torques, calibration).rows()
+        of_bands, band_costs = self.bands(torques, calibration).rows(expected or self.scoring)
         r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
         return r, J, P, costs + band_costs
 

@@ -14,18 +14,20 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
-from jointscope.robots.rests.creep import PARTS, creep_of, creeping_stretches
+from jointscope.robots.rests.creep import EVEN, PARTS, creep_of, creeping_stretches
 from jointscope.robots.rests.load_history import LoadHistory
 
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
 SWINGING = 12.0  # [sigma] of a link encoder that the means of parts may differ by
 ARRAYS = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved", "creep")
+MANY = 0.1  # of the rests, in which links that move on steadily are no accident
 FEWEST = 3  # rests; fewer, where motors do not stand often, are motion
 
 
@@ -96,12 +98,13 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     motor, link = robot.motor_encoder, robot.link_encoder
     stream, still = recording.streams[motor.name], standing(recording, robot)
     stretches = _split(sorted([*still, *creeping_stretches(recording, robot, still)]), loads.changes)
-    found, swinging = [], 0
+    found, swinging, drifts = [], 0, []
     for t0, t1 in stretches:
         a = _most_settled(recording, motor.name if link is None else link.name, t0, t1)
         q_motor, motor_scatter = _mean(recording, motor.name, a, t1)
         u, u_scatter = _mean(recording, "command", a, t1)
         q_link, link_scatter = (q_motor * np.nan, q_motor * 0.0) if link is None else _mean(recording, link.name, a, t1)
+        drifts.append(_drift(recording, robot, t0, t1))
         if link is not None and np.any(link_scatter > SWINGING * link.sigmas):
             swinging += 1
             continue
@@ -125,9 +128,10 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     first = stream.values[0] - motor.zero
     moved = _moved(first, q_motor, WITHIN * motor.sigmas)
     forces, links = np.array([force for force, _ in hung]), tuple(name for _, name in hung)
+    notices = _notices(len(found), swinging, np.array(drifts))
     rests = Rests(
         recording.path, recording.sha256, times, q_motor, None if link is None else q_link, u,
-        motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, _notices(len(found), swinging),
+        motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, notices,
     )  # fmt: skip
     last = _last_of_each(rests)
     rests = rests.only(last)
@@ -177,11 +181,41 @@ def _last_of_each(rests: Rests) -> NDArray[np.bool_]:
     return ~np.array([*same, False], dtype=bool)
 
 
-def _notices(count: int, swinging: int) -> tuple[Notice, ...]:
-    if not swinging:
-        return ()
-    text = f"rests: left out {swinging} of {count + swinging} in which a link still swung when the next one began"
-    return (Notice("rests", "dropped", swinging, text),)
+def _drift(recording: Recording, robot: Robot, t0: float, t1: float) -> float:
+    """How far a link moves on steadily in a stretch, without what its motor turns it; 0 where all stand or swing [rad].
+
+    Nothing but a load that changes does so.
+    """
+    motor, link = robot.motor_encoder, robot.link_encoder
+    if link is None:
+        return 0.0
+    parts = []
+    for encoder in (motor, link):
+        stream = recording.streams[encoder.name]
+        inside = stream.values[(stream.times >= t0) & (stream.times < t1)] - encoder.zero
+        if len(inside) < PARTS:
+            return 0.0
+        parts.append(np.array([part.mean(axis=0) for part in np.array_split(inside, PARTS)]))
+    steps = np.diff(parts[1] - joint_angles(robot, parts[0]), axis=0)
+    mean = steps.mean(axis=0)
+    steady = np.all(steps * np.sign(mean) > EVEN * np.abs(mean), axis=0) & (
+        np.abs(mean) * PARTS > SWINGING * link.sigmas
+    )
+    return float(np.max(np.where(steady, np.abs(mean) * PARTS, 0.0)))
+
+
+def _notices(count: int, swinging: int, drifts: Array) -> tuple[Notice, ...]:
+    found, many = [], int(np.sum(drifts > 0.0))
+    if swinging:
+        text = f"rests: left out {swinging} of {count + swinging} in which a link still swung when the next one began"
+        found.append(Notice("rests", "dropped", swinging, text))
+    if many and many >= MANY * len(drifts):
+        text = (
+            f"rests: in {many} of {len(drifts)} a link moves on steadily, by up to {1e3 * drifts.max():.2g} mrad, "
+            "while motors and /load stand: loads change that /load does not say, or links creep; check the topic"
+        )
+        found.append(Notice("rests", "info", many, text))
+    return tuple(found)
 
 
 def _why_none(

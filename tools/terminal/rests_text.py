@@ -97,7 +97,7 @@ def _misfit(result: RestCalibration) -> str:
     if widened > FAR:
         return (
             f"{joint} rests {significant(widened, 2)} sigmas of its encoder away, and its sigma was widened by as much "
-            "to go on"
+            "to go on, unless other loads hung there than /load says"
         )
     bands = result.errors.bands
     for j, joint in enumerate(result.robot.joints):
@@ -106,6 +106,12 @@ def _misfit(result: RestCalibration) -> str:
             return (
                 f"friction of {joint} would have to hold {significant(1e3 * beyond, 2)} mN m beyond a band of "
                 f"{significant(1e3 * bands[j], 2)} mN m"
+            )
+        creeping = float(result.errors.off_creeping[j])
+        if creeping > BEYOND * bands[j]:
+            return (
+                f"friction of {joint} is {significant(1e3 * creeping, 2)} mN m (rms) off a band of "
+                f"{significant(1e3 * bands[j], 2)} mN m where it creeps, as if it depended on speed or place"
             )
     return ""
 

@@ -141,3 +141,13 @@ def test_springs_whose_links_no_encoder_sees_have_no_creep():
     blind = replace(ROBOT, sensors={"motor_encoder": ROBOT.motor_encoder})
     assert blind.link_encoder is None
     assert creeping_stretches(recording(creeping(1e-3)), blind, []) == []
+
+
+def test_links_that_move_on_while_motors_and_load_stand_are_told():
+    motor = steps(0.0, 0.4, -0.2)
+    # the force ramps, and a link with it, which /load does not say
+    ramp = np.where(np.abs(np.diff(motor, prepend=0.0)) < 1e-9, 0.01, 0.0) / RATE
+    rests = find_rests(recording(motor, 0.3 * motor + np.cumsum(ramp)), ROBOT, LoadHistory.none())
+    (notice,) = [notice for notice in rests.notices if "moves on steadily" in notice.text]
+    assert "in 3 of 3 a link moves on steadily" in notice.text and "/load does not say" in notice.text
+    assert not find_rests(recording(motor, 0.3 * motor), ROBOT, LoadHistory.none()).notices

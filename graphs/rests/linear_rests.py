@@ -34,6 +34,7 @@ class LinearRests:
         A, b: shape (p, p) and (p,), priors included.
         y, half, Y, H: shape (M,) and (M, p) [N m].
         sigma, scale: of the M bands, noise without the blur of the edges, and what this is relative to [N m].
+        motor: number of the motor of each band, shape (M,).
     """
 
     A: Array
@@ -44,6 +45,7 @@ class LinearRests:
     H: Array
     sigma: Array
     scale: Array
+    motor: Columns
 
     @staticmethod
     def of(problem: RestSet, x: Array, calibration: Calibration, weight: Array, pull: Array) -> LinearRests:
@@ -75,7 +77,8 @@ class LinearRests:
         noise = np.hypot(bands.sigma, np.sqrt(np.einsum("mnd,mde,mne->mn", by_x, covariance, by_x)))
         scale = np.broadcast_to(problem.friction_scale, y.shape)
         half = np.maximum(half, 1e-3 * scale)
-        return LinearRests(0.5 * (A + A.T), b, *(part[kept] for part in (y, half, Y, H, noise, scale)))
+        y, half, Y, H, noise, scale = (part[kept] for part in (y, half, Y, H, noise, scale))
+        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, np.nonzero(kept)[1])
 
     def minimum(self, columns: Columns) -> tuple[Array, float]:
         """Values and cost where it is smallest, the values of other columns held.
@@ -118,11 +121,7 @@ class LinearRests:
         y, half = self.y + self.Y @ d, self.half + self.H @ d
         found = band_cost(y, half, sigma)
         g = self.A @ d + self.b + self.Y.T @ found.by_torque + self.H.T @ found.by_half
-        total, difference = (1.0 / half - found.by_half) * sigma, -found.by_torque * sigma
-        upper, lower = 0.5 * (total + difference), 0.5 * (total - difference)
-        a, b = (y + half) / sigma, (y - half) / sigma
-        of_a, of_b, of_both = upper * (a + upper), lower * (lower - b), -upper * lower
-        yy, hh, yh = (part / sigma**2 for part in (of_a + 2 * of_both + of_b, of_a - 2 * of_both + of_b, of_a - of_b))
+        yy, yh, hh = found.curvature
         Y, H = self.Y, self.H
         mixed = Y.T @ (yh[:, None] * H)
         return g, self.A + Y.T @ (yy[:, None] * Y) + H.T @ (hh[:, None] * H) + mixed + mixed.T

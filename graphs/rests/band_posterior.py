@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What rests say of friction, with sigmas that hold: the likelihood of a band falls off a cliff on one side only.
+
+The largest of n torques lies some s / n below the edge s of the band. The most likely s is there, too small, and no
+Gaussian at it says how much wider the band may be. So mean and covariance are those of the posterior itself. Each
+motor's bands tell of a few combinations z of the values; over these it is sampled,
+
+    p(z) = exp(-|z|^2 / 2 - c' z - sum of the bands' costs at  y + Y z,  half + H z),    z ~ N(0, 1) without the bands,
+
+and its two moments stand in the joint Gaussian in place of the bands. What is not known of the likelihood is sampled
+along: which share of the motors slid to where they rest, how near to the edge they stayed, and how well edges repeat.
+Values above zero are taken as they are here, not as logarithms: friction that may be zero has none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import expit
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.friction_band import band_cost, piled_cost
+from jointscope.graphs.rests.linear_rests import LinearRests
+from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.walkers import moments
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+TOLD = 0.25  # information, over that without bands, of a combination of which a motor's bands tell something
+WALKERS, SEED = 64, 1
+MOST_ODDS = 10.0  # logit of a share in piles that is none, or all
+DEPTHS = np.log((0.01, 0.5))  # of the piles below the edges, of the band; deeper ones are spread over it
+BLURS = np.log((0.1 * EDGE, EDGE))  # of the edges, of the friction
+SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
+SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
+
+
+def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Calibration, Array]:
+    """Mean and covariance of the values, friction bands integrated over.
+
+    Args:
+        problem: all rests with their weights.
+        robot: with the priors.
+        x: states of largest likelihood, shape (m, d).
+        calibration: values there.
+
+    Returns:
+        Means as calibration, covariance of its coordinates, shape (p, p).
+    """
+    free = [robot.parameters[name] for name in calibration.names]
+    prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
+    weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
+    pull = weight * (calibration.dynamics - prior)
+    commands = replace(problem, per_command=True)  # what was recorded has the likelihood
+    linear = LinearRests.of(commands, x, calibration, weight, pull)
+    values, size = calibration.values, calibration.value_by_coordinate
+    friction = calibration.positive & np.any(linear.H != 0.0, axis=0)
+    own = friction / np.array([p.prior_sigma**2 for p in free])
+    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(own)
+    b = (linear.b - pull * friction) / size + own * (values - np.array([p.prior for p in free]))
+    linear = replace(linear, A=A, b=b, Y=linear.Y / size, H=linear.H / size)
+    change, covariance = _moments(linear, np.where(friction, -values, -np.inf))
+    moved = np.log(np.where(friction, np.maximum(values + change, SMALLEST_SHARE * values), 1.0))
+    coordinates = np.where(friction, moved, calibration.dynamics + change / size)
+    found = calibration.with_points({DYNAMICS: coordinates})
+    scale = np.where(friction, found.value_by_coordinate, size)
+    return found, covariance / np.outer(scale, scale)
+
+
+def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
+    """Mean and covariance of the change of the values, which may fall to `least`, shape (p,)."""
+    unit = 1.0 / np.sqrt(np.diag(linear.A))
+    L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(linear.A * np.outer(unit, unit))).T  # L L' = A^-1
+    motors = [_MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
+    c = L.T @ linear.b
+    pulled = c + sum((motor.slope for motor in motors), np.zeros_like(c))
+    P, h = np.eye(len(c)), -c
+    for motor in motors:
+        V = motor.V
+        h -= motor.slope - V @ (V.T @ motor.slope)
+        if V.shape[1]:
+            slope = V.T @ (pulled - motor.slope)
+            mean, covariance = motor.moments(slope)
+            inverse = np.linalg.inv(covariance)
+            P += V @ (inverse - np.eye(len(mean))) @ V.T
+            h += V @ (inverse @ mean + slope)
+    information, vectors = np.linalg.eigh(P)
+    covariance = (vectors / np.maximum(information, SMALLEST_INFORMATION)) @ vectors.T
+    return L @ covariance @ h, L @ covariance @ L.T
+
+
+@dataclass(frozen=True)
+class _MotorBands:
+    """Bands of one motor at m rests, over r combinations z of the values.
+
+    Attributes:
+        y, half, noise, scale: shape (m,) [N m].
+        Y, H: slopes, shape (m, r).
+        V: the combinations that they tell of, among whitened changes of the values, shape (p, r).
+        slope: of the cost by these changes, shape (p,).
+        T, least: change of the values that may not fall further than so by z, shape (b, r) and (b,).
+        start: covariance of where to look for z, shape (r, r).
+    """
+
+    y: Array
+    half: Array
+    noise: Array
+    scale: Array
+    Y: Array
+    H: Array
+    V: Array
+    slope: Array
+    T: Array
+    least: Array
+    start: Array
+
+    @staticmethod
+    def of(linear: LinearRests, j: int, L: Array, least: Array) -> _MotorBands:
+        own, bounded = linear.motor == j, np.isfinite(least)
+        y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
+        Y, H = linear.Y[own] @ L, linear.H[own] @ L
+        found = band_cost(y, half, np.hypot(EDGE * scale, noise))
+        told, vectors = np.linalg.eigh(
+            Y.T @ (found.torque_information[:, None] * Y) + H.T @ (found.half_information[:, None] * H)
+        )
+        V = vectors[:, told > TOLD]
+        slope, Y, H = Y.T @ found.by_torque + H.T @ found.by_half, Y @ V, H @ V
+        yy, yh, hh = (part[:, None] for part in found.curvature)
+        curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H)
+        start = np.linalg.inv(np.eye(V.shape[1]) + curved)
+        return _MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
+
+    def cost(self, z: Array, odds: Array, depth: Array, blur: Array, slope: Array) -> Array:
+        """Of k points, shape (k,).
+
+        Args:
+            z: shape (k, r).
+            odds: logit of the share in piles, shape (k,).
+            depth: logarithm of the depth of the piles, of the band, shape (k,).
+            blur: logarithm of that of the edges, of the friction, shape (k,).
+            slope: of the cost without these bands, shape (r,).
+        """
+        half, found = self.half + z @ self.H.T, np.full(len(z), np.inf)
+        inside = np.all(half > 0.0, axis=1) & np.all(z @ self.T.T > self.least, axis=1) & (np.abs(odds) < MOST_ODDS)
+        for value, (low, high) in ((depth, DEPTHS), (blur, BLURS)):
+            inside &= (value > low) & (value < high)
+        if inside.any():
+            z, share = z[inside], expit(odds[inside])
+            sigma = np.hypot(np.exp(blur[inside])[:, None] * self.scale, self.noise)
+            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
+            costs = bands + np.log(sigma)  # of densities, whose blur is not the same
+            jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit
+            found[inside] = jeffreys + costs.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ slope
+        return found
+
+    def moments(self, slope: Array) -> tuple[Array, Array]:
+        """Mean and covariance of z; `slope` as of `cost`."""
+        rng, r = np.random.default_rng(SEED), len(slope)
+        z = rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(self.start).T
+        rest = rng.uniform((-2.0, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
+
+        def cost(point: Array) -> Array:
+            return self.cost(point[:, :r], point[:, r], point[:, r + 1], point[:, r + 2], slope)
+
+        while np.any(lost := ~np.isfinite(cost(np.hstack([z, rest])))):
+            z[lost] *= 0.7
+        mean, covariance = moments(cost, np.hstack([z, rest]), rng)
+        return mean[:r], covariance[:r, :r]
