@@ -21,6 +21,7 @@ from jointscope.graphs.judging.torque_judge import FEWEST_BLOCKS, TorqueJudge
 from jointscope.graphs.judging.torque_rows import TorqueEquations
 from jointscope.graphs.problem.standstill import ADDED_SPRING
 from jointscope.graphs.refits.loop_validation import judged_by_loop
+from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.model.robot import Robot
@@ -31,20 +32,21 @@ QUIET = 0.3  # of the missing torque: largest part that may be noise of the enco
 FEWEST_ROWS = 100
 
 
-def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
+def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver = solve) -> BaseModel:
     """A robot calibrated for the measure by which it will be judged.
 
     Args:
         robot: the model with start values.
         recordings: training recordings.
+        solver: minimises the cost of all samples.
     """
     if not seen_by_one_encoder(robot) or judged_by_loop(robot, recordings):
-        return BaseModel.of(robot, recordings, by_torques=False)
-    base = BaseModel.of(robot, recordings, by_torques=True)
+        return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
+    base = BaseModel.of(robot, recordings, by_torques=True, solver=solver)
     judge = torque_judge(base)
     if judge is not None and is_quiet(judge):
         return base
-    return BaseModel.of(robot, recordings, by_torques=False)
+    return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
 
 
 def torque_judge(base: BaseModel) -> TorqueJudge | None:

@@ -15,6 +15,7 @@ from jointscope.graphs.spread.kept_recording import (
     States,
     Visit,
     ask,
+    forget,
     told_and_asked,
 )
 from jointscope.graphs.workers.crew import MOST_LOSSES, Crew, Pending, WorkerLost
@@ -74,6 +75,13 @@ class SpreadRecording:
     def linearise(self, place: Place, damping: float, bends: Any) -> None:
         """Asks for what is left at a place; damping and bends as of `RecordingStretch.damp`."""
         self.ask(Linearisation(self._serial + 1, place, damping, bends))
+
+    def forget(self) -> None:
+        """The worker drops what it keeps."""
+        try:
+            self._crew.submit(self._slot, forget, self._key).result()
+        except WorkerLost:
+            pass
 
     @property
     def _serial(self) -> int:

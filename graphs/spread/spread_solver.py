@@ -56,7 +56,9 @@ class SpreadSolver:
             return solve(problems, start, max_iterations=max_iterations, hold=hold, progress=progress)
         slots = spread_evenly([len(problem.dynamics) for problem in pieces], self.crew.slots)
         spread = _Spread(self.crew, (self.client, self.solves), slots)
-        return solve(problems, start, max_iterations=max_iterations, hold=hold, progress=progress, elsewhere=spread)
+        solution = solve(problems, start, max_iterations=max_iterations, hold=hold, progress=progress, elsewhere=spread)
+        spread.forget()
+        return solution
 
 
 @dataclass
@@ -94,6 +96,11 @@ class _Spread:
         for recording, place in zip(self.recordings, places, strict=True):
             recording.ask(States(place))
         self._heard()
+
+    def forget(self) -> None:
+        """Workers need their recordings no longer; where a solve failed, its client's next one makes them forget."""
+        for recording in self.recordings:
+            recording.forget()
 
     def _heard(self) -> None:
         for recording in self.recordings:

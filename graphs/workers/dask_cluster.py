@@ -134,7 +134,7 @@ class DaskCluster:
     def _check_versions(self) -> None:
         """All workers must compute what this process would."""
         for package in SAME:
-            own = version(package)
+            own = version_here(package)
             for worker, other in self._client.run(version, package, on_error="return").items():
                 if isinstance(other, BaseException):
                     raise ClusterError(
@@ -155,6 +155,11 @@ class DaskCluster:
             self._client.register_plugin(WorkerEffects(texts))
 
 
+def version_here(package: str) -> str:
+    """Version of a package in this process."""
+    return version(package)
+
+
 @dataclass
 class _Pending:
     """A result of a cluster."""
@@ -163,6 +168,10 @@ class _Pending:
     slot: int
     worker: str
     future: Any
+
+    def drop(self) -> None:
+        """Nobody waits for it any more; what has begun ends by itself."""
+        self.future.cancel()
 
     def result(self) -> Any:
         """Waits for it, and looks from time to time whether somebody still works on it."""

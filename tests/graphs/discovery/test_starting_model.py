@@ -18,7 +18,7 @@ def asked(monkeypatch):
     def ask(quiet, one_encoder=True, loop=False):
         calibrated = []
 
-        def of(robot, recordings, by_torques):
+        def of(robot, recordings, by_torques, solver):
             calibrated.append(by_torques)
             return SimpleNamespace(by_torques=by_torques)
 
