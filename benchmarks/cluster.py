@@ -46,8 +46,8 @@ def run(quick: bool) -> Section:
     recordings = [simulate(robot, "calibration", seconds, seed=2, friction="smooth").recording, *made]
     section = Section(
         "Several workers",
-        f"{RECORDINGS} recordings of Doggy of {seconds:g} s at 1 kHz. *Iterations*: {ITERATIONS} of the batch solver on "
-        "all samples, with the recordings sent to workers that run already; *calibrate*: the whole verb but reading. "
+        f"{RECORDINGS} recordings of Doggy of {seconds:g} s at 1 kHz. *Iterations*: {ITERATIONS} of the batch solver "
+        "on all samples, with the recordings sent to workers that run already; *calibrate*: the whole verb but reading. "
         f"Two workers on a machine of {len(os.sched_getaffinity(0))} cores; load is what waits for a core on average "
         "while it runs, this run included.",
     )

@@ -14,13 +14,22 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from platform import python_version, python_version_tuple
 from types import TracebackType
 from typing import Any
 
 from jointscope.graphs.workers.crew import WorkerLost
 from jointscope.robots.errors import ClusterError
 
-SAME = ("jointscope", "numpy", "scipy", "gtsam", "numba", "pin")  # packages of which workers need our version
+SAME = (
+    "distributed",
+    "jointscope",
+    "numpy",
+    "scipy",
+    "gtsam",
+    "numba",
+    "pin",
+)  # packages of which workers need our version
 CONNECT = 5.0  # [s] to answer
 LOOK = 1.0  # [s] after which a worker that has not answered is looked for
 RETURN = 60.0  # [s] for a worker to come back where none is left
@@ -133,19 +142,24 @@ class DaskCluster:
 
     def _check_versions(self) -> None:
         """All workers must compute what this process would."""
+        major, minor, _ = python_version_tuple()
+        self._check("Python", f"{major}.{minor}.", python_version)
         for package in SAME:
-            own = version_here(package)
-            for worker, other in self._client.run(version, package, on_error="return").items():
-                if isinstance(other, BaseException):
-                    raise ClusterError(
-                        f"worker {worker}: {package} is not installed there ({other}); install {package} {own} in the "
-                        "environment of the workers, and restart them"
-                    )
-                if other != own:
-                    raise ClusterError(
-                        f"worker {worker} has {package} {other}, expected {own} as here; install the same version in "
-                        "the environment of the workers, and restart them"
-                    )
+            self._check(package, version_here(package), version, package)
+
+    def _check(self, what: str, own: str, ask: Callable[..., str], *args: str) -> None:
+        """A version that all workers must have."""
+        for worker, other in self._client.run(ask, *args, on_error="return").items():
+            if isinstance(other, BaseException):
+                raise ClusterError(
+                    f"worker {worker}: {what} is not installed there ({other}); install {what} {own} in the "
+                    "environment of the workers, and restart them"
+                )
+            if not other.startswith(own):
+                raise ClusterError(
+                    f"worker {worker} has {what} {other}, expected {own} as here; install the same version in the "
+                    "environment of the workers, and restart them"
+                )
 
     def _send_effects(self, files: Sequence[Path]) -> None:
         from jointscope.graphs.workers.worker_effects import WorkerEffects

@@ -95,5 +95,5 @@ def test_who_does_not_answer_is_named_at_once():
 
 def test_another_version_is_named_at_once(address, monkeypatch):
     monkeypatch.setattr(dask_cluster, "version_here", lambda package: "0.0.1")
-    with pytest.raises(ClusterError, match=r"has jointscope .*expected 0\.0\.1 as here"):
+    with pytest.raises(ClusterError, match=r"has distributed .*expected 0\.0\.1 as here"):
         DaskCluster(address)
