@@ -69,5 +69,5 @@ def test_recordings_that_this_machine_cannot_hold_are_refused(simulated, doggy, 
 
     must_fit_here(doggy, [simulated.recording])
     monkeypatch.setattr(memory_needed, "available_memory", lambda: 1e6)
-    with pytest.raises(RecordingError, match=r"1 recordings with 8 s need about .* GB are left on this machine"):
+    with pytest.raises(RecordingError, match=r"1 recordings with 8 s need at least .* GB are left on this machine"):
         must_fit_here(doggy, [simulated.recording])
