@@ -45,8 +45,8 @@ def run(quick: bool) -> Section:
         f"{RECORDINGS} recordings of Doggy of {seconds:g} s at 1 kHz. *Iterations*: {ITERATIONS} of the batch solver "
         "on all samples, the recordings sent to workers that run already; the best of "
         f"{REPEATS}, taken in turn. *computing*: of this process and the busiest worker, what "
-        "they would take with a core for each. *calibrate*: the whole verb but reading, once. Two workers on a machine of "
-        f"{len(os.sched_getaffinity(0))} cores, which had other work, too: load is what ran or waited for a core on "
+        "they would take with a core for each. *calibrate*: the whole verb but reading, once. Two workers on a machine "
+        f"of {len(os.sched_getaffinity(0))} cores, which had other work, too: load is what ran or waited for a core on "
         "average at the end of each calibration.",
     )
     local = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)

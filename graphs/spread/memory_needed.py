@@ -15,6 +15,7 @@ from jointscope.robots.recordings.recording import Recording
 
 NUMBER = 8  # [bytes]
 GIGABYTE = 1e9  # [bytes]
+PROCESS = 0.25e9  # [bytes] of a worker with what it imports
 PEAK = 2.2  # times what one solution takes; measured on 32 s of Doggy, 3.9 where torques that last are found, too
 
 
@@ -30,7 +31,7 @@ def must_fit(crew: Crew, robot: Robot, recordings: Sequence[Recording]) -> None:
     slots = spread_evenly([ticks_of(robot, recording) for recording in recordings], crew.slots)
     for left, own in crew.memories:
         mine = [i for i, slot in enumerate(slots) if slot in own]
-        total = sum(needed[i] for i in mine)
+        total = sum(needed[i] for i in mine) + PROCESS * len({slots[i] for i in mine})
         if total > left:
             raise ClusterError(
                 f"{crew.name}: {len(mine)} of {len(recordings)} recordings need about {total / GIGABYTE:.1f} GB in one "
@@ -47,8 +48,9 @@ def must_fit_here(robot: Robot, recordings: Sequence[Recording]) -> None:
     """
     needed, left = sum(solved_bytes(robot, recording) for recording in recordings), available_memory()
     if needed > left:
+        seconds = sum(recording.duration for recording in recordings)
         raise RecordingError(
-            f"{len(recordings)} recordings with {sum(recording.duration for recording in recordings):.0f} s need at least "
+            f"{len(recordings)} recordings with {seconds:.0f} s need at least "
             f"{needed / GIGABYTE:.1f} GB of memory, and {left / GIGABYTE:.1f} GB are left on this machine; give "
             "shorter recordings, or fewer"
         )
