@@ -12,7 +12,7 @@ from pathlib import Path
 
 from section_runs import run_sections
 
-SECTIONS = ("accuracy", "speed", "honest_sigmas", "reading")
+SECTIONS = ("accuracy", "speed", "honest_sigmas", "reading", "cluster")
 
 
 def main() -> None:

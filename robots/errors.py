@@ -35,3 +35,7 @@ class SimulationError(JointscopeError):
 
 class EstimatorError(JointscopeError):
     """The estimator for the control loop was called with something that it cannot be meant to take."""
+
+
+class ClusterError(JointscopeError):
+    """Workers of a cluster cannot be reached, are not what this process is, or have too little memory."""

@@ -15,6 +15,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.standstill import holding_sharpness
+from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.recordings.recording import Recording
@@ -68,6 +69,7 @@ class BaseModel:
         start: BaseModel | None = None,
         *,
         by_torques: bool | None = None,
+        solver: Solver = solve,
     ) -> BaseModel:
         """Calibrates a robot.
 
@@ -76,6 +78,7 @@ class BaseModel:
             recordings: training recordings.
             start: a model of the same recordings whose values are near; nothing is guessed anew.
             by_torques: see there; as the start where there is one, else wherever the robot allows it.
+            solver: minimises the cost of all samples.
         """
         if by_torques is None:
             by_torques = start.by_torques if start is not None else seen_by_one_encoder(robot)
@@ -86,7 +89,7 @@ class BaseModel:
         near = [calibration for calibration in start.calibrations] if start is not None else None
         # motors behind which links swing that nobody sees tell of these while they move
         moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
-        result = calibrate(full, recordings, near=near, standstill=not moving, memory=False)
+        result = calibrate(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)
         return BaseModel(
             result.robot,
             tuple(recordings),

@@ -104,7 +104,7 @@ def diagnose(
     report, clock, pool = progress or (lambda text, share: None), _Clock(), side_by_side or SideBySide()
     pool.begin(leaders)
     report("calibrating the base model", 0.0)
-    base = base or starting_model(robot, recordings)
+    base = base or starting_model(robot, recordings, pool.solver)
     clock.stage("calibration")
     report("scoring the catalogue", 0.3)
     scored = score_candidates(base)

@@ -17,7 +17,7 @@ from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.discovery.unexplained import believed_floor
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
-from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -67,9 +67,10 @@ class Motion:
 
     def calibrated(self, robot: Robot, start: BaseModel | None = None) -> BaseModel:
         """All components of every gyro are predicted."""
+        solver = self.side_by_side.solver if self.side_by_side is not None else solve
         if start is None:
-            return starting_model(with_full_gyros(robot), self.recordings)
-        return BaseModel.of(robot, self.recordings, start)
+            return starting_model(with_full_gyros(robot), self.recordings, solver)
+        return BaseModel.of(robot, self.recordings, start, solver=solver)
 
     def errors(self, model: BaseModel) -> ValidationError:
         """On the pieces where a diagnosis validates."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-import signal
 import tempfile
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -18,6 +17,11 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
+
+from jointscope.graphs.spread.spread_solver import SpreadSolver
+from jointscope.graphs.workers.crew import WorkerLost
+from jointscope.graphs.workers.dask_cluster import DaskCluster
+from jointscope.graphs.workers.local_processes import LocalProcesses, made_ready
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -32,10 +36,14 @@ class SideBySide:
     Args:
         workers: processes; with 1 everything is done in this one.
         effect_files: Python files with effects of the user's own, which workers read, too.
+        cluster: does everything, if it is given; it knows the user's effects already.
     """
 
-    def __init__(self, workers: int = 1, effect_files: Sequence[Path] = ()):
+    def __init__(self, workers: int = 1, effect_files: Sequence[Path] = (), cluster: DaskCluster | None = None):
         self.workers = workers
+        self.cluster = cluster
+        self._keepers = LocalProcesses(workers, effect_files)
+        self._solver = SpreadSolver(cluster or self._keepers)
         self._effect_files = tuple(effect_files)
         self._pool: ProcessPoolExecutor | None = None
 
@@ -46,11 +54,17 @@ class SideBySide:
         self, kind: type[BaseException] | None, err: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stop()
+        self._keepers.__exit__(kind, err, trace)
+
+    @property
+    def solver(self) -> SpreadSolver:
+        """Solves with recordings spread over the same workers; processes that keep them begin where there are two."""
+        return self._solver
 
     def begin(self, tasks: int) -> None:
         """Starts processes for a number of tasks to come, which are ready by then; what they import takes a second."""
         count = min(self.workers, tasks)
-        if count > 1 and self._pool is None:
+        if count > 1 and self._pool is None and self.cluster is None:
             for _ in range(count):
                 self._processes().submit(os.getpid)
 
@@ -62,6 +76,9 @@ class SideBySide:
             shared: what all tasks need; it is handed to each worker once.
             tasks: small.
         """
+        if self.cluster is not None:
+            yield from _on_cluster(self.cluster, function, shared, tasks)
+            return
         if self.workers < 2 or len(tasks) < 2:
             yield from (function(shared, task) for task in tasks)
             return
@@ -114,6 +131,30 @@ class SideBySide:
         self._pool = None
 
 
+def _on_cluster(cluster: DaskCluster, function: Callable[[Any, T], R], shared: Any, tasks: Sequence[T]) -> Generator[R]:
+    """As `SideBySide.in_order`."""
+    handle, running = cluster.share(shared), dict[int, Any]()
+    try:
+        for i in range(len(tasks)):
+            for ahead in range(i, min(i + cluster.slots, len(tasks))):
+                if ahead not in running:
+                    running[ahead] = cluster.submit(ahead % cluster.slots, function, handle, tasks[ahead])
+            for _ in range(ATTEMPTS):
+                try:
+                    result = running[i].result()
+                    break
+                except WorkerLost:  # perhaps with the only copy of what is shared
+                    handle = cluster.share(shared)
+                    running[i] = cluster.submit(i % cluster.slots, function, handle, tasks[i])
+            else:
+                result = function(shared, tasks[i])
+            del running[i]
+            yield result
+    finally:
+        for pending in running.values():
+            pending.drop()
+
+
 def available_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -121,13 +162,9 @@ def available_cores() -> int:
 
 def _begin(effect_files: tuple[Path, ...]) -> None:
     """Makes a worker ready, with the modules that it will need; the process that asked handles Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    made_ready(effect_files)
     from jointscope.graphs.discovery import diagnose  # noqa: F401
     from jointscope.graphs.kernels import band_kernel  # noqa: F401
-    from jointscope.robots.files.effect_catalogue import add_user_effects
-
-    for file in effect_files:
-        add_user_effects(file)
 
 
 def _run(function: Callable[[Any, Any], Any], file: str, task: Any) -> Any:

@@ -29,6 +29,7 @@ from jointscope.graphs.judging.torque_rows import TorqueEquations
 from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowest_seen
 from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
+from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.errors import EffectError, JointscopeError
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.model.robot import SHARPNESS, Robot
@@ -41,27 +42,28 @@ FEWEST_ROWS = 100
 SHARPER = 1.5  # times the sharpness that the robot file says, from which another one is tried
 
 
-def starting_model(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
+def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver = solve) -> BaseModel:
     """A robot calibrated for the measure by which it will be judged.
 
     Args:
         robot: the model with start values.
         recordings: training recordings.
+        solver: minimises the cost of all samples.
     """
-    return _as_sharp_as_told(_by_its_measure(robot, recordings))
+    return _as_sharp_as_told(_by_its_measure(robot, recordings, solver), solver)
 
 
-def _by_its_measure(robot: Robot, recordings: Sequence[Recording]) -> BaseModel:
+def _by_its_measure(robot: Robot, recordings: Sequence[Recording], solver: Solver) -> BaseModel:
     if not seen_by_one_encoder(robot) or judged_by_loop(robot, recordings):
-        return BaseModel.of(robot, recordings, by_torques=False)
-    base = BaseModel.of(robot, recordings, by_torques=True)
+        return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
+    base = BaseModel.of(robot, recordings, by_torques=True, solver=solver)
     judge = torque_judge(base)
     if judge is not None and is_quiet(judge):
         return base
-    return BaseModel.of(robot, recordings, by_torques=False)
+    return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
 
 
-def _as_sharp_as_told(base: BaseModel) -> BaseModel:
+def _as_sharp_as_told(base: BaseModel, solver: Solver = solve) -> BaseModel:
     """The model, or one whose dry friction turns over as sharply as the recordings say, if that predicts better.
 
     A true sign drives the sharpness up without an end: no sharper than what the encoder tells from one. Steps in which
@@ -72,10 +74,11 @@ def _as_sharp_as_told(base: BaseModel) -> BaseModel:
         return base
     try:
         asked = with_sharpness(robot, {joint: robot.sharpness_of(joint) for joint in told}, fixed=False)
-        found = calibrate(asked, base.recordings, near=base.calibrations, standstill=True, memory=False).robot
+        near = base.calibrations
+        found = calibrate(asked, base.recordings, near=near, standstill=True, memory=False, solver=solver).robot
         held = {joint: min(found.sharpness_of(joint), most) for joint, most in told.items()}
         sharper = {joint: k for joint, k in held.items() if k > robot.sharpness_of(joint)}
-        other = BaseModel.of(with_sharpness(robot, sharper), base.recordings, base)
+        other = BaseModel.of(with_sharpness(robot, sharper), base.recordings, base, solver=solver)
         before, after = (judged_error(b, b.robot, b.calibrations, fit_and_judge(b)[1]).error for b in (base, other))
     except JointscopeError:
         return base

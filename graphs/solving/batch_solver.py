@@ -35,6 +35,7 @@ from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
+from jointscope.graphs.solving.stretch import Elsewhere
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
@@ -93,6 +94,7 @@ def solve(
     first: First | None = None,
     length: int = 0,
     damping: float = LAMBDA_START,
+    elsewhere: Elsewhere | None = None,
 ) -> Solution:
     """Minimises the cost of all recordings together.
 
@@ -106,11 +108,12 @@ def solve(
         first: finds values to go on from; where it finds none, or they cost more than the start, the start is taken.
         length: steps in one condensed factor; chosen by the number of samples if 0.
         damping: the first one that is tried.
+        elsewhere: keeps the recordings of motion, which stand first, if not this process; goes without `first`.
 
     Raises:
         SolveError: the cost is not finite or cannot be lowered from a point that is no minimum.
     """
-    graph, values = CondensedGraph.of(problems, start, hold, length)
+    graph, values = CondensedGraph.of(problems, start, hold, length, elsewhere)
     if first is not None:
         begin, found = graph.cost(values), first(graph, values)
         if found is not None and graph.cost(found) <= begin:
@@ -128,15 +131,8 @@ def solve(
     descent.run(max_iterations, step_tolerance, measured_rows(problems), progress, damping)
     graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
     estimate = graph.estimate(descent.values)
-    return Solution(
-        estimate,
-        descent.cost,
-        graph.shared,
-        graph.systems(estimate),
-        descent.iterations,
-        descent.converged,
-        descent.flat,
-    )
+    end = (descent.iterations, descent.converged, descent.flat)
+    return Solution(estimate, descent.cost, graph.shared, graph.systems(estimate), *end)
 
 
 @dataclass

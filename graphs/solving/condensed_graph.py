@@ -32,7 +32,7 @@ from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
 from jointscope.graphs.solving.set_problem import Problem, motions, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
-from jointscope.graphs.solving.stretch import RecordingStretch, cut
+from jointscope.graphs.solving.stretch import Elsewhere, GraphStretch, Place, cut
 from jointscope.graphs.solving.whole_set import WholeSet
 
 Array = NDArray[np.float64]
@@ -53,19 +53,25 @@ class CondensedGraph:
         shared: where the shared values stand in one vector.
         likes: calibration of each piece, for the blocks that are held.
         held_cost: cost of priors whose block is held.
+        elsewhere: who keeps the recordings of motion, if not this process.
     """
 
     problems: tuple[Problem, ...]
     graph: gtsam.NonlinearFactorGraph
-    stretches: tuple[tuple[RecordingStretch | WholeSet, ...], ...]
+    stretches: tuple[tuple[GraphStretch, ...], ...]
     blocks: tuple[tuple[str, ...], ...]
     shared: SharedLayout
     likes: tuple[Calibration, ...]
     held_cost: float
+    elsewhere: Elsewhere | None = None
 
     @staticmethod
     def of(
-        problems: Sequence[Problem], start: Estimate, hold: Sequence[str] = (), length: int = 0
+        problems: Sequence[Problem],
+        start: Estimate,
+        hold: Sequence[str] = (),
+        length: int = 0,
+        elsewhere: Elsewhere | None = None,
     ) -> tuple[CondensedGraph, gtsam.Values]:
         """The graph, and the values of an estimate.
 
@@ -74,6 +80,7 @@ class CondensedGraph:
             start: where it is linearised first.
             hold: blocks that stay as they are; they are no variables of the graph.
             length: steps in one stretch; chosen by the number of samples if 0.
+            elsewhere: takes the recordings of motion, which stand first.
         """
         places = owners(problems)
         length = length or max(STRETCH, sum(len(p.dynamics) for p in motions(problems)) // MOST_STRETCHES)
@@ -89,9 +96,9 @@ class CondensedGraph:
         graph, stretches = gtsam.NonlinearFactorGraph(), []
         for piece, (problem, x, like) in enumerate(zip(problems, start.states, likes, strict=True)):
             blocks = free[piece]
-            cuts: tuple[RecordingStretch | WholeSet, ...]
+            cuts: tuple[GraphStretch, ...]
             if isinstance(problem, BagProblem):
-                cuts = tuple(cut(problem, x, like, length, blocks))
+                cuts = tuple((elsewhere.cut if elsewhere else cut)(problem, x, like, length, blocks))
             else:
                 cuts = (WholeSet(problem, x, like, blocks),)
             for stretch in cuts:
@@ -101,16 +108,20 @@ class CondensedGraph:
             stretches.append(cuts)
         held = _add_rows_without_states(graph, problems, places, likes, free)
         shared = SharedLayout.of(start.calibrations, places)
-        return CondensedGraph(tuple(problems), graph, tuple(stretches), tuple(free), shared, likes, held), values
+        return CondensedGraph(
+            tuple(problems), graph, tuple(stretches), tuple(free), shared, likes, held, elsewhere
+        ), values
 
     def cost(self, values: gtsam.Values) -> float:
         """Half the sum of squared whitened residuals, priors of held blocks included."""
+        if self.elsewhere:
+            self.elsewhere.visit(self._places(values))
         return float(self.graph.error(values)) + self.held_cost
 
     @property
     def costs(self) -> list[Array]:
         """Cost of each tick of each piece where it was evaluated last, shape (m,)."""
-        return [_overlapped([stretch.system.costs for stretch in cuts]) for cuts in self.stretches]
+        return [_overlapped([stretch.costs for stretch in cuts]) for cuts in self.stretches]
 
     def linearized(
         self, values: gtsam.Values, damping: float = 0.0, bends: Sequence[Array] = ()
@@ -125,7 +136,21 @@ class CondensedGraph:
         for piece, cuts in enumerate(self.stretches):
             for stretch in cuts:
                 stretch.damp(damping, bends[piece] if len(bends) else None)
+        if self.elsewhere:
+            self.elsewhere.linearise(self._places(values), damping, bends)
         return self.graph.linearize(values)
+
+    def _places(self, values: gtsam.Values) -> list[Place]:
+        """Where each recording of motion is, at some values."""
+        found = []
+        for piece, cuts in enumerate(self.stretches):
+            if isinstance(self.problems[piece], BagProblem):
+                ends = [tuple(values.atVector(state_key(tick, piece)) for tick in s.ticks) for s in cuts]
+                owner = self.shared.owners[piece]
+                found.append(
+                    Place(tuple(ends), extract_calibration(values, self.likes[piece], self.blocks[piece], owner))
+                )
+        return found
 
     @property
     def dynamics_key(self) -> int | None:
@@ -165,6 +190,8 @@ class CondensedGraph:
             extract_calibration(values, like, blocks, owner)
             for like, blocks, owner in zip(self.likes, self.blocks, self.shared.owners, strict=True)
         )
+        if self.elsewhere:
+            self.elsewhere.fetch_states(self._places(values))
         states = tuple(
             np.vstack([cuts[0].states, *(stretch.states[1:] for stretch in cuts[1:])]) for cuts in self.stretches
         )
@@ -186,7 +213,7 @@ class CondensedGraph:
         return found
 
 
-def _between(cuts: Sequence[RecordingStretch | WholeSet]) -> list[int]:
+def _between(cuts: Sequence[GraphStretch]) -> list[int]:
     """Ticks at the ends of stretches."""
     return list(dict.fromkeys(tick for stretch in cuts for tick in stretch.ticks))
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,68 @@ class Point:
         )
 
 
+@dataclass(frozen=True)
+class Place:
+    """Both ends of each stretch of a recording, shape (d,) each, and the shared values."""
+
+    ends: tuple[tuple[Array, ...], ...]
+    calibration: Calibration
+
+
+class GraphStretch(Protocol):
+    """What a graph asks of a stretch, wherever that is; as of `RecordingStretch`."""
+
+    @property
+    def ticks(self) -> tuple[int, ...]:
+        """First and last tick in the recording, or none."""
+
+    @property
+    def size(self) -> int:
+        """Number of columns: both ends, then the free blocks."""
+
+    @property
+    def states(self) -> Array:
+        """All states at the last evaluated point, shape (m, d)."""
+
+    @property
+    def system(self) -> NormalEquations:
+        """Normal equations at the last evaluated point."""
+
+    @property
+    def costs(self) -> Array:
+        """Cost of each tick there, shape (m,)."""
+
+    def columns(self, block: str) -> slice:
+        """Columns of a free block."""
+
+    def damp(self, damping: float, bends: Array | None) -> None:
+        """Sets the damping of all states, larger where `bends` says so, of all states of the recording."""
+
+    def visit(self, ends: Sequence[Array], calibration: Calibration) -> float:
+        """Evaluates everything at new ends and shared values; returns the cost there."""
+
+    def settle(self) -> tuple[Array, Array, float]:
+        """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
+
+
+class Elsewhere(Protocol):
+    """Who keeps recordings of motion beside this process; it is asked for all of them at once."""
+
+    def cut(
+        self, problem: BagProblem, x: Array, calibration: Calibration, length: int, blocks: Sequence[str]
+    ) -> tuple[GraphStretch, ...]:
+        """Takes the next recording; arguments as of `cut`."""
+
+    def visit(self, places: Sequence[Place]) -> None:
+        """Evaluates all recordings at their places."""
+
+    def linearise(self, places: Sequence[Place], damping: float, bends: Sequence[Array]) -> None:
+        """Makes these places the ones where they are linearised, with the damping of `CondensedGraph.linearized`."""
+
+    def fetch_states(self, places: Sequence[Place]) -> None:
+        """Brings all states at these places."""
+
+
 class RecordingStretch:
     """Samples of one recording between two ticks.
 
@@ -61,18 +124,13 @@ class RecordingStretch:
         self._d = x.shape[1]
         own = calibration.columns
         self._kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
-        self._columns: dict[str, slice] = {}
-        n = 2 * self._d
-        for block in blocks:
-            self._columns[block] = slice(n, n + calibration.block_size(block))
-            n += calibration.block_size(block)
-        self._size = n
+        self._columns, self._size = rim_columns(self._d, calibration, blocks)
         self._base = self._trial = self._evaluated(x.copy(), calibration)
         self._inner: InnerStates | None = None
         self._eliminated_with = self.damping
 
     @property
-    def ticks(self) -> tuple[int, int]:
+    def ticks(self) -> tuple[int, ...]:
         """First and last tick in the recording."""
         return self._start, self._start + len(self._base.x) - 1
 
@@ -90,6 +148,11 @@ class RecordingStretch:
     def system(self) -> NormalEquations:
         """Normal equations at the last evaluated point."""
         return self._trial.system
+
+    @property
+    def costs(self) -> Array:
+        """Cost of each tick there, shape (m,)."""
+        return self._trial.system.costs
 
     def columns(self, block: str) -> slice:
         """Columns of a free block."""
@@ -139,6 +202,15 @@ class RecordingStretch:
         return x
 
 
+def rim_columns(d: int, calibration: Calibration, blocks: Sequence[str]) -> tuple[dict[str, slice], int]:
+    """Columns of the free blocks behind those of two states of size d, and the number of all columns."""
+    columns, n = dict[str, slice](), 2 * d
+    for block in blocks:
+        columns[block] = slice(n, n + calibration.block_size(block))
+        n += calibration.block_size(block)
+    return columns, n
+
+
 def cut(
     problem: BagProblem, x: Array, calibration: Calibration, length: int, blocks: Sequence[str]
 ) -> Iterator[RecordingStretch]:
@@ -151,6 +223,12 @@ def cut(
         length: steps in one stretch.
         blocks: names of the blocks that may change.
     """
+    for a, b, part in parts_of(problem, length):
+        yield RecordingStretch(part, x[a : b + 1], calibration, a, blocks)
+
+
+def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
+    """First and last tick of each stretch, and its factors; arguments as of `cut`."""
     steps = len(problem.dynamics)
     edges = np.linspace(0, steps, max(round(steps / length), 1) + 1).round().astype(int)
     for a, b in pairwise(edges.tolist()):
@@ -162,5 +240,4 @@ def cut(
             chosen = np.flatnonzero(inside)
             if len(chosen):
                 placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
-        part = replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))
-        yield RecordingStretch(part, x[a : b + 1], calibration, a, blocks)
+        yield a, b, replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))

@@ -61,6 +61,11 @@ class WholeSet:
         """Normal equations at the last evaluated point."""
         return self._trial.system
 
+    @property
+    def costs(self) -> Array:
+        """Cost of each state there, shape (m,)."""
+        return self._trial.system.costs
+
     def columns(self, block: str) -> slice:
         """Columns of a free block."""
         return self._free.columns[block]

@@ -27,7 +27,8 @@ def effects_of_file(path: Path) -> list[tuple[Effect, str]]:
         EffectError: the file cannot be read, is not Python, or fails when it runs.
     """
     source, tree = _parsed(path)
-    module = ModuleType(f"jointscope_user_effects_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]}")
+    # named after what it says: a worker on another machine, which has the file elsewhere, knows it by the same name
+    module = ModuleType(f"jointscope_user_effects_{hashlib.sha256(source.encode()).hexdigest()[:12]}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses look their module up by name
     try:

@@ -61,6 +61,7 @@ def check_kind(args: argparse.Namespace) -> None:
         "--holdout": args.holdout is not None,
         "--holdout-share": args.holdout_share is not None,
         "--leave-out": bool(args.leave_out),
+        "--scheduler": args.scheduler is not None,
     }
     check_rests_alone(args)
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, search=True)

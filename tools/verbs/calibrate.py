@@ -24,6 +24,7 @@ from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_ki
 from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
+from jointscope.tools.verb_parts.workers import add_spreading_option, check_one_choice, check_workers, workers_of
 from jointscope.tools.writing.whole_file import check_outputs, whole_file
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def add_parser(subparsers: Any) -> None:
         action="store_true",
         help="solve stretch after stretch with iSAM2 and print what is known after each; the end is that of the batch",
     )
+    add_spreading_option(parser)
     add_poses_option(parser)
     add_rests_option(parser)
     add_frequency_option(parser)
@@ -80,7 +82,13 @@ def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
     if args.incremental and args.solver == "samples":
         raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
+    if (args.incremental or args.solver == "samples") and (args.workers > 1 or args.scheduler is not None):
+        raise SolveError(
+            f"{'--incremental' if args.incremental else '--solver samples'} solves in this process alone; leave out "
+            "--workers and --scheduler"
+        )
     files = ResultFiles.of(args)
+    check_one_choice(args)
     _check_kinds(args)
     check_outputs(
         [*files.all, *filter(None, [args.urdf])],
@@ -109,12 +117,13 @@ def run(args: argparse.Namespace) -> int:
             f"{robot.name}: its links are free, so there are no states to estimate one by one; leave out "
             f"`{'--incremental' if args.incremental else '--solver samples'}`"
         )
-    with progress_bar() as progress:
+    with progress_bar() as progress, workers_of(args) as workers:
         read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
+        check_workers(workers, robot, recordings)
         seen = None if args.incremental else progress  # what is printed and a bar would write into each other
-        solver = _solver(args, robot)
+        solver = _solver(args, robot) or workers.solver
         kinds = {"rests": args.rests, "poses": args.poses, "frequency": args.frequency}
         result = calibrate(robot, recordings, **kinds, accept=limits, solver=solver, progress=seen)
         if files.pictures:
@@ -158,6 +167,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--incremental": args.incremental,
         "--solver samples": args.solver == "samples",
         "--leave-out": bool(args.leave_out),
+        "--scheduler": args.scheduler is not None,
     }
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
     if args.urdf is not None and not args.poses:
@@ -165,7 +175,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
 
 
 def _solver(args: argparse.Namespace, robot: Any) -> Any:
-    """What minimises the cost of all samples."""
+    """What minimises the cost of all samples, if it is not the batch."""
     if args.incremental:
         from jointscope.graphs.gtsam_solvers.incremental_solver import Incremental
         from jointscope.tools.terminal.known_so_far import known_so_far_text
@@ -180,6 +190,4 @@ def _solver(args: argparse.Namespace, robot: Any) -> Any:
         from jointscope.graphs.gtsam_solvers.samples_solver import solve_samples
 
         return solve_samples
-    from jointscope.graphs.solving.batch_solver import solve
-
-    return solve
+    return None

@@ -14,7 +14,7 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_opt
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
 from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
-from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
+from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
 EXAMPLE = """example:
@@ -54,6 +54,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, writes the files, and says what was found."""
     files = ResultFiles.of(args)
+    check_one_choice(args)
     check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
@@ -80,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
     check_viewer(robot, files)
     with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
+        check_workers(workers, robot, recordings)
         result = diagnose(
             robot,
             recordings,

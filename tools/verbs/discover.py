@@ -7,7 +7,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
@@ -17,8 +17,11 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_opt
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
 from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
-from jointscope.tools.verb_parts.workers import add_workers_option, workers_of
+from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
+
+if TYPE_CHECKING:
+    from jointscope.graphs.discovery.side_by_side import SideBySide
 
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
@@ -56,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.verb_parts.discovery_state import state_file, step_file
 
     files = ResultFiles.of(args)
+    check_one_choice(args)
     check_kind(args)
     beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MOST_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
@@ -76,9 +80,10 @@ def run(args: argparse.Namespace) -> int:
         files.tell()
         return 0
     check_viewer(robot, files)
-    with progress_bar() as progress:
+    with progress_bar() as progress, workers_of(args) as workers:
         recordings, holdout = read_bags(args, robot, progress)
-        result = _discover(args, robot, recordings, holdout, progress)
+        check_workers(workers, robot, recordings)
+        result = _discover(args, robot, (recordings, holdout), workers, progress)
         if files.pictures:
             progress("writing", 1.0)
         write_discovery(result, files, robot.path.name)
@@ -88,29 +93,33 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _discover(
-    args: argparse.Namespace, robot: Robot, recordings: Sequence[Any], holdout: Any, progress: Progress
+    args: argparse.Namespace,
+    robot: Robot,
+    given: tuple[Sequence[Any], Any],
+    workers: SideBySide,
+    progress: Progress,
 ) -> Any:
     """The computation; whatever ends it, finished steps stay on disk."""
     from jointscope.tools.notebook.calls import discover
     from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
+    recordings, holdout = given
     hashes = hashes_of(robot, recordings, holdout, args.effects)
     state = DiscoveryState(args.output, hashes, recordings, robot.path.name)
     saved = () if args.restart else state.resume()
     if saved:
         print(f"Continuing after step {len(saved) - 1}, {saved[-1].robot_file}; --restart starts anew.\n", flush=True)
     try:
-        with workers_of(args) as workers:
-            result = discover(
-                robot,
-                recordings,
-                holdout,
-                missing_torque=ResultFiles.of(args).pictures,
-                save=state.save,
-                resume=saved or None,
-                side_by_side=workers,
-                progress=progress,
-            )
+        result = discover(
+            robot,
+            recordings,
+            holdout,
+            missing_torque=ResultFiles.of(args).pictures,
+            save=state.save,
+            resume=saved or None,
+            side_by_side=workers,
+            progress=progress,
+        )
     except KeyboardInterrupt:
         if not state.count:
             raise

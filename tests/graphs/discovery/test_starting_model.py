@@ -18,7 +18,7 @@ def asked(monkeypatch):
     def ask(quiet, one_encoder=True, loop=False):
         calibrated = []
 
-        def of(robot, recordings, by_torques):
+        def of(robot, recordings, by_torques, solver):
             calibrated.append(by_torques)
             return SimpleNamespace(by_torques=by_torques)
 
@@ -27,7 +27,7 @@ def asked(monkeypatch):
         monkeypatch.setattr(module, "judged_by_loop", lambda robot, recordings: loop)
         monkeypatch.setattr(module, "torque_judge", lambda base: None if quiet is None else "judge")
         monkeypatch.setattr(module, "is_quiet", lambda judge: quiet)
-        monkeypatch.setattr(module, "_as_sharp_as_told", lambda base: base)
+        monkeypatch.setattr(module, "_as_sharp_as_told", lambda base, solver: base)
         return starting_model("robot", ["recording"]).by_torques, calibrated
 
     return ask
