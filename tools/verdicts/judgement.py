@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.tools.presentation.numbers import significant
@@ -18,7 +18,7 @@ from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_b
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.same_time import same_time
-from jointscope.tools.verdicts.same_values import same_values
+from jointscope.tools.verdicts.same_values import same_by_regression, same_values
 from jointscope.tools.verdicts.short_steps import short_steps
 from jointscope.tools.verdicts.torque_constants import suspicious_constants
 from jointscope.tools.verdicts.whiteness import AS_EXPECTED, LAGS, channel_memory, endless_torque, strength
@@ -35,7 +35,6 @@ CORRELATION = (0.25, 0.5)  # largest autocorrelation within LAGS; a quantized en
 UNEXPLAINED = (0.02, 0.2)  # share of a velocity that the dynamics leave open after DRIFT, in the worst window
 DRIFT = 0.1  # [s]
 INFLATION = (3.0, 20.0)  # sigmas from blocks against those of white noise
-APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 TOGETHER = 2  # doubtful signs of the residuals that make an answer worthless
 WEAK = 0.1  # relative sigma of a direction that makes its parameters doubtful
 
@@ -99,7 +98,7 @@ def judge(result: CalibrationResult) -> Judgement:
         *(_consequences(about_values) if reasons else about_values),
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
-        _two_ways(result),
+        Check(*same_by_regression(result)),
         *(Check(*each) for each in same_values(result)),
         _constants(result),
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
@@ -242,40 +241,12 @@ def _honest_sigmas(result: CalibrationResult) -> Check:
     )
 
 
-def _two_ways(result: CalibrationResult) -> Check:
-    """Regression needs no states and no process noise; where both disagree one of them is wrong."""
-    name = "Regression says the same"
-    if not result.regressed:
-        return Check("info", name, "Regression knows rigid joints with dry and viscous friction only.")
-    table = {p.name: p for p in result.parameters}
-    apart = {n: _apart(table[n], other.value, other.sigma) for n, other in result.regressed.items() if n in table}
-    worst = max(apart, key=lambda n: apart[n], default="")
-    if not worst or apart[worst] <= APART[0]:
-        return Check("good", name, f"So it does of {len(apart)} values, each within its uncertainty or a few percent.")
-    found, other = table[worst], result.regressed[worst]
-    return Check(
-        "warn",
-        name,
-        f"{worst} is {significant(found.value)} ± {significant(found.sigma, 1)} {found.unit} here and "
-        f"{significant(other.value)} ± {significant(other.sigma, 1)} {found.unit} by regression on the same "
-        f"recordings, {significant(apart[worst], 2)} sigma apart: one of the two is wrong.",
-    )
-
-
 def _constants(result: CalibrationResult) -> Check:
     doubt = suspicious_constants(result)
     name = "Torque constants like those of drives"
     return (
         Check("bad", name, doubt) if doubt else Check("good", name, "Nothing speaks against the unit of the command.")
     )
-
-
-def _apart(found: ParameterEstimate, value: float, sigma: float) -> float:
-    """Distance of two values of a parameter in their sigmas; zero where it is a small share of it."""
-    distance = abs(found.value - value)
-    if distance <= APART[1] * max(abs(found.value), abs(value)):
-        return 0.0
-    return float(distance / max(np.hypot(found.sigma, sigma), 1e-300))
 
 
 def equation_names(result: CalibrationResult) -> list[str]:
