@@ -25,6 +25,7 @@ from jointscope.factors.friction_band import band_cost, piled_cost
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.walkers import moments
+from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ WALKERS, SEED = 64, 1
 MOST_ODDS = 10.0  # logit of a share in piles that is none, or all
 DEPTHS = np.log((0.01, 0.5))  # of the piles below the edges, of the band; deeper ones are spread over it
 BLURS = np.log((0.1 * EDGE, EDGE))  # of the edges, of the friction
+MOST_SHRINKS = 100  # of where walkers begin, towards the likeliest values
 SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
 SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
 
@@ -48,6 +50,9 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
 
     Returns:
         Means as calibration, covariance of its coordinates, shape (p, p).
+
+    Raises:
+        SolveError: a band that closes at a rest.
     """
     free = [robot.parameters[name] for name in calibration.names]
     prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
@@ -73,7 +78,7 @@ def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
     """Mean and covariance of the change of the values, which may fall to `least`, shape (p,)."""
     unit = 1.0 / np.sqrt(np.diag(linear.A))
     L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(linear.A * np.outer(unit, unit))).T  # L L' = A^-1
-    motors = [_MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
+    motors = [MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
     c = L.T @ linear.b
     pulled = c + sum((motor.slope for motor in motors), np.zeros_like(c))
     P, h = np.eye(len(c)), -c
@@ -92,7 +97,7 @@ def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class _MotorBands:
+class MotorBands:
     """Bands of one motor at m rests, over r combinations z of the values.
 
     Attributes:
@@ -117,7 +122,7 @@ class _MotorBands:
     start: Array
 
     @staticmethod
-    def of(linear: LinearRests, j: int, L: Array, least: Array) -> _MotorBands:
+    def of(linear: LinearRests, j: int, L: Array, least: Array) -> MotorBands:
         own, bounded = linear.motor == j, np.isfinite(least)
         y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
         Y, H = linear.Y[own] @ L, linear.H[own] @ L
@@ -130,7 +135,7 @@ class _MotorBands:
         yy, yh, hh = (part[:, None] for part in found.curvature)
         curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H)
         start = np.linalg.inv(np.eye(V.shape[1]) + curved)
-        return _MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
+        return MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
 
     def cost(self, z: Array, odds: Array, depth: Array, blur: Array, slope: Array) -> Array:
         """Of k points, shape (k,).
@@ -164,7 +169,16 @@ class _MotorBands:
         def cost(point: Array) -> Array:
             return self.cost(point[:, :r], point[:, r], point[:, r + 1], point[:, r + 2], slope)
 
-        while np.any(lost := ~np.isfinite(cost(np.hstack([z, rest])))):
+        for _ in range(MOST_SHRINKS):
+            lost = ~np.isfinite(cost(np.hstack([z, rest])))
+            if not np.any(lost):
+                break
             z[lost] *= 0.7
+        else:
+            raise SolveError(
+                f"a friction band closes at one of its {len(self.y)} rests: with the likeliest values friction there "
+                "is zero or less; leave out terms of it that these loads do not tell (`fixed: true` with value 0), or "
+                "record more loads"
+            )
         mean, covariance = moments(cost, np.hstack([z, rest]), rng)
         return mean[:r], covariance[:r, :r]

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from lever_bench import C0, C1, hanging, lever
 
+from jointscope.graphs.rests.band_posterior import MotorBands
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.robots.errors import SolveError
 from jointscope.tools.terminal.rests_text import verdict
 
 TRUTH = {"swing.coulomb_torque": C0, "swing.weight_dependent_friction.coefficient": C1}
@@ -58,6 +60,26 @@ def test_bands_that_begin_far_too_wide_or_narrow_come_to_the_same_end(tmp_path, 
     )
     for a, b in zip(near.parameters, far.parameters, strict=True):
         assert abs(a.value - b.value) < 0.2 * a.sigma, a.name
+
+
+def test_a_band_that_closes_at_a_rest_is_told_and_not_waited_for():
+    one, nothing = np.ones(3), np.zeros((3, 1))
+    half = np.array([1.0, 1.0, -0.1])
+    closed = MotorBands(
+        0.1 * one,
+        half,
+        one,
+        one,
+        one[:, None],
+        nothing,
+        np.eye(1),
+        np.zeros(1),
+        np.zeros((0, 1)),
+        np.zeros(0),
+        np.eye(1),
+    )
+    with pytest.raises(SolveError, match="a friction band closes at one of its 3 rests"):
+        closed.moments(np.zeros(1))
 
 
 def test_friction_of_motors_that_creep_as_their_speed_says_is_no_yes(tmp_path):
