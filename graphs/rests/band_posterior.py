@@ -123,6 +123,7 @@ class MotorBands:
 
     @staticmethod
     def of(linear: LinearRests, j: int, L: Array, least: Array) -> MotorBands:
+        """Of motor j, over changes L z of the values, which may fall to `least`, shape (p,)."""
         own, bounded = linear.motor == j, np.isfinite(least)
         y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
         Y, H = linear.Y[own] @ L, linear.H[own] @ L
