@@ -42,7 +42,7 @@ class MadeUp:
     def compare(self, robot):
         return SimpleNamespace(judged_error=self.error(robot), judged_floor=1.0)
 
-    def calibrate(self, robot, recordings, start=None):
+    def calibrate(self, robot, recordings, start=None, solver=None):
         self.calibrated.append(self.labels(robot))
         for here in robot.effects:
             gone = here.label in self.idle and len(robot.effects) > 1
