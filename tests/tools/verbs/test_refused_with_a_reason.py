@@ -85,7 +85,8 @@ def test_an_offset_is_named_instead_of_a_mass_and_adding_it_makes_the_values_rig
 
 def test_a_load_taken_up_is_told_with_its_time_and_the_part_before_is_right(folder, capsys):
     said = refused(taken_up, capsys)
-    moment, before = re.search(r"One load throughout\? From (\S+) s .*?before with `jointscope ([^`]*)`", said).groups()
+    told = re.search(r"One load throughout\? From (\S+) s .*?the rest with `jointscope ([^`]*)`", said)
+    moment, before = told.groups()
     assert float(moment) == pytest.approx(5.0, abs=0.15)
     assert "\nNo, " not in typed(capsys, f"{before} --json d.json")
     assert_right(folder / "d.json")
