@@ -2,7 +2,7 @@
 """In a worker: the stretches of a recording between two questions about them.
 
 What a worker keeps follows from how the recording began and the linearisations since, which whoever asks has written
-down. So a worker that lacks it, because it is new or has been restarted, is told both and comes to the same digits.
+down. So a worker that lacks it, because it is new or has been restarted, is told both and comes to the same place.
 """
 
 from __future__ import annotations

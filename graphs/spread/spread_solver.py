@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class SpreadSolver:
-    """Takes the place of `batch_solver.solve`, with the same result to the last digit.
+    """Takes the place of `batch_solver.solve`, with the same result but for rounding.
 
     Recordings are spread when there are at least two; pieces of another kind than motion stay here, as they are small.
 
