@@ -8,6 +8,7 @@ one of the cluster. What a worker keeps is not Dask's: who gave it gives it agai
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
@@ -30,6 +31,7 @@ SAME = (
     "numba",
     "pin",
 )  # packages of which workers need our version
+ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx|ucxx)://[^/\s]+:\d+")  # protocols of Dask, and where it listens
 CONNECT = 5.0  # [s] to answer
 LOOK = 1.0  # [s] after which a worker that has not answered is looked for
 RETURN = 60.0  # [s] for a worker to come back where none is left
@@ -52,6 +54,11 @@ class DaskCluster:
         except ImportError as err:
             raise ClusterError('--scheduler needs Dask: pip install "jointscope[cluster]"') from err
         self._address = address
+        if not ADDRESS.fullmatch(address):
+            raise ClusterError(
+                f"--scheduler: got {address!r}; expected an address like tcp://host:8786, as `dask scheduler` prints "
+                "it when it starts"
+            )
         try:
             with _quiet():
                 self._client = Client(address, timeout=CONNECT, set_as_default=False)
@@ -72,12 +79,15 @@ class DaskCluster:
         self.of_slot = [worker for worker, about in self._workers.items() for _ in range(about["nthreads"])]
 
     def __enter__(self) -> DaskCluster:
+        self._silence = _quiet()
+        self._silence.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, err: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._client.close()
+        self._silence.__exit__(kind, err, trace)
 
     @property
     def name(self) -> str:

@@ -187,7 +187,12 @@ def _of_joint(_: Limit, name: str, entry: float | None) -> _Found:
 
 
 def _of_poses(limit: Limit, content: Mapping[str, Any]) -> _Found:
-    return _number(content.get("poses", {}).get(limit.quantity), "mm", "this result says nothing of poses")
+    found = content.get("poses", {})
+    sessions = [found] if isinstance(found, Mapping) else found  # a calibration has one entry for each session
+    values = [session.get(limit.quantity) for session in sessions]
+    known = [value for value in values if isinstance(value, int | float)]
+    worst = max(known) if known and len(known) == len(values) else None
+    return _number(worst, "mm", "this result says nothing of poses")
 
 
 def _number(value: Any, unit: str = "", otherwise: str = "it is no number") -> _Found:

@@ -62,6 +62,7 @@ def check_kind(args: argparse.Namespace) -> None:
         "--holdout-share": args.holdout_share is not None,
         "--leave-out": bool(args.leave_out),
         "--scheduler": args.scheduler is not None,
+        "--workers": args.workers > 1,
     }
     check_rests_alone(args)
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, search=True)

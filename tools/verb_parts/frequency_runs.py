@@ -170,6 +170,7 @@ def run_kinds_calibration(
     from jointscope.tools.report.kinds_report import kinds_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
+    from jointscope.tools.verdicts.frequency_judgement import judge_kinds
 
     if files.rrd is not None:
         raise RobotError(f"{robot.name}: --rrd shows motion, not poses or frequency responses; use --report")
@@ -178,7 +179,8 @@ def run_kinds_calibration(
     lacks = _lacking(Calibrated(result.poses, result.frequency), progress)
     both, (alone, joint) = result.frequency.to_json() | lacks[1], result.pose_squares
     silent = set(result.frequency.silent)
-    content = both | pose_json(result.poses) | {
+    judgement = judge_kinds(result)
+    content = both | pose_json(result.poses) | judgement.to_json() | {
         "iterations": result.frequency.iterations + result.poses.iterations,
         "samples": both["samples"] + result.poses.count,
         "wall_seconds": result.wall_seconds,
@@ -196,4 +198,4 @@ def run_kinds_calibration(
     write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
     agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
     texts = [pose_calibration_text(result.poses), frequency_calibration_text(result.frequency)]
-    return "\n\n".join([agree, *lacks[0], *texts]), checked
+    return "\n\n".join([f"{judgement.headline}\n{agree}", *lacks[0], *texts]), checked

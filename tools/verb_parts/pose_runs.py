@@ -86,10 +86,29 @@ def check_one_kind(
     twice = next(((path, kind) for kind, paths in still.items() for path in bags if path in paths), None)
     if twice is not None:
         raise RecordingError(f"{twice[0]} is given as motion and as {twice[1]}; leave it out once")
+    for option, paths in (("--poses", poses), ("--rests", rests or ()), ("--frequency", frequency or ())):
+        _given_once(option, paths)
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
         other = "--poses" if poses else "--frequency" if frequency else "--rests"
         raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
+
+
+def _given_once(option: str, paths: Sequence[Path]) -> None:
+    """Each recording counts once, whatever its copies are called."""
+    from jointscope.tools.bags.messages.open_bag import bag_sha256
+
+    seen: dict[str, Path] = {}
+    for path in paths:
+        if not path.exists():
+            continue  # who reads it says so
+        sha256 = bag_sha256(path)
+        if sha256 in seen:
+            raise RecordingError(
+                f"{option}: {path} is the same recording as {seen[sha256]}; give every recording once, or its samples "
+                "count twice"
+            )
+        seen[sha256] = path
 
 
 def run_pose_calibration(

@@ -168,6 +168,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--solver samples": args.solver == "samples",
         "--leave-out": bool(args.leave_out),
         "--scheduler": args.scheduler is not None,
+        "--workers": args.workers > 1,
     }
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
     if args.urdf is not None and not args.poses:

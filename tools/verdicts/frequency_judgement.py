@@ -10,10 +10,12 @@ import numpy as np
 from jointscope.graphs.frequency.agreement import Agreement
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.explained import Answered, PoseFit
+from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
 from jointscope.robots.geometry.error_parameters import STIFFNESS
 from jointscope.tools.presentation.frequency_sentences import identifiable_sentence, one_realisation, sticking
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
+from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 AS_NOISE = 3.0  # power of what is left over that of the noise: up to here friction adds little
 ANSWERS_BACK = (
@@ -29,6 +31,20 @@ def judge_frequency(result: FrequencyCalibration) -> Judgement:
     """Applies all checks."""
     checks = tuple(make(result) for make in (_settled, _answer, _noise, _heldout, _agree, _told, _friction))
     return Judgement.of(checks)
+
+
+def judge_kinds(result: KindsCalibration) -> Judgement:
+    """All checks of poses and of frequency responses in one estimate, and whether both tell the same values."""
+    name, found = "Kinds that tell the same values", result.agreement
+    if found.doubtful:
+        text = (
+            f"Poses and frequency responses contradict each other: {_said(found)}. Stiffness under weight is not that "
+            "of the vibration, or one kind is of another arm: calibrate each alone and compare the values."
+        )
+        agree = Check("bad", name, text)
+    else:
+        agree = Check("good", name, f"Poses and frequency responses agree: {_said(found)}.")
+    return Judgement.of((agree, *judge_poses(result.poses).checks, *judge_frequency(result.frequency).checks))
 
 
 def _settled(result: FrequencyCalibration) -> Check:

@@ -100,6 +100,13 @@ def test_what_a_result_does_not_say_is_not_evaluated(tmp_path, line):
     assert outcome(tmp_path, line, {"poses": {"p90_mm": 0.05}})[0] == OPEN
 
 
+def test_the_worst_session_of_a_calibration_from_poses_is_judged(tmp_path):
+    sessions = {"poses": [{"p90_mm": 0.05}, {"p90_mm": 0.3}]}
+    assert outcome(tmp_path, "poses: all, p90_mm: 0.31", sessions) == (PASS, "0.3 mm")
+    assert outcome(tmp_path, "poses: all, p90_mm: 0.2", sessions)[0] == FAIL
+    assert outcome(tmp_path, "poses: all, p90_mm: 1", {"poses": [{"p90_mm": 0.05}, {}]})[0] == OPEN
+
+
 def test_drift_is_against_the_values_of_an_earlier_robot(tmp_path):
     earlier = "parameter: joint1.stiffness, against: doggy"
     (limit,) = limits_of(tmp_path, f"{earlier}, drift_percent: 60, because: belt set in January")
