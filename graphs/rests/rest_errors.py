@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.robots.bodies.known_loads import known_loads
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.at_encoders import encoder_errors
 
 Array = NDArray[np.float64]
+FEWEST = 8  # rests beyond the values of a regression, from which it says something
 SURELY = 3.0  # [sigma] of the encoders' noise in a torque that is missing for sure
 
 
@@ -32,6 +35,9 @@ class RestErrors:
         half: half widths of the bands, shape (m, n) [N m].
         creeping: torques that are missing where motors creep with their whole friction, shape (m, n) [N m]; zero where
             they stand.
+        held: torques that friction holds, shape (m, n) [N m]; no numbers where a motor has not moved since the last
+            rest, or a spring stands between it and its link.
+        weights: torques of known loads and of gravity there, shape (m, n, 2) [N m].
     """
 
     position: Array
@@ -41,12 +47,34 @@ class RestErrors:
     certain: Array
     half: Array
     creeping: Array
+    held: Array
+    weights: Array
 
     @property
     def off_creeping(self) -> Array:
         """Root mean square of what is missing where each motor creeps, shape (n,) [N m]; zero where none does."""
         count = np.sum(self.creeping != 0.0, axis=0)
         return np.asarray(np.sqrt(np.sum(self.creeping**2, axis=0) / np.maximum(count, 1)))
+
+    def following(self, j: int) -> tuple[float, float]:
+        """Share of what friction of a rigid joint holds that goes with loads and gravity, and how likely by chance.
+
+        Friction holds whatever is asked within its band, either way: it knows nothing of what hangs there, unless the
+        loads, their directions or masses are not what the file says, or nobody moved the joint as weights changed.
+        """
+        known = np.isfinite(self.held[:, j])
+        y, columns = self.held[known, j], self.weights[known, j]
+        columns = columns[:, np.ptp(columns, axis=0) > 0.0] if len(columns) else columns
+        left, k = len(y) - 1 - columns.shape[1], columns.shape[1]
+        if left < FEWEST or k == 0:
+            return 0.0, 1.0
+        A = np.column_stack([np.ones(len(y)), columns / np.abs(columns).max(axis=0)])
+        rest = float(np.sum((y - A @ np.linalg.lstsq(A, y)[0]) ** 2))
+        whole = float(np.sum((y - y.mean()) ** 2))
+        if not whole > 0.0:
+            return 0.0, 1.0
+        F = (whole - rest) / k / max(rest / left, 1e-12 * whole)
+        return 1.0 - rest / whole, float(f.sf(F, k, left))
 
     @property
     def bands(self) -> Array:
@@ -101,7 +129,12 @@ def _of(problem: RestSet) -> tuple[Array, ...]:
     certain = np.maximum(friction - SURELY * _noise(problem, held.by_position, motor, link), 0.0)
     sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
     creeping = np.where(rests.creep != 0.0, torques.sliding.value, 0.0)
-    return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value, creeping
+    rigid = np.array([joint not in robot.layout.motors for joint in robot.joints])
+    q, tree = measured[:, robot.layout.q_link], robot.kinematic_tree
+    loads = known_loads(tree, rests.links, rests.forces, q).torque
+    weights = np.stack([loads[:, columns], tree.torque(q, 0.0 * q, 0.0 * q)[:, columns]], axis=2)
+    asked = np.where(rests.moved & rigid, held.value, np.nan)
+    return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value, creeping, asked, weights
 
 
 def _noise(problem: RestSet, slopes: Array, motor: Array, link: Array) -> Array:

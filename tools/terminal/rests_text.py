@@ -19,6 +19,7 @@ from jointscope.tools.terminal.text_table import text_table
 LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
 WIDENED, FAR = 1.5, 3.0  # times that sigmas of link encoders were widened: more than they may repeat, and no noise
+FOLLOWS, BY_CHANCE = 0.1, 1e-5  # share of what friction holds that weights explain, and how likely by chance
 BEYOND = 0.1  # of its band, that friction may have to hold beyond it
 
 
@@ -68,6 +69,8 @@ def verdict(result: RestCalibration) -> str:
         return "No, do not rely on this yet: links do not rest where the model says."
     if doubt := _misfit(result):
         return f"No, do not rely on this yet: {doubt}; something is missing: {_diagnosis(result)}"
+    if doubt := _following(result):
+        return f"No, do not rely on this yet: {doubt}."
     for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
@@ -112,6 +115,19 @@ def _misfit(result: RestCalibration) -> str:
             return (
                 f"friction of {joint} is {significant(1e3 * creeping, 2)} mN m (rms) off a band of "
                 f"{significant(1e3 * bands[j], 2)} mN m where it creeps, as if it depended on speed or place"
+            )
+    return ""
+
+
+def _following(result: RestCalibration) -> str:
+    """A rigid joint whose friction holds what loads and gravity say; empty where none does."""
+    for j, joint in enumerate(result.robot.joints):
+        share, chance = result.errors.following(j)
+        if share > FOLLOWS and chance < BY_CHANCE:
+            return (
+                f"{significant(100 * share, 2)} % of what friction of {joint} has to hold goes with loads and gravity, "
+                "of which friction knows nothing: /load has another sign, unit or frame, a mass is another, or the "
+                "joint was not moved as weights changed"
             )
     return ""
 
