@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kept_rows import keep, known_rows
-from tx90l_search import Case, code, kept
+from kept_rows import keep
+from tx90l_search import Case, kept, rows_in
 
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.robots.model.robot import Robot
@@ -40,9 +40,7 @@ def coverage_rows(robot: Robot, folder: Path, tell: Tell, measure: bool = True) 
         tell: takes each line.
         measure: whether arms that are missing are measured; else the table is of what is there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    results, now = folder / "coverage.jsonl", code("robots", "factors", "graphs", "tools/bags", "tools/simulator")
-    known = known_rows(results, now)
+    results, now, known = rows_in(folder, "coverage")
     for seed in SEEDS:
         if f"seed {seed}" not in known and measure:
             row = _row(robot, seed, folder)

@@ -132,9 +132,7 @@ def search_rows(robot: Robot, folder: Path, tell: Tell, measure: bool = True) ->
         tell: takes each line.
         measure: whether arms that are missing are measured; else the table is of what is there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    results, now = folder / "search.jsonl", code("robots", "factors", "graphs", "tools/bags", "tools/simulator")
-    known = known_rows(results, now)
+    results, now, known = rows_in(folder, "search")
     tell("| simulated, 40 poses and 2 shaken | added | size over the truth, in sigmas | s |\n| --- | --- | --- | --- |")
     rows = []
     for case in (*CLEAN, *FAULTS):
@@ -248,6 +246,13 @@ def _sizes_said(row: Mapping[str, Any]) -> str:
 def _read(bags: Any, robot: Robot) -> Iterator[Any]:
     for bag in bags:
         yield read_shaken(bag, robot)
+
+
+def rows_in(folder: Path, part: str) -> tuple[Path, str, dict[str, Any]]:
+    """The file with the rows of a part, the code that they are of, and those that are there, by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    results, now = folder / f"{part}.jsonl", code("robots", "factors", "graphs", "tools/bags", "tools/simulator")
+    return results, now, known_rows(results, now)
 
 
 def code(*parts: str) -> str:

@@ -57,7 +57,7 @@ from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
-from jointscope.robots.recordings.recording import TOLD_WITH_RESULTS, Notice, Recording
+from jointscope.robots.recordings.recording import TOLD_WITH_RESULTS, Notice, Recording, must_count_once
 from jointscope.robots.recordings.resting_joints import must_move
 
 Array = NDArray[np.float64]
@@ -220,15 +220,7 @@ def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint:
     """
     if not recordings:
         raise RecordingError("no recording given; pass at least one bag")
-    seen: dict[str, str] = {}
-    for recording in recordings:
-        before = seen.get(recording.sha256) if recording.sha256 else None
-        seen[recording.sha256] = recording.path
-        if before is not None:
-            raise RecordingError(
-                f"{recording.path} is the same recording as {before}; give every recording once, "
-                "or its samples count twice"
-            )
+    must_count_once((recording.path, recording.sha256) for recording in recordings)
     notices = [notice for recording in recordings for notice in recording.notices if notice.kind in TOLD_WITH_RESULTS]
     notices += [notice for recording in recordings for notice in screen_all(recording, robot)]
     if every_joint:

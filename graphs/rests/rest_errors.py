@@ -13,7 +13,6 @@ from scipy.stats import f
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.robots.bodies.known_loads import known_loads
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.at_encoders import encoder_errors
 
@@ -130,9 +129,7 @@ def _of(problem: RestSet) -> tuple[Array, ...]:
     sigma = np.hypot(link, motor) if rests.q_link is not None else np.ones_like(seen)
     creeping = np.where(rests.creep != 0.0, torques.sliding.value, 0.0)
     rigid = np.array([joint not in robot.layout.motors for joint in robot.joints])
-    q, tree = measured[:, robot.layout.q_link], robot.kinematic_tree
-    loads = known_loads(tree, rests.links, rests.forces, q).torque
-    weights = np.stack([loads[:, columns], tree.torque(q, 0.0 * q, 0.0 * q)[:, columns]], axis=2)
+    weights = np.stack(problem.weights(measured[:, robot.layout.q_link]), axis=2)[:, columns]
     asked = np.where(rests.moved & rigid, held.value, np.nan)
     return seen, seen / sigma, missing[:, columns], friction, certain, torques.half.value, creeping, asked, weights
 

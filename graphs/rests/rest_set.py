@@ -78,9 +78,8 @@ class RestSet:
         ones = np.ones(robot.n)
         plain = RestSet(robot, rests, ones, np.ones(robot.layout.n_link), ones)
         x, calibration = plain.start(Calibration.of(robot))
-        q, tree = x[:, robot.layout.q_link], robot.kinematic_tree
-        loads = known_loads(tree, rests.links, rests.forces, q)
-        carried = np.abs(loads.torque - tree.torque(q, 0.0 * q, 0.0 * q)).max(axis=0)
+        loads, gravity = plain.weights(x[:, robot.layout.q_link])
+        carried = np.abs(loads - gravity).max(axis=0)
         moved = np.where(rests.moved, np.abs(plain.torques(x, calibration).motors.value), np.nan)
         held = np.array([np.nanmedian(column) if np.any(np.isfinite(column)) else 1.0 for column in moved.T])
         largest = max(float(carried.max()), 1e-9)
@@ -134,6 +133,12 @@ class RestSet:
         x[:, layout.motor_q] = q_motor
         x[:, layout.joint_q] = q_link
         return x[:, layout.positions], common.only([DYNAMICS])
+
+    def weights(self, q: Array) -> tuple[Array, Array]:
+        """Torques of known loads, and those that hold the links against gravity, at links q, shapes (m, k) [N m]."""
+        tree = self.robot.kinematic_tree
+        loads = known_loads(tree, self.rests.links, self.rests.forces, q)
+        return loads.torque, tree.torque(q, 0.0 * q, 0.0 * q)
 
     def torques(self, x: Array, calibration: Calibration) -> AtRest:
         """What holds the robot at positions of shape (m, d)."""

@@ -9,7 +9,7 @@ regressed on, too, each by its columns at nothing of it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -199,15 +199,15 @@ def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | No
     return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
 
 
-def with_sigma(
-    robot: Robot, joint: int, rows: Array, blocks: NDArray[np.intp], fewest: int
-) -> tuple[Fit, float] | None:
-    """The regression and the sigma of its last column's factor, from blocks left out in turn; None with too few."""
+def sigma_of(
+    told: Callable[[Fit], float], robot: Robot, joint: int, rows: Array, blocks: NDArray[np.intp], fewest: int
+) -> float | None:
+    """The sigma of what a regression tells, from blocks left out in turn; None with too few."""
     names = np.unique(blocks)
     if len(names) < fewest:
         return None
-    others = np.array([fit(robot, joint, rows[blocks != name]).more[-1] for name in names])
-    return fit(robot, joint, rows), float(np.sqrt((len(names) - 1.0) * np.var(others)))
+    others = np.array([told(fit(robot, joint, rows[blocks != name])) for name in names])
+    return float(np.sqrt((len(names) - 1.0) * np.var(others)))
 
 
 def changes_between(robot: Robot, joint: str, plain: Fit, best: Fit) -> dict[str, float]:

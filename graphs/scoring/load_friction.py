@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit, of_drives
+from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit, of_drives, sigma_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
@@ -84,11 +84,9 @@ def _under(rows: JointRows, joint: int, width: float) -> LoadFriction | None:
         assert beside is not None
         here, blocks = beside
         found = fit(robot, joint, here)
-    names = np.unique(blocks)
-    if len(names) < FEWEST_BLOCKS or not found.gain > 0.0:
+    sigma = sigma_of(_share, robot, joint, here, blocks, FEWEST_BLOCKS) if found.gain > 0.0 else None
+    if sigma is None:
         return None
-    others = np.array([_share(fit(robot, joint, here[blocks != name])) for name in names])
-    sigma = float(np.sqrt((len(names) - 1.0) * np.var(others)))
     name = robot.joints[joint]
     return LoadFriction(name, _share(found), sigma, changes_between(robot, name, plain, found))
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit, with_sigma
+from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit, sigma_of
 from jointscope.graphs.scoring.regressed_causes import RegressedCause
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
@@ -121,5 +121,7 @@ def _under(rows: JointRows, joint: int, width: float, columns: list[list[Array]]
     without, beside = rows.beside(joint, width, [[] for _ in columns]), rows.beside(joint, width, columns)
     if without is None or beside is None:
         return None
-    told = with_sigma(rows.robot, joint, *beside, fewest=FEWEST_BLOCKS)
-    return None if told is None else (fit(rows.robot, joint, without[0]), *told)
+    sigma = sigma_of(lambda found: float(found.more[-1]), rows.robot, joint, *beside, FEWEST_BLOCKS)
+    if sigma is None:
+        return None
+    return fit(rows.robot, joint, without[0]), fit(rows.robot, joint, beside[0]), sigma

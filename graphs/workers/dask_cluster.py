@@ -12,6 +12,7 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +33,7 @@ SAME = (
     "pin",
 )  # packages of which workers need our version
 ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx|ucxx)://[^/\s]+:\d+")  # protocols of Dask, and where it listens
+EXPECTED = "expected an address like tcp://host:8786, as `dask scheduler` prints it when it starts"
 CONNECT = 5.0  # [s] to answer
 LOOK = 1.0  # [s] after which a worker that has not answered is looked for
 RETURN = 60.0  # [s] for a worker to come back where none is left
@@ -53,20 +55,14 @@ class DaskCluster:
             from distributed import Client
         except ImportError as err:
             raise ClusterError('--scheduler needs Dask: pip install "jointscope[cluster]"') from err
-        self._address = address
+        self._address, self._open = address, ExitStack()
         if not ADDRESS.fullmatch(address):
-            raise ClusterError(
-                f"--scheduler: got {address!r}; expected an address like tcp://host:8786, as `dask scheduler` prints "
-                "it when it starts"
-            )
+            raise ClusterError(f"--scheduler: got {address!r}; {EXPECTED}")
         try:
             with _quiet():
                 self._client = Client(address, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, ImportError) as err:
-            raise ClusterError(
-                f"no Dask scheduler answers at {address} ({err}); expected an address like tcp://host:8786, as "
-                "`dask scheduler` prints it when it starts"
-            ) from err
+            raise ClusterError(f"no Dask scheduler answers at {address} ({err}); {EXPECTED}") from err
         try:
             self._workers = self._alive()
             if not self._workers:
@@ -79,15 +75,14 @@ class DaskCluster:
         self.of_slot = [worker for worker, about in self._workers.items() for _ in range(about["nthreads"])]
 
     def __enter__(self) -> DaskCluster:
-        self._silence = _quiet()
-        self._silence.__enter__()
+        self._open.enter_context(_quiet())
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, err: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._client.close()
-        self._silence.__exit__(kind, err, trace)
+        self._open.close()
 
     @property
     def name(self) -> str:

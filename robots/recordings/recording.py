@@ -7,7 +7,7 @@ absolute start in nanoseconds is kept so that a sample can be found again in its
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -264,3 +264,23 @@ def _touched(stretches: Sequence[tuple[float, float]], times: Array, horizon: Ar
     for t0, t1 in stretches:
         touched |= (times >= t0) & (times - horizon <= t1)
     return touched
+
+
+def must_count_once(recordings: Iterable[tuple[str, str]], option: str = "") -> None:
+    """Refuses a recording that is given twice.
+
+    Args:
+        recordings: path and hash of the content of each; nobody compares one without a hash.
+        option: with which they are given; none of recordings of motion.
+
+    Raises:
+        RecordingError: a path and its twin.
+    """
+    seen: dict[str, str] = {}
+    for path, sha256 in recordings:
+        if sha256 and sha256 in seen:
+            raise RecordingError(
+                f"{option and f'{option}: '}{path} is the same recording as {seen[sha256]}; give every recording once, "
+                "or its samples count twice"
+            )
+        seen[sha256] = path

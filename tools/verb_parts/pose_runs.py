@@ -12,6 +12,7 @@ from typing import Any
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.recordings.recording import must_count_once
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
@@ -95,20 +96,11 @@ def check_one_kind(
 
 
 def _given_once(option: str, paths: Sequence[Path]) -> None:
-    """Each recording counts once, whatever its copies are called."""
+    """As `must_count_once`, for recordings that are not read yet; what is not there, its reader says."""
     from jointscope.tools.bags.messages.open_bag import bag_sha256
 
-    seen: dict[str, Path] = {}
-    for path in paths:
-        if not path.exists():
-            continue  # who reads it says so
-        sha256 = bag_sha256(path)
-        if sha256 in seen:
-            raise RecordingError(
-                f"{option}: {path} is the same recording as {seen[sha256]}; give every recording once, or its samples "
-                "count twice"
-            )
-        seen[sha256] = path
+    if len(paths) > 1:
+        must_count_once(((str(path), bag_sha256(path)) for path in paths if path.exists()), option)
 
 
 def run_pose_calibration(

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointscope.graphs.frequency.agreement import Agreement
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.explained import Answered, PoseFit
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
@@ -16,6 +15,7 @@ from jointscope.tools.presentation.frequency_sentences import identifiable_sente
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.same_values import NAME, test_said
 
 AS_NOISE = 3.0  # power of what is left over that of the noise: up to here friction adds little
 ANSWERS_BACK = (
@@ -35,15 +35,15 @@ def judge_frequency(result: FrequencyCalibration) -> Judgement:
 
 def judge_kinds(result: KindsCalibration) -> Judgement:
     """All checks of poses and of frequency responses in one estimate, and whether both tell the same values."""
-    name, found = "Kinds that tell the same values", result.agreement
+    found = result.agreement
     if found.doubtful:
         text = (
-            f"Poses and frequency responses contradict each other: {_said(found)}. Stiffness under weight is not that "
-            "of the vibration, or one kind is of another arm: calibrate each alone and compare the values."
+            f"Poses and frequency responses contradict each other: {test_said(found)}. Stiffness under weight is not "
+            "that of the vibration, or one kind is of another arm: calibrate each alone and compare the values."
         )
-        agree = Check("bad", name, text)
+        agree = Check("bad", NAME, text)
     else:
-        agree = Check("good", name, f"Poses and frequency responses agree: {_said(found)}.")
+        agree = Check("good", NAME, f"Poses and frequency responses agree: {test_said(found)}.")
     return Judgement.of((agree, *judge_poses(result.poses).checks, *judge_frequency(result.frequency).checks))
 
 
@@ -137,17 +137,13 @@ def _agree(result: FrequencyCalibration) -> Check:
     doubtful = {key: test for key, test in tests.items() if test.doubtful}
     if not doubtful:
         least = min(tests, key=lambda key: tests[key].p_value)
-        return Check("good", name, f"All agree; furthest off is {least}, {_said(tests[least])}.")
-    said = "; ".join(f"{key}, {_said(test)}" for key, test in list(doubtful.items())[:SHOWN])
+        return Check("good", name, f"All agree; furthest off is {least}, {test_said(tests[least])}.")
+    said = "; ".join(f"{key}, {test_said(test)}" for key, test in list(doubtful.items())[:SHOWN])
     return Check(
         "bad",
         name,
         f"In disagreement with the others: {said}. An effect is missing, the load was another, or the arm changed.",
     )
-
-
-def _said(test: Agreement) -> str:
-    return f"chi-square {significant(test.chi2, 3)} for {test.dof} directions, p = {significant(test.p_value, 2)}"
 
 
 def _told(result: FrequencyCalibration) -> Check:

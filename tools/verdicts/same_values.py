@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.frequency.agreement import Agreement
 from jointscope.graphs.joint_kinds.beside_motion import responses_agree
 from jointscope.tools.presentation.numbers import significant
 
@@ -19,7 +20,7 @@ def same_values(result: CalibrationResult) -> list[tuple[str, str, str]]:
     found = responses_agree(result)
     if found is None:
         return []
-    said = f"chi-square {significant(found.chi2, 3)} for {found.dof} directions, p = {significant(found.p_value, 2)}"
+    said = test_said(found)
     if not found.doubtful:
         return [("good", NAME, f"Motion and frequency responses agree: {said}.")]
     text = (
@@ -27,6 +28,11 @@ def same_values(result: CalibrationResult) -> list[tuple[str, str, str]]:
         "shows, the load was another, or the robot changed. `jointscope diagnose` with each alone says what it may be."
     )
     return [("bad", NAME, text)]
+
+
+def test_said(test: Agreement) -> str:
+    """How far apart two kinds of recordings are."""
+    return f"chi-square {significant(test.chi2, 3)} for {test.dof} directions, p = {significant(test.p_value, 2)}"
 
 
 def same_by_regression(result: CalibrationResult) -> tuple[str, str, str]:
