@@ -2,6 +2,7 @@
 """Robots as MuJoCo models against the equations that they were calibrated with."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 from tilted_arm import arm_with
@@ -74,6 +75,19 @@ def test_accelerations_are_those_of_the_calibrated_model(name, seed, tmp_path):
     mujoco.mj_forward(model, data)
     expected = equations_of(robot)(x, u)
     np.testing.assert_allclose(data.qacc[place], expected, rtol=0, atol=SIX_DIGITS * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["arm", "arm in A"])
+def test_pinocchio_reads_masses_damping_and_armatures_of_rigid_joints(name, tmp_path):
+    text = mujoco_model(robot_named(name, tmp_path)).text
+    path = tmp_path / "exported.xml"  # rotors of elastic joints stand beside the arm, where pinocchio 4.1.0 does not look
+    path.write_text(text, encoding="utf-8")
+    engine, read = mujoco.MjModel.from_xml_string(text), pin.buildModelFromMJCF(str(path))
+    place = [read.idx_vs[read.getJointId(engine.joint(k).name)] for k in range(engine.njnt)]
+    assert pin.computeTotalMass(read) == pytest.approx(engine.body_mass.sum(), rel=SIX_DIGITS)
+    np.testing.assert_allclose(np.array(read.damping)[place], engine.dof_damping, rtol=SIX_DIGITS)
+    np.testing.assert_allclose(np.array(read.armature)[place], engine.dof_armature, rtol=SIX_DIGITS)
+    assert not engine.actuator_armature.any()
 
 
 def test_a_motion_with_dry_friction_is_that_of_the_calibrated_model(tmp_path):
