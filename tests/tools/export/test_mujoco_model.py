@@ -77,10 +77,9 @@ def test_accelerations_are_those_of_the_calibrated_model(name, seed, tmp_path):
     np.testing.assert_allclose(data.qacc[place], expected, rtol=0, atol=SIX_DIGITS * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", ["arm", "arm in A"])
-def test_pinocchio_reads_masses_damping_and_armatures_of_rigid_joints(name, tmp_path):
-    text = mujoco_model(robot_named(name, tmp_path)).text
-    path = tmp_path / "exported.xml"  # rotors of elastic joints stand beside the arm, where pinocchio 4.1.0 does not look
+def test_pinocchio_reads_masses_damping_and_armatures_of_rigid_joints(tmp_path):
+    text = mujoco_model(arm_with(tmp_path)).text
+    path = tmp_path / "exported.xml"
     path.write_text(text, encoding="utf-8")
     engine, read = mujoco.MjModel.from_xml_string(text), pin.buildModelFromMJCF(str(path))
     place = [read.idx_vs[read.getJointId(engine.joint(k).name)] for k in range(engine.njnt)]
