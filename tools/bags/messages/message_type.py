@@ -85,6 +85,15 @@ class MessageType:
         return bytes(self.typestore.serialize_ros1(message, self.name))
 
 
+def full_type_name(name: str, ros2: bool) -> str:
+    """The name of a type in three parts: writers of MCAP files other than rosbag2 leave out the one in the middle.
+
+    >>> full_type_name("sensor_msgs/JointState", True)
+    'sensor_msgs/msg/JointState'
+    """
+    return name.replace("/", "/msg/") if ros2 and name.count("/") == 1 else name
+
+
 def inner_type(kind: Any) -> str | None:
     """The message type inside a field or its elements; None for primitives."""
     from rosbags.interfaces import Nodetype

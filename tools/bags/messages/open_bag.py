@@ -21,7 +21,8 @@ from jointscope.tools.bags.messages.joined_topics import (
     joined_message_type,
     parts_of,
 )
-from jointscope.tools.bags.messages.message_type import MessageType, defined_message_type, inner_type
+from jointscope.tools.bags.messages.mcap_profile import other_profile
+from jointscope.tools.bags.messages.message_type import MessageType, defined_message_type, full_type_name, inner_type
 
 Progress = Callable[[int, int], None]
 
@@ -90,7 +91,7 @@ class Bag:
         if len(parts) > 1:
             kinds = {kind for part in parts for kind in self.type_names(part)}
             return (JOINED_TYPE,) if kinds <= set(SINGLE_TYPES) else tuple(sorted(kinds))
-        return tuple(sorted({connection.msgtype for connection in self._infos[topic].connections}))
+        return tuple(sorted({full_type_name(link.msgtype, self.ros2) for link in self._infos[topic].connections}))
 
     def message_type(self, topic: str) -> MessageType:
         """The type of a topic's messages.
@@ -102,7 +103,8 @@ class Bag:
             return joined_message_type()
         connection = self._infos[parts_of(topic)[0]].connections[0]
         try:
-            found = defined_message_type(connection.msgtype, connection.msgdef, self.ros2)
+            name = full_type_name(connection.msgtype, self.ros2)
+            found = defined_message_type(name, connection.msgdef, self.ros2)
             _look_up(found, found.name, set())
             return found
         except RecordingError as err:
@@ -194,7 +196,8 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
             reader.open()
             bag = Bag(path, reader, ros2)
         except Exception as err:  # damaged bags raise errors of every kind
-            raise RecordingError(f"cannot read the bag {path}: {one_line(err)}; {repair(path)}") from err
+            why = other_profile(_storage(path)) or f"{one_line(err)}; {repair(path)}"
+            raise RecordingError(f"cannot read the bag {path}: {why}") from err
         yield bag
     finally:
         with suppress(Exception):
