@@ -12,9 +12,10 @@ from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 
-SUSPICIOUS = ("gap", "unit", "axes", SATURATION)  # kinds of notices that may explain a failure
+SUSPICIOUS = ("gap", "unit", "axes", MIRRORED, SATURATION)  # kinds of notices that may explain a failure
 MOST = 3
 
 P = ParamSpec("P")

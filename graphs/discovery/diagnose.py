@@ -40,6 +40,7 @@ from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -199,7 +200,7 @@ def _to_look_at_first(base: BaseModel) -> list[str]:
     The robot as it was before its calibration is screened: a mounting that was calibrated hides axes that are swapped.
     """
     notices = [notice for recording in base.recordings for notice in screen_all(recording, base.result.start)]
-    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes", SATURATION))
+    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes", MIRRORED, SATURATION))
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{LOOK_FIRST}: {text}." for text in texts]
 

@@ -30,10 +30,12 @@ from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowes
 from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Solver, solve
-from jointscope.robots.errors import EffectError, JointscopeError
+from jointscope.graphs.starts.saturated_drives import screen_all
+from jointscope.robots.errors import EffectError, JointscopeError, RecordingError
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Recording
 
 BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
@@ -49,8 +51,23 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
         robot: the model with start values.
         recordings: training recordings.
         solver: minimises the cost of all samples.
+
+    Raises:
+        RecordingError: a gyroscope is of the other hand: nothing fits it, and every effect would be judged by how
+            it bends.
     """
+    for recording in recordings:
+        _refuse_mirrored(robot, recording)
     return _as_sharp_as_told(_by_its_measure(robot, recordings, solver), solver)
+
+
+def _refuse_mirrored(robot: Robot, recording: Recording) -> None:
+    for notice in screen_all(recording, robot):
+        if notice.kind == MIRRORED:
+            raise RecordingError(
+                f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file, or leave "
+                f"{notice.stream} out of it, then search again"
+            )
 
 
 def _by_its_measure(robot: Robot, recordings: Sequence[Recording], solver: Solver) -> BaseModel:

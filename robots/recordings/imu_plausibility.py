@@ -29,6 +29,7 @@ SAME_RATE = 5.0  # ratios up to this are flexibility, not units
 UNIT_TOLERANCE = 2.4  # a unit explains a ratio that it meets within this factor
 CLEARLY_WORSE = float(np.log(1.3))  # by which another unit explains a ratio worse, to be left unsaid
 SAME_MOTION = 0.5  # correlation of the two rates' norms
+MIRRORED = "mirrored"  # kind of the notice of axes of the other hand, which no mounting can turn right
 BAD_FIT, BETTER = 0.6, 0.35  # the expected axes leave more than that share of the gyro's power, others that much less
 ODD_FIT, MUCH_BETTER = 0.2, 0.1  # where they leave less, others must be clearly better
 ENOUGH_INSTANTS = 10
@@ -192,9 +193,10 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         f"{gyro.name}: the axes seem swapped or flipped against R_imu_body: {wrong}; as it stands "
         f"{100 * expected:.0f} % of the signal do not fit, with those axes {100 * best:.0f} %"
     )
-    if np.linalg.det(_axes_matrix(axes)) < 0:
+    mirrored = np.linalg.det(_axes_matrix(axes)) < 0
+    if mirrored:
         text += f"; no rotation does that: {_mirrored(gyro, _axes_matrix(axes))}, or a joint counts backwards"
-    return [Notice(gyro.name, "axes", 0, text)]
+    return [Notice(gyro.name, MIRRORED if mirrored else "axes", 0, text)]
 
 
 def _mirrored(gyro: Gyro, axes: Array) -> str:

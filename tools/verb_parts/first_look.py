@@ -10,11 +10,12 @@ from typing import TextIO
 from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.tools.terminal.progress import ERASE_LINE
 
 LIMIT = "limit"
-PLAIN_MISTAKES = ("unit", "axes", LIMIT, SATURATION)  # kinds of notices
+PLAIN_MISTAKES = ("unit", "axes", MIRRORED, LIMIT, SATURATION)  # kinds of notices
 CONTRADICTED = (
     "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording takes "
     "long to calibrate (Ctrl-C ends it).\n"

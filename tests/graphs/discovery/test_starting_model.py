@@ -9,6 +9,8 @@ import pytest
 from jointscope.graphs.discovery import starting_model as module
 from jointscope.graphs.discovery.discovery_result import DiscoveryStep, with_lasting_floors
 from jointscope.graphs.discovery.starting_model import is_quiet, starting_model
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.recordings.recording import Notice
 
 
 @pytest.fixture
@@ -27,6 +29,7 @@ def asked(monkeypatch):
         monkeypatch.setattr(module, "judged_by_loop", lambda robot, recordings: loop)
         monkeypatch.setattr(module, "torque_judge", lambda base: None if quiet is None else "judge")
         monkeypatch.setattr(module, "is_quiet", lambda judge: quiet)
+        monkeypatch.setattr(module, "screen_all", lambda recording, robot: [])
         monkeypatch.setattr(module, "_as_sharp_as_told", lambda base, solver: base)
         return starting_model("robot", ["recording"]).by_torques, calibrated
 
@@ -35,6 +38,14 @@ def asked(monkeypatch):
 
 def test_quiet_encoders_are_asked_of_torques(asked):
     assert asked(True) == (True, [True])
+
+
+def test_a_gyro_of_the_other_hand_ends_the_search_before_it_begins(asked, monkeypatch):
+    assert asked(True)[0]
+    notices = [Notice("imu2", "axes", 0, "turned"), Notice("imu2", "mirrored", 0, "imu2: no rotation does that")]
+    monkeypatch.setattr(module, "screen_all", lambda recording, robot: notices)
+    with pytest.raises(RecordingError, match=r"a.mcap: imu2: no rotation does that; no effect .* leave imu2 out of it"):
+        starting_model("robot", [SimpleNamespace(path="a.mcap")])
 
 
 @pytest.mark.parametrize("quiet", (False, None))

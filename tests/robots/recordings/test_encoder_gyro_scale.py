@@ -90,7 +90,7 @@ def test_a_gyro_whose_axes_are_swapped_is_not_asked_about_scales(doggy, good):
     stream = good.streams["imu2"]
     swapped = replace(stream, values=stream.values[:, [2, 1, 0]])
     notices = screen(replace(good, streams={**good.streams, "imu2": swapped}), doggy)
-    assert [n.kind for n in notices] == ["axes"]
+    assert [n.kind for n in notices] == ["mirrored"]
     assert notices[0].text.startswith(
         "imu2: the axes seem swapped or flipped against R_imu_body: its x looks like +z; its z looks like +x; "
     )
