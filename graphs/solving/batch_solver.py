@@ -32,7 +32,7 @@ from jointscope.graphs.solving.convergence import (
 from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, owners, priors_of
+from jointscope.graphs.solving.set_problem import Problem, cost_of, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
 from jointscope.graphs.solving.stretch import Elsewhere
@@ -241,11 +241,9 @@ def newton_step(
 
 def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate | None:
     """Where one hardly damped step leads; None where the cost does not fall."""
-    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    systems = [linearized(problem, x, calibration) for problem, x, calibration in bags]
-    here = Solution(estimate, float("nan"), SharedLayout.of(estimate.calibrations, owners(problems)), systems)
-    there = newton_step(problems, here, hold, LAMBDA_START).estimate
-    return there if total_cost(problems, there) < cost_at(problems, here) else None
+    graph, values = CondensedGraph.of(problems, estimate, hold)
+    begin, step = graph.cost(values), damped_step(graph, values, LAMBDA_START)
+    return graph.estimate(step.values) if graph.cost(step.values) < begin else None
 
 
 def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:

@@ -32,6 +32,7 @@ from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
 from jointscope.graphs.solving.set_problem import Problem, motions, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.graphs.solving.stretch import Elsewhere, GraphStretch, Place, cut
 from jointscope.graphs.solving.whole_set import WholeSet
 
@@ -116,6 +117,8 @@ class CondensedGraph:
         """Half the sum of squared whitened residuals, priors of held blocks included."""
         if self.elsewhere:
             self.elsewhere.visit(self._places(values))
+        else:
+            self._visit_side_by_side(values)
         return float(self.graph.error(values)) + self.held_cost
 
     @property
@@ -138,7 +141,24 @@ class CondensedGraph:
                 stretch.damp(damping, bends[piece] if len(bends) else None)
         if self.elsewhere:
             self.elsewhere.linearise(self._places(values), damping, bends)
+        else:
+            self._visit_side_by_side(values, settle=True)
         return self.graph.linearize(values)
+
+    def _visit_side_by_side(self, values: gtsam.Values, settle: bool = False) -> None:
+        """Brings all stretches where GTSAM will ask for them, one after the other; they remember what they found."""
+
+        def visit(task: tuple[GraphStretch, tuple[Array, ...], Calibration]) -> None:
+            stretch, ends, calibration = task
+            stretch.visit(ends, calibration)
+            if settle:
+                stretch.settle()
+
+        motions = [cuts for cuts, p in zip(self.stretches, self.problems, strict=True) if isinstance(p, BagProblem)]
+        places = zip(motions, self._places(values), strict=True)
+        tasks = [(s, ends, at.calibration) for cuts, at in places for s, ends in zip(cuts, at.ends, strict=True)]
+        for _ in side_by_side(visit, tasks):
+            pass
 
     def _places(self, values: gtsam.Values) -> list[Place]:
         """Where each recording of motion is, at some values."""

@@ -16,6 +16,7 @@ from jointscope.graphs.solving.set_problem import Problem, motions
 
 SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
 SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
+SURE = 0.1  # [step tolerance] a step that has arrived where the next fall will be as small
 COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 CONTRADICTS = 2.0  # [sigma] root mean square residual from which a model contradicts its recording
 FLAT, FLAT_STEPS = 1e-5, 3  # relative fall of such a model's cost, so many times in a row, that ends the search
@@ -67,7 +68,10 @@ def has_converged(iterations: Sequence[Iteration], tolerance: float, measured: i
     last = iterations[-1]
     enough = short_step(last.cost_after, tolerance, measured)
     arrived = last.step_in_sigmas < enough and _remaining(iterations) < SLOW * enough
-    return (arrived and last.fall < SMALL_FALL) or (last.fall < COST_TOLERANCE and undamped)
+    done = last.fall < SMALL_FALL
+    if undamped and last.step_in_sigmas < SURE * enough:  # only states moved, and they converge quadratically, too
+        done = done or _next_fall(iterations) < SMALL_FALL
+    return (arrived and done) or (last.fall < COST_TOLERANCE and undamped)
 
 
 def is_flat(iterations: Sequence[Iteration], measured: int) -> bool:
@@ -100,3 +104,11 @@ def _remaining(iterations: Sequence[Iteration]) -> float:
         return last
     ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.97)
     return last * ratio / (1.0 - ratio)
+
+
+def _next_fall(iterations: Sequence[Iteration]) -> float:
+    """Relative fall of the next step, if falls go on shrinking as the last one did."""
+    last = iterations[-1].fall
+    if len(iterations) < 2:
+        return last
+    return last * min(last / max(iterations[-2].fall, 1e-300), 1.0)

@@ -19,6 +19,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor, Linearization
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import Placed
+from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -109,13 +110,20 @@ def linearize_all(
 ) -> Iterator[Linearized]:
     """All factors chunk by chunk: factor, first tick of each sample, linearization."""
     m = len(problem.dynamics)
-    for start in range(0, m, CHUNK):
+
+    def steps(start: int) -> Linearized:
         stop = min(start + CHUNK, m)
         part = problem.dynamics.select(slice(start, stop))
-        yield part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
-    for placed in () if dynamics_only else problem.placed:
-        for factor, ticks in chunks(placed):
-            yield factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
+        return part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
+
+    def samples(piece: tuple[Factor, NDArray[np.intp]]) -> Linearized:
+        factor, ticks = piece
+        return factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
+
+    threads = 0 if m > CHUNK else 1  # handing over takes longer than what is short
+    yield from side_by_side(steps, range(0, m, CHUNK), threads)
+    if not dynamics_only:
+        yield from side_by_side(samples, (piece for placed in problem.placed for piece in chunks(placed)), threads)
 
 
 def cost(problem: BagProblem, x: Array, calibration: Calibration) -> float:

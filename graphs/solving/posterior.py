@@ -23,8 +23,9 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
 from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
-from jointscope.graphs.solving.normal_equations import Linearized, whitened
+from jointscope.graphs.solving.normal_equations import CHUNK, Linearized, whitened
 from jointscope.graphs.solving.set_problem import Problem
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.graphs.solving.unobservable import unobservable
 
 Array = NDArray[np.float64]
@@ -136,7 +137,9 @@ def residual_parts(
 
     columns = calibration.columns
     p = posterior.shared.shape[0]
-    for factor, ticks, linear in linearized:
+
+    def part(piece: Linearized) -> ResidualPart:
+        factor, ticks, linear = piece
         r, J, by_block = whitened(factor, linear)
         by_shared, leverage = np.zeros((*r.shape, p)), np.zeros(r.shape)
         for block, J_block in by_block.items():
@@ -145,4 +148,7 @@ def residual_parts(
         sides = (np.ascontiguousarray(J_i) for J_i in (*J, none, none)[:2])
         known = (posterior.given_shared, posterior.neighbours, posterior.response, posterior.shared)
         absorb(*sides, np.asarray(ticks, dtype=np.intp), *map(np.ascontiguousarray, known), by_shared, leverage)
-        yield ResidualPart(factor, ticks, r, leverage, by_shared)
+        return ResidualPart(factor, ticks, r, leverage, by_shared)
+
+    threads = 0 if len(posterior.given_shared) > CHUNK else 1  # handing over takes longer than what is short
+    yield from side_by_side(part, linearized, threads)

@@ -15,6 +15,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.inner_states import InnerStates
 from jointscope.graphs.solving.normal_equations import NormalEquations, build
+from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -223,8 +224,12 @@ def cut(
         length: steps in one stretch.
         blocks: names of the blocks that may change.
     """
-    for a, b, part in parts_of(problem, length):
-        yield RecordingStretch(part, x[a : b + 1], calibration, a, blocks)
+
+    def stretch(part: tuple[int, int, BagProblem]) -> RecordingStretch:
+        a, b, samples = part
+        return RecordingStretch(samples, x[a : b + 1], calibration, a, blocks)
+
+    return side_by_side(stretch, parts_of(problem, length))
 
 
 def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
