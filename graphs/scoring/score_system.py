@@ -46,15 +46,15 @@ class Segment:
     elimination: Elimination
 
     @staticmethod
-    def of(problem: BagProblem, x: Array, calibration: Calibration) -> Segment:
-        """Linearises a solved recording."""
+    def of(problem: BagProblem, x: Array, calibration: Calibration, elimination: Elimination | None = None) -> Segment:
+        """Linearises a solved recording; its states may have been eliminated already."""
         linearized = list(linearize_all(problem, x, calibration))
-        placed = iter(np.concatenate([np.zeros(0), *(p.times for p in problem.placed)]))
-        stamps = []
+        times, placed, stamps = np.concatenate([np.zeros(0), *(p.times for p in problem.placed)]), 0, []
         for factor, _, _ in linearized:
             count = 0 if isinstance(factor, DynamicsFactor) else len(factor)
-            stamps.append(np.array([next(placed) for _ in range(count)]))
-        elimination = eliminate(accumulate(linearized, x, calibration))
+            stamps.append(times[placed : placed + count])
+            placed += count
+        elimination = elimination or eliminate(accumulate(linearized, x, calibration))
         return Segment(problem, calibration, ScoreSignals.of(problem, x, calibration), linearized, stamps, elimination)
 
     @cached_property

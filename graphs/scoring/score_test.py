@@ -26,6 +26,7 @@ from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, Hypothes
 from jointscope.graphs.scoring.hypothesis_system import hypothesis_system
 from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import Segment, rows_in_time
+from jointscope.graphs.solving.banded_solver import Elimination
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.solver_context import side_by_side
@@ -49,15 +50,22 @@ class ScoreTest:
         self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
 
     @staticmethod
-    def of(problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]) -> ScoreTest:
+    def of(
+        problems: Sequence[BagProblem],
+        states: Sequence[Array],
+        calibrations: Sequence[Calibration],
+        eliminations: Sequence[Elimination] | None = None,
+    ) -> ScoreTest:
         """The test on whole recordings.
 
         Args:
             problems: their factors.
             states: their solution.
             calibrations: the values found, with the biases of each recording.
+            eliminations: of the states at that solution, where they are at hand.
         """
-        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
+        known = eliminations or [None] * len(problems)
+        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, known, strict=True)])
 
     @property
     def seconds(self) -> float:

@@ -7,7 +7,7 @@ that both end in the same point.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -32,7 +32,7 @@ from jointscope.graphs.solving.convergence import (
 from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.graphs.solving.set_problem import Problem, cost_of, priors_of
+from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
 from jointscope.graphs.solving.stretch import Elsewhere
@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
+SMALLEST = 1e-12  # damping that is as good as none
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
 
@@ -53,7 +54,7 @@ class Solution:
         estimate: the minimum.
         cost: half the sum of squared whitened residuals.
         shared: layout of the shared values.
-        systems: normal equations of each recording at the estimate.
+        systems: normal equations of each recording at the estimate, where they are at hand; see `systems_of`.
         iterations: history.
         converged: False if the iterations ended before the step became small.
         flat: the iterations ended because a model that contradicts its recording gained nothing any more.
@@ -62,7 +63,7 @@ class Solution:
     estimate: Estimate
     cost: float
     shared: SharedLayout
-    systems: list[NormalEquations]
+    systems: list[NormalEquations] | None = None
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
@@ -132,7 +133,7 @@ def solve(
     graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
     estimate = graph.estimate(descent.values)
     end = (descent.iterations, descent.converged, descent.flat)
-    return Solution(estimate, descent.cost, graph.shared, graph.systems(estimate), *end)
+    return Solution(estimate, descent.cost, graph.shared, None, *end)
 
 
 @dataclass
@@ -160,7 +161,7 @@ class _Descent:
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
-            damping = max(accepted / LAMBDA_FACTOR, 1e-12)
+            damping = _next(accepted)
             self.bends.relaxed()
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
 
@@ -168,6 +169,7 @@ class _Descent:
         """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
         while True:
             step = damped_step(self.graph, self.values, damping, self.bends.values)
+            self.graph.expect(damping_of_states(_next(damping)), self.bends.later)
             cost, costs = self.graph.cost(step.values), self.graph.costs
             if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
                 self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
@@ -194,6 +196,20 @@ class _Descent:
                 f"{in_sigmas:.2g} sigma; the model contradicts the recording or a start value is far off"
             )
         self.converged = True
+
+
+def _next(damping: float) -> float:
+    """Damping after a step that was accepted."""
+    return max(damping / LAMBDA_FACTOR, SMALLEST)
+
+
+def systems_of(problems: Sequence[Problem], solution: Solution) -> Iterator[NormalEquations]:
+    """Normal equations of each recording at a solution; they are large, so each is built when it is asked for."""
+    if solution.systems is not None:
+        yield from solution.systems
+        return
+    for bag in zip(problems, solution.estimate.states, solution.estimate.calibrations, strict=True):
+        yield linearized(*bag)
 
 
 @dataclass(frozen=True)
@@ -232,7 +248,7 @@ def newton_step(
     shared = solution.shared
     free = free_indices(shared, hold)
     if eliminations is None:
-        eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
+        eliminations = [eliminate(system, damping_of_states(damping)) for system in systems_of(problems, solution)]
     H, g = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
@@ -254,7 +270,9 @@ def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:
 
 def cost_at(problems: Sequence[Problem], solution: Solution) -> float:
     """As `total_cost`, where the solution's systems know what the recordings cost."""
-    return sum(system.cost for system in solution.systems) + _prior_cost(problems, solution.estimate.calibrations)
+    return sum(system.cost for system in systems_of(problems, solution)) + _prior_cost(
+        problems, solution.estimate.calibrations
+    )
 
 
 def _prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:

@@ -74,7 +74,13 @@ class NormalEquations:
         )
 
 
-def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool = False) -> NormalEquations:
+def build(
+    problem: BagProblem,
+    x: Array,
+    calibration: Calibration,
+    split: bool = False,
+    into: NormalEquations | None = None,
+) -> NormalEquations:
     """Linearises all factors of a recording.
 
     Args:
@@ -82,8 +88,9 @@ def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool =
         x: states, shape (m, 4n).
         calibration: shared values, with the biases of this recording.
         split: keep apart what reaches on to the next state, as a filter needs it.
+        into: an empty system that takes them, if there is memory already.
     """
-    return accumulate(linearize_all(problem, x, calibration), x, calibration, split)
+    return accumulate(linearize_all(problem, x, calibration), x, calibration, split, into=into)
 
 
 def accumulate(
@@ -92,6 +99,7 @@ def accumulate(
     calibration: Calibration,
     split: bool = False,
     with_shared: bool = True,
+    into: NormalEquations | None = None,
 ) -> NormalEquations:
     """Sums linearised factors; arguments as in `build`.
 
@@ -99,7 +107,7 @@ def accumulate(
     """
     columns = calibration.columns
     p = calibration.size if with_shared else 0
-    system = NormalEquations.zeros(len(x), x.shape[1], p, split)
+    system = into or NormalEquations.zeros(len(x), x.shape[1], p, split)
     for factor, ticks, linear in linearized:
         _accumulate(system, factor, ticks, linear, columns)
     return system

@@ -22,13 +22,37 @@ from scipy.linalg import cho_factor, cho_solve
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
-from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
+from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system, systems_of
 from jointscope.graphs.solving.normal_equations import CHUNK, Linearized, whitened
 from jointscope.graphs.solving.set_problem import Problem
 from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.graphs.solving.unobservable import unobservable
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StateSpread:
+    """Variances of one recording's states.
+
+    Attributes:
+        given_shared: of each state for known shared values, shape (m, d).
+        response: X = A^-1 B, change of each state against the shared values, shape (m, d, p).
+        shared: covariance of this recording's shared values, shape (p, p).
+    """
+
+    given_shared: Array
+    response: Array
+    shared: Array
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviation of every state component, shape (m, d)."""
+        found = self.given_shared.copy()
+        for start in range(0, len(found), CHUNK):
+            X = self.response[start : start + CHUNK]
+            found[start : start + CHUNK] += np.sum((X @ self.shared) * X, axis=2)
+        return np.sqrt(found)
 
 
 @dataclass(frozen=True)
@@ -59,10 +83,14 @@ class StatePosterior:
         return StatePosterior(P, neighbours, X, shared)
 
     @property
+    def spread(self) -> StateSpread:
+        """What is left of it where only standard deviations are wanted."""
+        return StateSpread(np.einsum("kii->ki", self.given_shared).copy(), self.response, self.shared)
+
+    @property
     def sigmas(self) -> Array:
         """Standard deviation of every state component, shape (m, d)."""
-        widened = np.einsum("kip,pq,kiq->ki", self.response, self.shared, self.response, optimize=True)
-        return np.sqrt(np.einsum("kii->ki", self.given_shared) + widened)
+        return self.spread.sigmas
 
     def covariance(self, tick: int) -> Array:
         """Full covariance of one state, shape (d, d)."""
@@ -89,7 +117,7 @@ def posteriors(
     """
     shared = solution.shared
     if eliminations is None:
-        eliminations = [eliminate(system) for system in solution.systems]
+        eliminations = [eliminate(system) for system in systems_of(problems, solution)]
     H, _ = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     free = free_indices(shared, hold)
     covariance = np.zeros_like(H)

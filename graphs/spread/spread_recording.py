@@ -42,7 +42,7 @@ class SpreadRecording:
         self._told = False
         d, calibration, blocks = beginning.x.shape[1], beginning.calibration, beginning.blocks
         parts = parts_of(beginning.problem, beginning.length)
-        self.stretches = tuple(DistantStretch(part, (a, b), d, calibration, blocks) for a, b, part in parts)
+        self.stretches = tuple(DistantStretch((a, b), d, calibration, blocks) for a, b, _ in parts)
 
     def ask(self, question: Question) -> None:
         """Asks; the worker begins."""
