@@ -27,10 +27,10 @@ from jointscope.graphs.calibration.residual_collection import BagResiduals, coll
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence
 from jointscope.graphs.noise.robust_sigma import inflation
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
-from jointscope.graphs.solving.batch_solver import Solution, systems_of
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
+from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StateSpread, posteriors
-from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.solving.set_problem import Problem, SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.starts.saturated_drives import SATURATION
 from jointscope.robots.model.robot import Robot
@@ -87,8 +87,9 @@ class Solved:
         problems: list[BagProblem], solution: Solution, hold: Sequence[str], sets: Sequence[SetProblem] = ()
     ) -> Solved:
         """Uncertainties and one pass over all residuals."""
-        every, motions = [*problems, *sets], len(problems)
-        eliminations = [eliminate(system) for system in systems_of(every, solution)]
+        every: list[Problem] = [*problems, *sets]
+        motions = len(problems)
+        eliminations = eliminations_of(every, solution.estimate)
         found, covariance = posteriors(every, solution, hold, eliminations)
         evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
         residuals = [

@@ -27,8 +27,8 @@ from jointscope.graphs.solving.batch_solver import (
     NewtonStep,
     Progress,
     Solution,
-    cost_at,
     newton_step,
+    prior_cost,
     solve,
     total_cost,
 )
@@ -38,6 +38,7 @@ from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
@@ -197,12 +198,12 @@ def _cycle(
     linearized = [list(linearize_all(*bag)) for bag in bags]
     systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
     shared = SharedLayout.of(estimate.calibrations, owners(problems))
-    here = Solution(estimate, float("nan"), shared, systems)
-    eliminations = [eliminate(system) for system in systems]
+    here = Solution(estimate, float("nan"), shared)
+    eliminations = list(side_by_side(eliminate, systems))
     step = newton_step(problems, here, hold, eliminations=eliminations)
     cost = sum(system.cost for system in systems)
     far = step.in_sigmas > short_step(cost, FAR, measured_rows(problems))
-    if far or total_cost(problems, step.estimate) > cost_at(problems, here):
+    if far or total_cost(problems, step.estimate) > cost + prior_cost(problems, estimate.calibrations):
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
             near = solve(problems, estimate, max_iterations=2, hold=hold, damping=damping)

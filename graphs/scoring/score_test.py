@@ -64,7 +64,7 @@ class ScoreTest:
             calibrations: the values found, with the biases of each recording.
             eliminations: of the states at that solution, where they are at hand.
         """
-        known = eliminations or [None] * len(problems)
+        known: Sequence[Elimination | None] = eliminations or [None] * len(problems)
         return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, known, strict=True)])
 
     @property

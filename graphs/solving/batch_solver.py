@@ -7,7 +7,7 @@ that both end in the same point.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.convergence import (
     LAMBDA_FACTOR,
@@ -31,8 +31,7 @@ from jointscope.graphs.solving.convergence import (
 )
 from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, priors_of
+from jointscope.graphs.solving.set_problem import Problem, cost_of, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
 from jointscope.graphs.solving.stretch import Elsewhere
@@ -54,7 +53,6 @@ class Solution:
         estimate: the minimum.
         cost: half the sum of squared whitened residuals.
         shared: layout of the shared values.
-        systems: normal equations of each recording at the estimate, where they are at hand; see `systems_of`.
         iterations: history.
         converged: False if the iterations ended before the step became small.
         flat: the iterations ended because a model that contradicts its recording gained nothing any more.
@@ -63,7 +61,6 @@ class Solution:
     estimate: Estimate
     cost: float
     shared: SharedLayout
-    systems: list[NormalEquations] | None = None
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
@@ -133,7 +130,7 @@ def solve(
     graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
     estimate = graph.estimate(descent.values)
     end = (descent.iterations, descent.converged, descent.flat)
-    return Solution(estimate, descent.cost, graph.shared, None, *end)
+    return Solution(estimate, descent.cost, graph.shared, *end)
 
 
 @dataclass
@@ -203,15 +200,6 @@ def _next(damping: float) -> float:
     return max(damping / LAMBDA_FACTOR, SMALLEST)
 
 
-def systems_of(problems: Sequence[Problem], solution: Solution) -> Iterator[NormalEquations]:
-    """Normal equations of each recording at a solution; they are large, so each is built when it is asked for."""
-    if solution.systems is not None:
-        yield from solution.systems
-        return
-    for bag in zip(problems, solution.estimate.states, solution.estimate.calibrations, strict=True):
-        yield linearized(*bag)
-
-
 @dataclass(frozen=True)
 class NewtonStep:
     """A Gauss-Newton step.
@@ -233,24 +221,22 @@ def newton_step(
     problems: Sequence[Problem],
     solution: Solution,
     hold: Sequence[str] = (),
-    damping: float = 0.0,
     eliminations: Sequence[Elimination] | None = None,
 ) -> NewtonStep:
-    """One step from the solution's normal equations, not checked against the cost.
+    """One step from a solution, not checked against the cost.
 
     Args:
         problems: factors of each recording.
-        solution: estimate with its normal equations.
+        solution: where it begins.
         hold: blocks that stay.
-        damping: Levenberg-Marquardt lambda, relative to the diagonal.
-        eliminations: of the solution's systems without damping, where they are there already.
+        eliminations: at the solution, where they are there already.
     """
-    shared = solution.shared
+    shared, estimate = solution.shared, solution.estimate
     free = free_indices(shared, hold)
     if eliminations is None:
-        eliminations = [eliminate(system, damping_of_states(damping)) for system in systems_of(problems, solution)]
+        eliminations = eliminations_of(problems, estimate)
     H, g = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
-    dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
+    dp, in_sigmas = shared_step(H, g, free, 0.0, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
@@ -265,17 +251,11 @@ def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[s
 def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:
     """Cost of all recordings and of the priors they share."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    return sum(cost_of(*bag) for bag in bags) + _prior_cost(problems, estimate.calibrations)
+    return sum(cost_of(*bag) for bag in bags) + prior_cost(problems, estimate.calibrations)
 
 
-def cost_at(problems: Sequence[Problem], solution: Solution) -> float:
-    """As `total_cost`, where the solution's systems know what the recordings cost."""
-    return sum(system.cost for system in systems_of(problems, solution)) + _prior_cost(
-        problems, solution.estimate.calibrations
-    )
-
-
-def _prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:
+def prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:
+    """Cost of what recordings share."""
     residuals = ((p.residual((), calibrations[i]) / p.sigmas) for p, i in priors_of(problems, calibrations))
     return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
 

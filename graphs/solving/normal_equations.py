@@ -10,7 +10,8 @@ States form a chain, so the Hessian is block tridiagonal with a border for the s
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,6 +133,22 @@ def linearize_all(
     yield from side_by_side(steps, range(0, m, CHUNK), threads)
     if not dynamics_only:
         yield from side_by_side(samples, (piece for placed in problem.placed for piece in chunks(placed)), threads)
+
+
+def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
+    """First and last tick of each stretch, and its factors; side by side, of about `length` steps each."""
+    steps = len(problem.dynamics)
+    edges = np.linspace(0, steps, max(round(steps / length), 1) + 1).round().astype(int)
+    for a, b in pairwise(edges.tolist()):
+        placed = []
+        for p in problem.placed:
+            if p.factor.states == 0:
+                continue
+            inside = (p.ticks >= a) & ((p.ticks < b) | (b == steps))
+            chosen = np.flatnonzero(inside)
+            if len(chosen):
+                placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
+        yield a, b, replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))
 
 
 def cost(problem: BagProblem, x: Array, calibration: Calibration) -> float:

@@ -21,8 +21,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
-from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system, systems_of
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
+from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
 from jointscope.graphs.solving.normal_equations import CHUNK, Linearized, whitened
 from jointscope.graphs.solving.set_problem import Problem
 from jointscope.graphs.solving.solver_context import side_by_side
@@ -117,7 +117,7 @@ def posteriors(
     """
     shared = solution.shared
     if eliminations is None:
-        eliminations = [eliminate(system) for system in systems_of(problems, solution)]
+        eliminations = eliminations_of(problems, solution.estimate)
     H, _ = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     free = free_indices(shared, hold)
     covariance = np.zeros_like(H)

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.inner_states import LinearisedStretch
+from jointscope.graphs.solving.normal_equations import parts_of
 from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
@@ -210,19 +210,3 @@ def cut(
         return RecordingStretch(samples, x[a : b + 1], calibration, a, blocks)
 
     return side_by_side(stretch, parts_of(problem, length))
-
-
-def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
-    """First and last tick of each stretch, and its factors; arguments as of `cut`."""
-    steps = len(problem.dynamics)
-    edges = np.linspace(0, steps, max(round(steps / length), 1) + 1).round().astype(int)
-    for a, b in pairwise(edges.tolist()):
-        placed = []
-        for p in problem.placed:
-            if p.factor.states == 0:
-                continue
-            inside = (p.ticks >= a) & ((p.ticks < b) | (b == steps))
-            chosen = np.flatnonzero(inside)
-            if len(chosen):
-                placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
-        yield a, b, replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))

@@ -64,6 +64,11 @@ class WholeSet:
         return self._trial.x
 
     @property
+    def system(self) -> NormalEquations:
+        """Normal equations at the last evaluated point."""
+        return self._trial.system
+
+    @property
     def costs(self) -> Array:
         """Cost of each state there, shape (m,)."""
         return self._trial.costs

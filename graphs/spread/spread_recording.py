@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from jointscope.graphs.solving.stretch import Place, parts_of
+from jointscope.graphs.solving.normal_equations import parts_of
+from jointscope.graphs.solving.stretch import Place
 from jointscope.graphs.spread.distant_stretch import DistantStretch
 from jointscope.graphs.spread.kept_recording import (
     Beginning,
