@@ -135,7 +135,7 @@ def solve(
 
 @dataclass
 class _Descent:
-    """The iterations of one solve; attributes as in `Solution`, `costs` by tick and the damping that they ask for."""
+    """The iterations of one solve; as in `Solution`, `costs` by tick, their damping, whether a step was rejected."""
 
     graph: CondensedGraph
     values: gtsam.Values
@@ -145,6 +145,7 @@ class _Descent:
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
+    rejected: bool = False
 
     def run(self, most: int, tolerance: float, measured: int, progress: Progress | None, damping: float) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
@@ -154,7 +155,8 @@ class _Descent:
             accepted = self._lowered(damping, tolerance, measured)
             if accepted is None:
                 return
-            self.converged = has_converged(self.iterations, tolerance, measured, accepted <= LAMBDA_START)
+            undamped, smooth = accepted <= LAMBDA_START, not self.rejected
+            self.converged = has_converged(self.iterations, tolerance, measured, undamped, smooth)
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
@@ -172,6 +174,7 @@ class _Descent:
                 self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
                 self.values, self.cost, self.costs = step.values, cost, costs
                 return damping
+            self.rejected = True
             if self.bends.raised(self.costs, costs):
                 continue
             # a start says nothing yet about how well the model can fit

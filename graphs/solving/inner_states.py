@@ -127,26 +127,32 @@ class Point:
 
 
 class LinearisedStretch:
-    """Memory for one linearisation of a stretch; what only its elimination needs is shared by all of a thread.
+    """Memory for one linearisation of a stretch.
 
     Args:
         problem: the factors of the stretch.
         kept: columns of the free blocks.
         start: tick of its first state, for messages.
         m, d, p: number of states, size of one, number of shared values.
+        whole: whether the blocks of the states are kept, so that they can be eliminated with another damping; else they
+            are in memory that all stretches of a thread share.
 
     Attributes:
         point: where that is; None where it has failed.
-        damping: of each state, with which the inner ones were eliminated, shape (m,).
+        damping: of each state, with which the inner ones are eliminated, shape (m,).
     """
 
-    def __init__(self, problem: BagProblem, kept: NDArray[np.intp], start: int, m: int, d: int, p: int):
+    def __init__(
+        self, problem: BagProblem, kept: NDArray[np.intp], start: int, m: int, d: int, p: int, whole: bool = False
+    ):
         self.point: Point | None = None
         self.damping = np.zeros(m)
         self._problem, self._kept, self._start = problem, kept, start
         self._border, self._gradient = np.empty((m, d, p)), np.empty((m, d))
-        self._columns = np.empty((m - 2, d, 2 * d))
-        self._inner: InnerStates | SolveError | None = None
+        self._columns, self._blocks = np.empty((m - 2, d, 2 * d)), np.empty((2 * m - 1, d, d)) if whole else None
+        self._system: NormalEquations | None = None
+        self._inner: InnerStates | None = None
+        self._failure: SolveError | None = None
 
     @property
     def inner(self) -> InnerStates:
@@ -155,44 +161,56 @@ class LinearisedStretch:
         Raises:
             SolveError: a state is not determined.
         """
-        assert self._inner is not None
-        if isinstance(self._inner, SolveError):
-            raise self._inner
+        if self._failure is not None:
+            raise self._failure
+        if self._inner is None:
+            assert self._system is not None
+            self._inner = InnerStates.of(self._system, self._kept, self.damping, self._start, self._columns)
         return self._inner
 
+    def is_damped(self, damping: Array) -> bool:
+        """Whether that is the damping, or can be."""
+        if np.array_equal(1.0 + self.damping, 1.0 + damping):
+            return True
+        if self._blocks is not None:
+            self.damping, self._inner = damping, None
+        return self._blocks is not None
+
     def move(self, x: Array, calibration: Calibration, damping: Array) -> Point:
-        """Linearises the stretch and eliminates its inner states.
+        """Linearises the stretch; inner states are eliminated at once where their blocks are not kept.
 
         Args:
             x: states, shape (m, d).
             calibration: shared values.
             damping: of each state, shape (m,).
         """
-        self.point = None  # neither the one nor the other, should it fail
+        self.point = self._failure = None  # neither the one place nor the other, should it fail
         m, d, p = self._border.shape
-        blocks = _blocks(2 * m - 1, d)
-        self._border[:], self._gradient[:] = 0.0, 0.0
+        blocks = shared_blocks(2 * m - 1, d) if self._blocks is None else self._blocks
+        blocks[:], self._border[:], self._gradient[:] = 0.0, 0.0, 0.0
         shared = np.zeros((p, p)), self._gradient, np.zeros(p)
         system = NormalEquations(blocks[:m], blocks[m:], self._border, *shared, 0.0, np.zeros(m))
         build(self._problem, x, calibration, into=system)
-        try:
-            self._inner = InnerStates.of(system, self._kept, damping, self._start, self._columns)
-        except SolveError as err:  # the cost tells soon enough that this is no place to go on from
-            self._inner = err
-        self.point, self.damping = Point(x, calibration, system.cost, system.costs), damping
+        self._system, self._inner, self.damping = system, None, damping
+        if self._blocks is None:
+            try:
+                _ = self.inner
+            except SolveError as err:  # the cost tells soon enough that this is no place to go on from
+                self._failure = err
+            self._system = None
+        self.point = Point(x, calibration, system.cost, system.costs)
         return self.point
 
 
 _own = threading.local()  # of each thread: memory for the blocks of one stretch
 
 
-def _blocks(count: int, d: int) -> Array:
-    """Zeros of shape (count, d, d), in memory that the next stretch of this thread takes."""
+def shared_blocks(count: int, d: int) -> Array:
+    """Memory of shape (count, d, d) that the next stretch of this thread takes."""
     size = count * d * d
     if len(getattr(_own, "memory", ())) < size:
         _own.memory = np.empty(size)
     found: Array = _own.memory[:size].reshape(count, d, d)
-    found[:] = 0.0
     return found
 
 

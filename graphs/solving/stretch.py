@@ -18,6 +18,8 @@ from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
+LONG = 20_000  # states of a recording from which memory is what is scarce
+
 
 @dataclass(frozen=True)
 class Place:
@@ -81,7 +83,7 @@ class RecordingStretch:
     """Samples of one recording between two ticks.
 
     Inner states follow from where the stretch was linearised last; after that this linearisation is not needed unless
-    the step is rejected. So a trial takes its memory until a first one is rejected, from when on both are kept.
+    the step is rejected. So a trial may take its memory until a first one is rejected, from when on both are kept.
 
     Args:
         problem: the factors of these samples alone, ticks counted from the first.
@@ -89,19 +91,30 @@ class RecordingStretch:
         calibration: shared values to begin with.
         start: tick of the first state in its recording.
         blocks: names of the blocks that may change.
+        keeps_both: whether both are kept from the beginning: short recordings have room for what they may need again.
 
     Attributes:
         damping: Levenberg-Marquardt lambda of each state, relative to the diagonal, shape (m,).
     """
 
-    def __init__(self, problem: BagProblem, x: Array, calibration: Calibration, start: int, blocks: Sequence[str]):
+    def __init__(
+        self,
+        problem: BagProblem,
+        x: Array,
+        calibration: Calibration,
+        start: int,
+        blocks: Sequence[str],
+        keeps_both: bool = True,
+    ):
         self.problem, self._start = problem, start
         self.damping = np.zeros(len(x))
         own = calibration.columns
         kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
         self._columns, self._size = rim_columns(x.shape[1], calibration, blocks)
-        self._room = lambda: LinearisedStretch(problem, kept, start, len(x), x.shape[1], calibration.size)
-        self._kept, self._keeps_both = [self._room()], False
+        sizes = len(x), x.shape[1], calibration.size
+        self._room = lambda: LinearisedStretch(problem, kept, start, *sizes, whole=self._keeps_both)
+        self._keeps_both = keeps_both
+        self._kept = [self._room()]
         self._base = self._trial = self._kept[0].move(x.copy(), calibration, self.damping)
         self._damped_with = self.damping
 
@@ -154,13 +167,14 @@ class RecordingStretch:
 
     def _linearised(self) -> LinearisedStretch:
         """The linearisation at the base, made anew where a trial has taken its memory."""
-        for found in self._kept:
-            if found.point is self._base and np.array_equal(1.0 + found.damping, 1.0 + self._damped_with):
-                return found
-        self._keeps_both |= all(found.point is not self._base for found in self._kept)
-        room = next((found for found in self._kept if found.point is self._base), None) or self._free_room()
-        self._base = room.move(self._base.x, self._base.calibration, self._damped_with)
-        self._trial = self._base
+        own = next((found for found in self._kept if found.point is self._base), None)
+        if own is not None and own.is_damped(self._damped_with):
+            return own
+        if own is None and not self._keeps_both:  # a step was rejected
+            self._keeps_both = True
+            self._kept = [self._room()]
+        room = own or self._free_room()
+        self._base = self._trial = room.move(self._base.x, self._base.calibration, self._damped_with)
         return room
 
     def _free_room(self) -> LinearisedStretch:
@@ -207,6 +221,6 @@ def cut(
 
     def stretch(part: tuple[int, int, BagProblem]) -> RecordingStretch:
         a, b, samples = part
-        return RecordingStretch(samples, x[a : b + 1], calibration, a, blocks)
+        return RecordingStretch(samples, x[a : b + 1], calibration, a, blocks, keeps_both=len(x) < LONG)
 
     return side_by_side(stretch, parts_of(problem, length))

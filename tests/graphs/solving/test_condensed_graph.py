@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving import solver_context
+from jointscope.graphs.solving import solver_context, stretch
 from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.batch_solver import reduced_system, solve, total_cost
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
@@ -16,6 +18,7 @@ from jointscope.graphs.solving.damped_step import damped_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import build
 from jointscope.graphs.starts.initial_guess import initial_states
+from jointscope.robots.errors import SolveError
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +65,10 @@ def assert_alike(one, other):
         assert np.array_equal(a, b)
 
 
-def test_a_rejected_step_leaves_the_graph_as_if_it_had_not_been_tried(moving):
+@pytest.mark.parametrize("long", [0, 20_000])
+def test_a_rejected_step_leaves_the_graph_as_if_it_had_not_been_tried(moving, long, monkeypatch):
     """A trial takes the memory of the linearisation that it follows from, until a first one is rejected."""
+    monkeypatch.setattr(stretch, "LONG", long)
     problems, estimate = moving
     (tried, values), (fresh, _) = (CondensedGraph.of(problems, estimate, length=60) for _ in range(2))
     steps = [damped_step(tried, values, damping).values for damping in (1e-9, 10.0, 0.1)]
@@ -76,8 +81,10 @@ def test_a_rejected_step_leaves_the_graph_as_if_it_had_not_been_tried(moving):
     assert_alike(*(reduced(graph, steps[-1]) for graph in (tried, fresh)))
 
 
+@pytest.mark.parametrize("long", [0, 20_000])
 @pytest.mark.parametrize("bent", [False, True])
-def test_damping_that_was_not_expected_is_heeded(moving, bent):
+def test_damping_that_was_not_expected_is_heeded(moving, bent, long, monkeypatch):
+    monkeypatch.setattr(stretch, "LONG", long)
     problems, estimate = moving
     (told, values), (surprised, _) = (CondensedGraph.of(problems, estimate, length=60) for _ in range(2))
     bends = [np.where(np.arange(len(x)) % 7 == 0, 1e-3 * bent, 0.0) for x in estimate.states]
@@ -89,6 +96,28 @@ def test_damping_that_was_not_expected_is_heeded(moving, bent):
         graph.cost(step)
         found.append(reduced(graph, step, 1e-9, bends))
     assert_alike(*found)
+
+
+def test_a_long_recording_is_solved_like_a_short_one(moving, monkeypatch):
+    problems, estimate = moving
+    found = []
+    for long in (0, 20_000):
+        monkeypatch.setattr(stretch, "LONG", long)
+        solution = solve(problems, estimate, length=60)
+        found.append((solution.cost, *solution.estimate.states, solution.estimate.calibrations[0].values))
+    for one, other in zip(*found, strict=True):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+
+
+def test_a_state_that_nothing_tells_is_named_in_a_long_recording_too(moving, monkeypatch):
+    problems, estimate = moving
+    monkeypatch.setattr(stretch, "LONG", 0)
+    problem = problems[0]
+    steps = replace(problem.dynamics.steps, free=np.full((len(problem.dynamics), 6), np.inf))
+    blind = [replace(problem, placed=problem.placed[:1], dynamics=replace(problem.dynamics, steps=steps))]
+    graph, values = CondensedGraph.of(blind, Estimate(estimate.states[:1], estimate.calibrations[:1]))
+    with pytest.raises(SolveError, match="is not determined by the recording"):
+        graph.linearized(values)
 
 
 @pytest.mark.parametrize("threads", [2, 3])
