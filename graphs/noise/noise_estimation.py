@@ -195,8 +195,8 @@ def _cycle(
     Checked steps, where they have to be taken, begin with a damping; the last result is that for those of next time.
     """
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
-    linearized = [list(linearize_all(*bag)) for bag in bags]
-    systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
+    linearized = list(side_by_side(lambda bag: list(linearize_all(*bag)), bags))
+    systems = list(side_by_side(lambda i: accumulate(linearized[i], *bags[i][1:]), range(len(bags))))
     shared = SharedLayout.of(estimate.calibrations, owners(problems))
     here = Solution(estimate, float("nan"), shared)
     eliminations = list(side_by_side(eliminate, systems))
@@ -210,14 +210,18 @@ def _cycle(
             return _cycle(problems, near.estimate, hold, next_damping(near.iterations), damped=True)
         step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
     found, _ = posteriors(problems, here, hold, eliminations)
-    evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
-    for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
-        dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]
-        dx = step.dx[i]
+    rates = problems[0].robot.layout.n_rates
+
+    def told(i: int) -> NoiseEvidence:
+        dynamics = [part for part in linearized[i] if isinstance(part[0], DynamicsFactor)]
+        dx, evidence = step.dx[i], NoiseEvidence.empty(rates)
         local = {DYNAMICS: shared.step(step.dp, i)[DYNAMICS]}
         moved = [(factor, ticks, after_step(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
-        for part in residual_parts(moved, estimate.calibrations[i], posterior):
+        for part in residual_parts(moved, estimate.calibrations[i], found[i]):
             evidence.add(part)
+        return evidence
+
+    evidence = sum(side_by_side(told, range(len(bags))), NoiseEvidence.empty(rates))
     return evidence, step.estimate, damping
 
 

@@ -78,8 +78,15 @@ class StatePosterior:
 
         m, d, _ = elimination.columns.shape
         P, neighbours = np.empty((m, d, d)), np.empty((max(m - 1, 0), d, d))
-        selected_inverse(elimination.columns, P, neighbours)
-        X = elimination.solve_transposed(elimination.W).reshape(m, d, elimination.W.shape[1])
+
+        def inverse() -> Array:
+            selected_inverse(elimination.columns, P, neighbours)
+            return P
+
+        def response() -> Array:
+            return elimination.solve_transposed(elimination.W).reshape(m, d, elimination.W.shape[1])
+
+        _, X = side_by_side(lambda task: task(), (inverse, response), threads=0 if m > CHUNK else 1)
         return StatePosterior(P, neighbours, X, shared)
 
     @property
@@ -125,11 +132,12 @@ def posteriors(
         covariance[np.ix_(free, free)] = cho_solve(cho_factor(H[np.ix_(free, free)]), np.eye(len(free)))
     except np.linalg.LinAlgError as err:
         raise unobservable(H, free, shared, solution.estimate.calibrations[0]) from err
-    found = []
-    for i, elimination in enumerate(eliminations):
+
+    def posterior(i: int) -> StatePosterior:
         index = shared.indices(i)
-        found.append(StatePosterior.of(elimination, covariance[np.ix_(index, index)]))
-    return found, covariance
+        return StatePosterior.of(eliminations[i], covariance[np.ix_(index, index)])
+
+    return list(side_by_side(posterior, range(len(eliminations)))), covariance
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import functools
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from typing import ParamSpec, TypeVar
@@ -67,7 +67,7 @@ def side_by_side(function: Callable[[T], R], tasks: Iterable[T], threads: int = 
         tasks: taken as they are needed; they may not need each other.
         threads: how many; `thread_count()` if 0.
     """
-    threads = threads or thread_count()
+    threads = 1 if isinstance(tasks, Sized) and len(tasks) < 2 else threads or thread_count()
     if threads < 2 or getattr(_here, "is_ours", False):  # who waits for its own kind may wait forever
         yield from map(function, tasks)
         return

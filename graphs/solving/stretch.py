@@ -111,9 +111,8 @@ class RecordingStretch:
         own = calibration.columns
         kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
         self._columns, self._size = rim_columns(x.shape[1], calibration, blocks)
-        sizes = len(x), x.shape[1], calibration.size
-        self._room = lambda: LinearisedStretch(problem, kept, start, *sizes, whole=self._keeps_both)
         self._keeps_both = keeps_both
+        self._sizes = problem, kept, start, len(x), x.shape[1], calibration.size
         self._kept = [self._room()]
         self._base = self._trial = self._kept[0].move(x.copy(), calibration, self.damping)
         self._damped_with = self.damping
@@ -176,6 +175,9 @@ class RecordingStretch:
         room = own or self._free_room()
         self._base = self._trial = room.move(self._base.x, self._base.calibration, self._damped_with)
         return room
+
+    def _room(self) -> LinearisedStretch:
+        return LinearisedStretch(*self._sizes, whole=self._keeps_both)
 
     def _free_room(self) -> LinearisedStretch:
         """Memory for another linearisation."""
