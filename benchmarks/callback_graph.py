@@ -15,6 +15,7 @@ import gtsam
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.gtsam_solvers.reference_graph import initial_values, nonlinear_graph
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.batch_solver import Solution, newton_step, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import build
@@ -64,7 +65,7 @@ def batch_iteration(problem: BagProblem, estimate: Estimate, repeats: int = 3) -
         system = build(problem, x, calibration)
         built = time.perf_counter()
         shared = SharedLayout.of(calibration, 1)
-        newton_step([problem], Solution(estimate, system.cost, shared, [system]))
+        newton_step([problem], Solution(estimate, system.cost, shared), eliminations=[eliminate(system)])
         costs.append(Cost(problem.recording.duration, built - started, time.perf_counter() - built))
     return min(costs, key=lambda cost: cost.total)
 

@@ -14,6 +14,7 @@ from jointscope.factors.factor import Factor
 from jointscope.factors.priors import shared_priors
 from jointscope.factors.single import block_key, state_key
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import eliminate
 from jointscope.graphs.solving.batch_solver import NewtonStep, Solution, newton_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import Linearized, accumulate, linearize_all, whitened
@@ -48,8 +49,8 @@ def measure(problem: BagProblem, estimate: Estimate) -> EliminationTimes:
     x, calibration = estimate.states[0], estimate.calibrations[0]
     linearized = list(linearize_all(problem, x, calibration))
     system, accumulating = _fastest(lambda: accumulate(linearized, x, calibration))
-    solution = Solution(estimate, system.cost, SharedLayout.of(calibration, 1), [system])
-    step, banded = _fastest(lambda: newton_step([problem], solution))
+    solution = Solution(estimate, system.cost, SharedLayout.of(calibration, 1))
+    step, banded = _fastest(lambda: newton_step([problem], solution, eliminations=[eliminate(system)]))
     graph = jacobian_graph(problem, linearized, estimate)
     ordering = chain_ordering(len(x), estimate)
     found, multifrontal = _fastest(lambda: graph.optimize(ordering))

@@ -172,6 +172,7 @@ def _calibrated(
     # the file that will be written says in which posture its values were found
     robot = robot.locked_as_in(recordings[0].posture)
     result = summarize(robot, solved, tuple(history.records), notices, hold)
+    solved = replace(solved, spreads=[])  # they are large, and all that they say has been said
     if near is None and not biases_only:
         result = _asked_for_causes(result, solved, stage if memory else None, recordings)
         if memory and not result.has_named_causes:  # else torques that last would hide them
@@ -195,7 +196,7 @@ def _asked_for_causes(
     result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
 ) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
-    test = ScoreTest.of(*solved.of_motions)
+    test = ScoreTest.of(*solved.of_motions, solved.eliminations)
     lacking = lacking_effects(test) if stage else ()
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):

@@ -27,9 +27,10 @@ from jointscope.graphs.calibration.residual_collection import BagResiduals, coll
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence
 from jointscope.graphs.noise.robust_sigma import inflation
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution
-from jointscope.graphs.solving.posterior import StatePosterior, posteriors
-from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.solving.posterior import StateSpread, posteriors
+from jointscope.graphs.solving.set_problem import Problem, SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.starts.saturated_drives import SATURATION
 from jointscope.robots.model.robot import Robot
@@ -47,19 +48,21 @@ class Solved:
     Attributes:
         problems: factors of each motion, with the noise used.
         solution: states and shared values, of the motions first.
-        posteriors: uncertainty of each recording's states.
+        spreads: uncertainty of each motion's states.
         covariance: of all shared values, shape (s, s).
         residuals: of each recording.
         evidence: what the residuals say about the process noise.
+        eliminations: of each motion's states.
         sets: recordings of other kinds.
     """
 
     problems: list[BagProblem]
     solution: Solution
-    posteriors: list[StatePosterior]
+    spreads: list[StateSpread]
     covariance: Array
     residuals: list[BagResiduals]
     evidence: NoiseEvidence
+    eliminations: list[Elimination]
     sets: Sequence[SetProblem] = ()
 
     @property
@@ -84,13 +87,17 @@ class Solved:
         problems: list[BagProblem], solution: Solution, hold: Sequence[str], sets: Sequence[SetProblem] = ()
     ) -> Solved:
         """Uncertainties and one pass over all residuals."""
-        found, covariance = posteriors([*problems, *sets], solution, hold)
+        every: list[Problem] = [*problems, *sets]
+        motions = len(problems)
+        eliminations = eliminations_of(every, solution.estimate)
+        found, covariance = posteriors(every, solution, hold, eliminations)
         evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
         residuals = [
             collect(problem, solution, i, posterior, evidence)
-            for i, (problem, posterior) in enumerate(zip(problems, found[: len(problems)], strict=True))
+            for i, (problem, posterior) in enumerate(zip(problems, found[:motions], strict=True))
         ]
-        return Solved(problems, solution, found, covariance, residuals, evidence, sets)
+        spreads = [posterior.spread for posterior in found[:motions]]
+        return Solved(problems, solution, spreads, covariance, residuals, evidence, eliminations[:motions], sets)
 
 
 def summarize(
@@ -151,8 +158,8 @@ def summarize(
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
     problem, solution = solved.problems[i], solved.solution
     widening = factor[solution.shared.indices(i)]
-    posterior = solved.posteriors[i]
-    posterior = replace(posterior, shared=posterior.shared * np.outer(widening, widening))
+    spread = solved.spreads[i]
+    spread = replace(spread, shared=spread.shared * np.outer(widening, widening))
     residuals = {}
     for name, sensor in problem.robot.sensors.items():
         if collector.series[name]:
@@ -167,7 +174,7 @@ def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> 
         ticks=problem.timeline.ticks,
         commands=np.vstack([u, u[-1:]]),
         states=states,
-        sigmas=posterior.sigmas,
+        sigmas=spread.sigmas,
         residuals=residuals,
         process=process,
         process_sigma=process_sigma,

@@ -137,7 +137,8 @@ class WholeStage:
         self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate, most: int | None = None
     ) -> Solved:
         """A solution whose noise agrees with its residuals."""
-        *_, solved = self.passes(problems, noise, estimate, most)
+        for found in self.passes(problems, noise, estimate, most):  # each is large, and the last one counts
+            solved = found
         return solved
 
     def passes(

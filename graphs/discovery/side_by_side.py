@@ -155,11 +155,6 @@ def _on_cluster(cluster: DaskCluster, function: Callable[[Any, T], R], shared: A
             pending.drop()
 
 
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _begin(effect_files: tuple[Path, ...]) -> None:
     """Makes a worker ready, with the modules that it will need; the process that asked handles Ctrl-C."""
     made_ready(effect_files)

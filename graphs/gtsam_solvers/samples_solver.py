@@ -24,11 +24,10 @@ from jointscope.graphs.gtsam_solvers.reference_graph import (
     unsolvable,
 )
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving.banded_solver import eliminations_of
 from jointscope.graphs.solving.batch_solver import Progress, Solution, free_indices, reduced_system, total_cost
 from jointscope.graphs.solving.convergence import Iteration
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import build
 from jointscope.graphs.solving.set_problem import Problem, motions_only
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.errors import SolveError
@@ -115,11 +114,9 @@ def _solution(
     dampings: Sequence[float],
     converged: bool,
 ) -> Solution:
-    """The end of a path with its normal equations; its steps in the sigmas that hold there."""
-    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    systems = [build(problem, x, calibration) for problem, x, calibration in bags]
+    """The end of a path with its steps in the sigmas that hold there."""
     shared = SharedLayout.of(estimate.calibrations, len(problems))
-    eliminated = [eliminate(system) for system in systems]
+    eliminated = eliminations_of(problems, estimate)
     H, _ = reduced_system(problems, eliminated, shared, estimate.calibrations)
     free = free_indices(shared, hold)
     sigmas = np.full(shared.size, np.inf)
@@ -128,7 +125,7 @@ def _solution(
         Iteration(costs[i], costs[i + 1], dampings[i], _longest(before, after, shared, sigmas))
         for i, (before, after) in enumerate(pairwise(path))
     ]
-    return Solution(estimate, total_cost(problems, estimate), shared, systems, iterations, converged)
+    return Solution(estimate, total_cost(problems, estimate), shared, iterations, converged)
 
 
 def _longest(before: Sequence[Calibration], after: Sequence[Calibration], shared: SharedLayout, sigmas: Array) -> float:

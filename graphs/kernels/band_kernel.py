@@ -19,26 +19,35 @@ Array = NDArray[np.float64]
 
 
 @compiled
-def factorise(D: Array, E: Array, scale: Array, columns: Array, W: Array) -> int:
-    """Factorises the chain and solves for the border in place.
+def factorise(D: Array, E: Array, scale: Array, start: int, columns: Array, W: Array) -> int:
+    """Factorises a chain, or goes on with it, and solves for the border in place.
 
     Args:
-        D: diagonal blocks, of which the lower triangle is read, shape (m, d, d).
-        E: blocks below the diagonal, shape (m - 1, d, d).
-        scale: factor on the diagonal of each tick, shape (m,).
-        columns: takes L, the lower band column by column, zeros before, shape (m, d, 2d).
-        W: the border, which becomes L^-1 times it, shape (m, d, p).
+        D: diagonal blocks of some ticks, of which the lower triangle is read, shape (s, d, d).
+        E: blocks below the diagonal, the first one before the first of these ticks if there is a tick before; (s, d, d)
+            or, from the first tick on, (s - 1, d, d).
+        scale: factor on the diagonal of each tick, shape (s,).
+        start: tick of the first of them.
+        columns: takes L, the lower band column by column, zeros before, all ticks, shape (m, d, 2d).
+        W: the border of all ticks, which becomes L^-1 times it where they are, shape (m, d, p).
 
     Returns:
         0, or one more than the index of the first pivot that is not positive.
     """
-    m, d, p = W.shape
+    _, d, p = W.shape
     A, L, X, inverse = np.empty((d, d)), np.zeros((d, d)), np.zeros((d, d)), np.empty(d)
-    for k in range(m):
+    if start > 0:
+        for j in range(d):
+            for i in range(j, d):
+                L[i, j] = columns[start - 1, j, i - j]
+            inverse[j] = 1.0 / L[j, j]
+    first = 0 if start > 0 else 1
+    for s in range(len(D)):
+        k = start + s
         if k > 0:
-            _solve_below(E[k - 1], L, inverse, X, columns[k - 1])
+            _solve_below(E[s - first], L, inverse, X, columns[k - 1])
             _subtract(X, W[k - 1], W[k], p)
-        pivot = _factor(D[k], scale[k], X, A, L, inverse, columns[k])
+        pivot = _factor(D[s], scale[s], X, A, L, inverse, columns[k])
         if pivot > 0:
             return k * d + pivot
         _solve(L, inverse, W[k], p)

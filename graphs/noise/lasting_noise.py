@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from jointscope.graphs.noise.linear_smoother import LinearSmoother, Smoothed
 from jointscope.graphs.noise.noise_estimation import FixedPoint, NoiseEvidence, settled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 
@@ -68,7 +70,7 @@ class NoiseWindows:
         """Evidence of the robot's own white noise."""
         own = without_lasting(self.robot)
         smoothers = self._smoothers(self.on(own), self._carried(own))
-        return sum(smoother.smooth(own.noise, {}).evidence for smoother in smoothers)
+        return sum(side_by_side(lambda smoother: smoother.smooth(own.noise, {}).evidence, smoothers))
 
     def separated(
         self, correlation_time: float, cycles: int = CYCLES, widen: bool = True, near: ProcessNoise | None = None
@@ -91,7 +93,8 @@ class NoiseWindows:
         for cycle in range(cycles):
             if cycle in (0, ANEW):
                 smoothers = self._smoothers(windows, states)
-            smoothed = [smoother.smooth(noise, widened) for smoother in smoothers]
+            smooth = partial(LinearSmoother.smooth, noise=noise, widened=widened)
+            smoothed = list(side_by_side(smooth, smoothers))
             states = [s.x for s in smoothed]
             found = sum((s.process for s in smoothed), NoiseEvidence.empty(robot.layout.n_rates))
             evidence = sum(s.evidence for s in smoothed)
@@ -105,7 +108,8 @@ class NoiseWindows:
         return [robot.layout.carried_over(x, self.robot.layout) for x in self.states]
 
     def _smoothers(self, windows: list[BagProblem], states: list[Array]) -> list[LinearSmoother]:
-        return [LinearSmoother.of(*given) for given in zip(windows, states, self.calibrations, strict=True)]
+        given = list(zip(windows, states, self.calibrations, strict=True))
+        return list(side_by_side(lambda one: LinearSmoother.of(*one), given))
 
 
 def without_lasting(robot: Robot) -> Robot:

@@ -27,8 +27,8 @@ from jointscope.graphs.solving.batch_solver import (
     NewtonStep,
     Progress,
     Solution,
-    cost_at,
     newton_step,
+    prior_cost,
     solve,
     total_cost,
 )
@@ -38,6 +38,7 @@ from jointscope.graphs.solving.normal_equations import accumulate, linearize_all
 from jointscope.graphs.solving.posterior import ResidualPart, posteriors, residual_parts
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
@@ -194,29 +195,33 @@ def _cycle(
     Checked steps, where they have to be taken, begin with a damping; the last result is that for those of next time.
     """
     bags = list(zip(problems, estimate.states, estimate.calibrations, strict=True))
-    linearized = [list(linearize_all(*bag)) for bag in bags]
-    systems = [accumulate(parts, x, c) for parts, (_, x, c) in zip(linearized, bags, strict=True)]
+    linearized = list(side_by_side(lambda bag: list(linearize_all(*bag)), bags))
+    systems = list(side_by_side(lambda i: accumulate(linearized[i], *bags[i][1:]), range(len(bags))))
     shared = SharedLayout.of(estimate.calibrations, owners(problems))
-    here = Solution(estimate, float("nan"), shared, systems)
-    eliminations = [eliminate(system) for system in systems]
+    here = Solution(estimate, float("nan"), shared)
+    eliminations = list(side_by_side(eliminate, systems))
     step = newton_step(problems, here, hold, eliminations=eliminations)
     cost = sum(system.cost for system in systems)
     far = step.in_sigmas > short_step(cost, FAR, measured_rows(problems))
-    if far or total_cost(problems, step.estimate) > cost_at(problems, here):
+    if far or total_cost(problems, step.estimate) > cost + prior_cost(problems, estimate.calibrations):
         # too far for a step that nobody checks: two checked ones first, and none if it is still too far
         if not damped:
             near = solve(problems, estimate, max_iterations=2, hold=hold, damping=damping)
             return _cycle(problems, near.estimate, hold, next_damping(near.iterations), damped=True)
         step = NewtonStep(estimate, 0.0, [np.zeros_like(dx) for dx in step.dx], np.zeros_like(step.dp))
     found, _ = posteriors(problems, here, hold, eliminations)
-    evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)
-    for i, (parts, posterior) in enumerate(zip(linearized, found, strict=True)):
-        dynamics = [part for part in parts if isinstance(part[0], DynamicsFactor)]
-        dx = step.dx[i]
+    rates = problems[0].robot.layout.n_rates
+
+    def told(i: int) -> NoiseEvidence:
+        dynamics = [part for part in linearized[i] if isinstance(part[0], DynamicsFactor)]
+        dx, evidence = step.dx[i], NoiseEvidence.empty(rates)
         local = {DYNAMICS: shared.step(step.dp, i)[DYNAMICS]}
         moved = [(factor, ticks, after_step(linear, ticks, dx, local)) for factor, ticks, linear in dynamics]
-        for part in residual_parts(moved, estimate.calibrations[i], posterior):
+        for part in residual_parts(moved, estimate.calibrations[i], found[i]):
             evidence.add(part)
+        return evidence
+
+    evidence = sum(side_by_side(told, range(len(bags))), NoiseEvidence.empty(rates))
     return evidence, step.estimate, damping
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from jointscope.graphs.noise.noise_estimation import densities
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving.banded_solver import eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution
 
 
@@ -28,7 +28,7 @@ def unlikelihood(problems: Sequence[BagProblem], solution: Solution) -> float:
         problems: the recordings, with the noise at which they were solved.
         solution: of these and no other recordings.
     """
-    volumes = 0.5 * sum(eliminate(system).log_determinant for system in solution.systems)
+    volumes = 0.5 * sum(elimination.log_determinant for elimination in eliminations_of(problems, solution.estimate))
     return solution.cost + volumes + sum(_of_steps(problem) + _of_encoders(problem) for problem in problems)
 
 

@@ -1,22 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Hessian on base parameters and hypotheses with all states eliminated: one elimination for all of them.
-
-Regressors of hypotheses are further columns beside the shared values. With A = L L' for the states,
-
-    H = C - W' W,   g = g_p - W' w,   W = L^-1 B,   w = L^-1 g_x
-
-on (shared values, hypotheses). Nothing is solved anew for a hypothesis.
-"""
+"""A solved recording, linearised, and the rows that hypotheses touch in it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
@@ -27,12 +19,10 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column, SensorPart
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
-from jointscope.graphs.solving.normal_equations import Linearized, accumulate, add_at, linearize_all, whitened
+from jointscope.graphs.solving.normal_equations import Linearized, accumulate, linearize_all
 from jointscope.robots.parts.process_noise import ProcessNoise
 
 Array = NDArray[np.float64]
-Whitened = tuple[Array, tuple[Array, ...], dict[str, Array]]
-"""Residual, shape (s, r), derivatives by states, shape (s, r, d) each, and by blocks, shape (s, r, size)."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +46,15 @@ class Segment:
     elimination: Elimination
 
     @staticmethod
-    def of(problem: BagProblem, x: Array, calibration: Calibration) -> Segment:
-        """Linearises a solved recording."""
+    def of(problem: BagProblem, x: Array, calibration: Calibration, elimination: Elimination | None = None) -> Segment:
+        """Linearises a solved recording; its states may have been eliminated already."""
         linearized = list(linearize_all(problem, x, calibration))
-        placed = iter(np.concatenate([np.zeros(0), *(p.times for p in problem.placed)]))
-        stamps = []
+        times, placed, stamps = np.concatenate([np.zeros(0), *(p.times for p in problem.placed)]), 0, []
         for factor, _, _ in linearized:
             count = 0 if isinstance(factor, DynamicsFactor) else len(factor)
-            stamps.append(np.array([next(placed) for _ in range(count)]))
-        elimination = eliminate(accumulate(linearized, x, calibration))
+            stamps.append(times[placed : placed + count])
+            placed += count
+        elimination = elimination or eliminate(accumulate(linearized, x, calibration))
         return Segment(problem, calibration, ScoreSignals.of(problem, x, calibration), linearized, stamps, elimination)
 
     @cached_property
@@ -75,9 +65,19 @@ class Segment:
         return ScoreSignals.between(self.problem, self.signals.x, self.calibration)
 
     @cached_property
-    def whitened(self) -> list[Whitened]:
-        """Residual and derivatives of every piece of `linearized`, whitened; the same for every batch of hypotheses."""
-        return [whitened(factor, linear) for factor, _, linear in self.linearized]
+    def readings(self) -> list[SensorPart | None]:
+        """What regressors of readings ask of every piece of `linearized`; None for pieces that are no channels."""
+        pieces = zip(self.linearized, self.stamps, strict=True)
+        return [_sensor_part(self, *piece, stamps) if self._reads(piece[0]) else None for piece, stamps in pieces]
+
+    def prepare(self) -> None:
+        """Finds what all hypotheses need, before threads ask for it."""
+        _ = self.middle, self.readings
+
+    def _reads(self, factor: Factor) -> bool:
+        """Whether rows are channels of a sensor; of combinations of them, errors of channels are not known."""
+        sensors = self.problem.robot.sensors
+        return factor.name in sensors and set(factor.rows) <= set(sensors[factor.name].channels)
 
     def with_noise(self, noise: ProcessNoise) -> Segment:
         """The same with another process noise; only weights change."""
@@ -91,103 +91,98 @@ class Segment:
 
 @dataclass(frozen=True)
 class ScoreRows:
-    """Whitened rows of some factor samples: the residual and its derivatives.
+    """Rows of some factor samples: the residual and its derivatives, all whitened.
 
     Attributes:
         ticks: first state of each sample, shape (s,).
-        residual: shape (s, r).
-        by_state: shape (s, r, d) each.
-        by_block: derivative by the shared values, block by block.
+        weights: of the rows, one over their sigmas, shape (s, r).
+        linear: residual and derivatives before they are whitened.
         by_size: derivative by the sizes of the hypotheses, shape (s, r, k).
     """
 
     ticks: NDArray[np.intp]
-    residual: Array
-    by_state: tuple[Array, ...]
-    by_block: dict[str, Array]
+    weights: Array
+    linear: Linearization
     by_size: Array
+
+    @property
+    def residual(self) -> Array:
+        """Shape (s, r)."""
+        return self.linear.residual * self.weights
+
+    @property
+    def by_state(self) -> tuple[Array, ...]:
+        """Derivatives by the states of each sample, shape (s, r, d) each."""
+        return tuple(J * self.weights[:, :, None] for J in self.linear.by_state)
+
+    @property
+    def by_block(self) -> dict[str, Array]:
+        """Derivative by the shared values, block by block."""
+        return {block: J * self.weights[:, :, None] for block, J in self.linear.by_block.items()}
 
 
 def rows_of(segment: Segment, columns: Sequence[Column]) -> list[ScoreRows]:
     """All rows that a hypothesis may touch: dynamics and sensors."""
-    at_ticks, in_steps, reading = (
-        [i for i, c in enumerate(columns) if getattr(c, kind) is not None]
-        for kind in ("at_ticks", "in_steps", "reading")
+    every = range(len(segment.linearized))
+    return [rows for rows in (_rows(segment, i, columns) for i in every) if rows is not None]
+
+
+def rows_in_time(segment: Segment, columns: Sequence[Column]) -> Iterator[ScoreRows]:
+    """The same, pieces that begin earlier first; only one of them exists at a time."""
+    order = sorted(range(len(segment.linearized)), key=lambda i: _first_tick(segment.linearized[i][1]))
+    yield from (rows for rows in (_rows(segment, i, columns) for i in order) if rows is not None)
+
+
+def _first_tick(ticks: NDArray[np.intp]) -> int:
+    return int(ticks.min()) if len(ticks) else 0
+
+
+def _rows(segment: Segment, piece: int, columns: Sequence[Column]) -> ScoreRows | None:
+    """Rows of one linearised piece; None where no hypothesis touches it."""
+    factor, ticks, linear = segment.linearized[piece]
+    if factor.states == 0 or factor.name == "initial_state":
+        return None
+    by_size = np.zeros((*linear.residual.shape, len(columns)))
+    if isinstance(factor, DynamicsFactor):
+        _add_dynamics(segment, factor, ticks, linear, columns, by_size)
+    else:
+        reading, part = [i for i, c in enumerate(columns) if c.reading is not None], segment.readings[piece]
+        if not reading or part is None:
+            return None
+        for i in reading:
+            evaluate = columns[i].reading
+            assert evaluate is not None
+            by_size[:, :, i] = evaluate(part)
+    weights = 1.0 / np.broadcast_to(factor.sigmas, linear.residual.shape)
+    by_size *= weights[:, :, None]
+    return ScoreRows(ticks, weights, linear, by_size)
+
+
+def _add_dynamics(
+    segment: Segment,
+    factor: DynamicsFactor,
+    ticks: NDArray[np.intp],
+    linear: Linearization,
+    columns: Sequence[Column],
+    by_size: Array,
+) -> None:
+    """What hypotheses do to the defects of some steps, shape (s, rows, k)."""
+    at_ticks, in_steps = (
+        [i for i, c in enumerate(columns) if getattr(c, kind) is not None] for kind in ("at_ticks", "in_steps")
     )
-    stacked = _stacked([columns[i].at_ticks for i in at_ticks]), _stacked([columns[i].in_steps for i in in_steps])
-    between = _stacked([columns[i].between for i in at_ticks])
-    found = []
-    pieces = zip(segment.linearized, segment.whitened, segment.stamps, strict=True)
-    for (factor, ticks, linear), (r, J, by_block), stamps in pieces:
-        if factor.states == 0 or factor.name == "initial_state":
-            continue
-        if isinstance(factor, DynamicsFactor):
-            by_size = np.zeros((*r.shape, len(columns)))
-            if at_ticks:
-                ends = stacked[0][ticks], stacked[0][ticks + 1]
-                if segment.middle is not None and between.shape[2] == len(at_ticks):
-                    by_size[:, :, at_ticks] = _simpson(factor.steps, *ends, between[ticks], segment.middle[1][ticks])
-                else:
-                    by_size[:, :, at_ticks] = _defects(factor.steps, *ends)
-            for i, column in enumerate(columns):
-                if column.better_integrator:
-                    by_size[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
-            if in_steps:
-                by_size[:, :, in_steps] = _defects(factor.steps, stacked[1][ticks], stacked[1][ticks])
-        elif reading and _reads_channels(segment, factor):
-            part = _sensor_part(segment, factor, ticks, linear, stamps)
-            by_size = np.zeros((*r.shape, len(columns)))
-            for i in reading:
-                evaluate = columns[i].reading
-                assert evaluate is not None
-                by_size[:, :, i] = evaluate(part)
+    if at_ticks:
+        first, last = (_stacked([columns[i].at_ticks for i in at_ticks], ticks + end) for end in (0, 1))
+        between = _stacked([columns[i].between for i in at_ticks], ticks)
+        if segment.middle is not None and between.shape[2] == len(at_ticks):
+            by_size[:, :, at_ticks] = _simpson(factor.steps, first, last, between, segment.middle[1][ticks])
         else:
-            continue
-        by_size /= np.broadcast_to(factor.sigmas, r.shape)[:, :, None]
-        found.append(ScoreRows(ticks, r, J, by_block, by_size))
-    return found
-
-
-@dataclass(frozen=True)
-class HypothesisSystem:
-    """Reduced system of one segment on its shared values (p of them) and k sizes of hypotheses.
-
-    Attributes:
-        H: Hessian, shape (p + k, p + k).
-        g: gradient, shape (p + k,).
-        W: L^-1 B of the hypotheses, shape (m d, k).
-    """
-
-    H: Array
-    g: Array
-    W: Array
-
-
-def hypothesis_system(segment: Segment, rows: Sequence[ScoreRows], k: int) -> HypothesisSystem:
-    """Eliminates the states from the hypotheses' columns.
-
-    Args:
-        segment: the recording.
-        rows: as `rows_of` gives them.
-        k: number of columns.
-    """
-    base = segment.elimination
-    m, d, p = len(base.W) // base.d, base.d, base.W.shape[1]
-    # LAPACK wants column after column
-    B, C_pk, C_kk, g_k = np.zeros((k, m, d)).transpose(1, 2, 0), np.zeros((p, k)), np.zeros((k, k)), np.zeros(k)
-    columns = segment.calibration.columns
-    for part in rows:
-        flat = part.by_size.reshape(-1, k)
-        C_kk += flat.T @ flat
-        g_k += flat.T @ part.residual.ravel()
-        for block, J in part.by_block.items():
-            C_pk[columns[block]] += J.reshape(len(flat), J.shape[2]).T @ flat
-        for i, J in enumerate(part.by_state):
-            add_at(B, part.ticks + i, J.transpose(0, 2, 1) @ part.by_size)
-    W, info = lapack.dtbtrs(base.L, B.reshape(m * d, k), uplo="L", overwrite_b=1)
-    assert info == 0
-    H = np.block([[base.S, C_pk - base.W.T @ W], [(C_pk - base.W.T @ W).T, C_kk - W.T @ W]])
-    return HypothesisSystem(H, np.concatenate([base.s, g_k - W.T @ base.w]), W)
+            by_size[:, :, at_ticks] = _defects(factor.steps, first, last)
+    for i, column in enumerate(columns):
+        if column.better_integrator:
+            by_size[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
+    if in_steps:
+        held = _stacked([columns[i].in_steps for i in in_steps], ticks)
+        by_size[:, :, in_steps] = _defects(factor.steps, held, held)
 
 
 def _defects(steps: Steps, first: Array, last: Array) -> Array:
@@ -208,10 +203,11 @@ def _simpson(steps: Steps, first: Array, last: Array, middle: Array, by_rates: A
         middle: the same between.
         by_rates: derivative of all accelerations by the rates in the middle, shape (s, r, r).
     """
-    h = steps.h[:, None, None]
-    moved = middle + by_rates @ (h / 8.0 * (first - last))
-    d_q = -(h**2) / 12.0 * (first - last)[:, : len(steps.layout.positions)]
-    return steps.combine(-h / 6.0 * (first + 4.0 * moved + last), d_q)
+    from jointscope.graphs.kernels.score_kernel import simpson_columns  # as above
+
+    d_v, d_q = np.empty_like(first), np.empty((len(first), len(steps.layout.positions), first.shape[2]))
+    simpson_columns(steps.h, first, last, middle, np.ascontiguousarray(by_rates), d_v, d_q)
+    return steps.combine(d_v, d_q)
 
 
 def _what_simpson_adds(
@@ -223,14 +219,10 @@ def _what_simpson_adds(
     return simpson.residual((x[ticks], x[ticks + 1]), segment.calibration) - linear.residual
 
 
-def _stacked(parts: list[Array | None]) -> Array:
-    there = [part for part in parts if part is not None]
+def _stacked(parts: Sequence[Array | None], ticks: NDArray[np.intp]) -> Array:
+    """Some rows of columns side by side, shape (s, r, k)."""
+    there = [part[ticks] for part in parts if part is not None]
     return np.stack(there, axis=2) if there else np.zeros((0, 0, 0))
-
-
-def _reads_channels(segment: Segment, factor: Factor) -> bool:
-    """Whether rows are channels of a sensor, not combinations of them, of which errors of channels are not known."""
-    return set(factor.rows) <= set(segment.problem.robot.sensors[factor.name].channels)
 
 
 def _sensor_part(

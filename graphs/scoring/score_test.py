@@ -23,10 +23,13 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, HypothesisStep, JointScores, fit
+from jointscope.graphs.scoring.hypothesis_system import hypothesis_system
 from jointscope.graphs.scoring.score_columns import regressors_of
-from jointscope.graphs.scoring.score_system import ScoreRows, Segment, hypothesis_system, rows_of
+from jointscope.graphs.scoring.score_system import Segment, rows_in_time
+from jointscope.graphs.solving.banded_solver import Elimination
 from jointscope.graphs.solving.set_problem import owners
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -47,15 +50,22 @@ class ScoreTest:
         self._shared = SharedLayout.of([s.calibration for s in segments], owners([s.problem for s in segments]))
 
     @staticmethod
-    def of(problems: Sequence[BagProblem], states: Sequence[Array], calibrations: Sequence[Calibration]) -> ScoreTest:
+    def of(
+        problems: Sequence[BagProblem],
+        states: Sequence[Array],
+        calibrations: Sequence[Calibration],
+        eliminations: Sequence[Elimination] | None = None,
+    ) -> ScoreTest:
         """The test on whole recordings.
 
         Args:
             problems: their factors.
             states: their solution.
             calibrations: the values found, with the biases of each recording.
+            eliminations: of the states at that solution, where they are at hand.
         """
-        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, strict=True)])
+        known: Sequence[Elimination | None] = eliminations or [None] * len(problems)
+        return ScoreTest([Segment.of(*one) for one in zip(problems, states, calibrations, known, strict=True)])
 
     @property
     def seconds(self) -> float:
@@ -75,8 +85,10 @@ class ScoreTest:
     def each(self, hypotheses: Sequence[EffectHypothesis]) -> list[HypothesisScore]:
         """Scores one by one, in batches."""
         found: list[HypothesisScore] = []
-        for batch in _batches(hypotheses):
-            S, s, columns, _, _ = self._profiled(batch)
+        batches = _batches(hypotheses)
+        for segment in self._segments:
+            segment.prepare()
+        for batch, (S, s, columns, _, _) in zip(batches, side_by_side(self._profiled, batches), strict=True):
             found += [_score(hypothesis, S[c, c], s[c]) for hypothesis, c in zip(batch, columns, strict=True)]
         return found
 
@@ -125,11 +137,7 @@ class ScoreTest:
     def placebo(self, columns: Sequence[Array]) -> Array:
         """Scores of meaningless acceleration regressors, given per segment, shape (m + 1, r, k) each; shape (k,)."""
         k = columns[0].shape[2]
-        parts = [
-            rows_of(segment, [Column(at_ticks=c[:, :, i]) for i in range(k)])
-            for segment, c in zip(self._segments, columns, strict=True)
-        ]
-        H, g = self._assembled(parts, k)[:2]
+        H, g, _ = self._assembled([[Column(at_ticks=c[:, :, i]) for i in range(k)] for c in columns], k, keep=False)
         S, s, _ = self._profile(H, g, k)
         seen = np.diag(S)
         # a regressor of zeros, as the load of a rigid joint that carries no weight, explains nothing
@@ -138,25 +146,25 @@ class ScoreTest:
     def _profiled(
         self, hypotheses: Sequence[EffectHypothesis], with_blocks: bool = False
     ) -> tuple[Array, Array, list[slice], Array, tuple[Array, list[Array]]]:
-        parts, columns, k = [], [], 0
+        columns, k = [], 0
         for hypothesis in hypotheses:
             columns.append(slice(k, k + len(hypothesis.sizes)))
             k += len(hypothesis.sizes)
-        for segment in self._segments:
-            regressors = [column for hypothesis in hypotheses for column in regressors_of(hypothesis, segment)]
-            parts.append(rows_of(segment, regressors))
-        H, g, W = self._assembled(parts, k)
+        regressors = [[column for h in hypotheses for column in regressors_of(h, s)] for s in self._segments]
+        H, g, W = self._assembled(regressors, k, keep=with_blocks)
         S, s, response = self._profile(H, g, k)
         S = S + np.diag([1.0 / size.prior_sigma**2 for hypothesis in hypotheses for size in hypothesis.sizes])
-        blocks = self._blocks(parts, W, response, columns) if with_blocks else (np.zeros((0, k)), [])
+        blocks = self._blocks(regressors, W, response, columns) if with_blocks else (np.zeros((0, k)), [])
         return S, s, columns, response, blocks
 
-    def _assembled(self, parts: Sequence[Sequence[ScoreRows]], k: int) -> tuple[Array, Array, list[Array]]:
+    def _assembled(
+        self, regressors: Sequence[Sequence[Column]], k: int, keep: bool
+    ) -> tuple[Array, Array, list[Array]]:
         """Hessian and gradient on all shared values and the hypotheses, over all segments, with priors."""
         size, shared = self._shared.size, self._shared
         H, g, Ws = np.zeros((size + k, size + k)), np.zeros(size + k), []
-        for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
-            system = hypothesis_system(segment, rows, k)
+        for i, (segment, columns) in enumerate(zip(self._segments, regressors, strict=True)):
+            system = hypothesis_system(segment, rows_in_time(segment, columns), k, keep)
             index = np.concatenate([shared.indices(i), size + np.arange(k)])
             H[np.ix_(index, index)] += system.H
             g[index] += system.g
@@ -180,7 +188,7 @@ class ScoreTest:
 
     def _blocks(
         self,
-        parts: Sequence[Sequence[ScoreRows]],
+        regressors: Sequence[Sequence[Column]],
         Ws: Sequence[Array],
         response: Array,
         columns: Sequence[slice],
@@ -189,7 +197,7 @@ class ScoreTest:
         k = response.shape[1]
         scores = list[Array]()
         information: list[list[Array]] = [[] for _ in columns]
-        for i, (segment, rows) in enumerate(zip(self._segments, parts, strict=True)):
+        for i, (segment, own_columns) in enumerate(zip(self._segments, regressors, strict=True)):
             base, dp = segment.elimination, response[self._shared.indices(i)]
             dx = base.solve_transposed(-(Ws[i] + base.W @ dp)).reshape(-1, base.d, k)
             ticks = segment.problem.timeline.ticks
@@ -197,7 +205,7 @@ class ScoreTest:
             count, blocks = int(block[-1]) + 1, segment.calibration.columns
             total = np.zeros((count, k))
             own = [np.zeros((count, c.stop - c.start, c.stop - c.start)) for c in columns]
-            for part in rows:
+            for part in rows_in_time(segment, own_columns):
                 # residuals change with states and base parameters following along
                 moved = part.by_size + sum(J @ dp[blocks[b]] for b, J in part.by_block.items())
                 for j, J in enumerate(part.by_state):

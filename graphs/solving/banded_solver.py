@@ -10,15 +10,23 @@ and the states follow as dx = -L^-T (w + W dp). The cost is linear in the number
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import NormalEquations, build, parts_of
+from jointscope.graphs.solving.set_problem import Problem
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
+
+PART = 1000  # steps whose normal equations exist at once
 
 
 @dataclass(frozen=True)
@@ -95,11 +103,61 @@ def eliminate(system: NormalEquations, damping: float | Array = 0.0, first_tick:
     columns = np.zeros((m, d, 2 * d))
     scale = np.broadcast_to(1.0 + np.asarray(damping, dtype=float), m)
     D, E, scale = (np.ascontiguousarray(a, dtype=float) for a in (system.D, system.E, scale))
-    check_pivots(factorise(D, E, scale, columns, right), d, first_tick)
+    check_pivots(factorise(D, E, scale, 0, columns, right), d, first_tick)
     Ww = right.reshape(m * d, p + 1)
     square = Ww.T @ Ww
     S, s = system.C - square[:p, :p], system.g_p - square[:p, p]
     return Elimination(columns, Ww[:, :p], Ww[:, p], S, s, d)
+
+
+def eliminate_recording(problem: BagProblem, x: Array, calibration: Calibration) -> Elimination:
+    """As `eliminate` of the normal equations of a recording, which exist for some ticks at a time only.
+
+    Args:
+        problem: its factors.
+        x: states, shape (m, d).
+        calibration: shared values.
+
+    Raises:
+        SolveError: a state is not determined.
+    """
+    from jointscope.graphs.kernels.band_kernel import factorise  # as above
+
+    (m, d), p = x.shape, calibration.size
+    right, columns, square = np.empty((m, d, p + 1)), np.zeros((m, d, 2 * d)), np.zeros((p + 1, p + 1))
+    alone = replace(problem, placed=tuple(placed for placed in problem.placed if placed.factor.states == 0))
+    rest = build(replace(alone, dynamics=problem.dynamics.select(slice(0, 0))), x[:2], calibration)
+    C, g_p, before = rest.C, rest.g_p, None
+
+    def built(part: tuple[int, int, BagProblem]) -> tuple[int, int, NormalEquations]:
+        a, b, samples = part
+        return a, b, build(samples, x[a : b + 1], calibration)
+
+    for a, b, system in side_by_side(built, parts_of(problem, PART)):
+        C, g_p, end = C + system.C, g_p + system.g_p, b + int(b == m - 1)
+        if before is not None:  # the last state of a part is the first one of the next
+            for own, last in zip((system.D, system.B, system.g_x), before[:3], strict=True):
+                own[0] += last
+        E = system.E if before is None else np.concatenate([before[3], system.E])
+        ticks = slice(a, end)
+        right[ticks, :, :p], right[ticks, :, p] = system.B[: end - a], system.g_x[: end - a]
+        check_pivots(factorise(system.D[: end - a], E, np.ones(end - a), a, columns, right), d, 0)
+        part = right[ticks].reshape(-1, p + 1)
+        square += part.T @ part
+        before = system.D[-1], system.B[-1], system.g_x[-1], system.E[-1:]
+    Ww = right.reshape(m * d, p + 1)
+    return Elimination(columns, Ww[:, :p], Ww[:, p], C - square[:p, :p], g_p - square[:p, p], d)
+
+
+def eliminations_of(problems: Sequence[Problem], estimate: Estimate) -> list[Elimination]:
+    """The states of recordings of any kind eliminated, linearised where they are."""
+    found = []
+    for problem, x, calibration in zip(problems, estimate.states, estimate.calibrations, strict=True):
+        if isinstance(problem, BagProblem):
+            found.append(eliminate_recording(problem, x, calibration))
+        else:
+            found.append(eliminate(problem.linearize(x, calibration)))
+    return found
 
 
 def check_pivots(info: int, d: int, first_tick: int) -> None:

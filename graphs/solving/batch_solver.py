@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.convergence import (
     LAMBDA_FACTOR,
@@ -31,8 +31,7 @@ from jointscope.graphs.solving.convergence import (
 )
 from jointscope.graphs.solving.damped_step import LARGEST, damped_step, damping_of_states, shared_step
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.graphs.solving.set_problem import Problem, cost_of, linearized, owners, priors_of
+from jointscope.graphs.solving.set_problem import Problem, cost_of, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.graphs.solving.state_damping import StateDamping
 from jointscope.graphs.solving.stretch import Elsewhere
@@ -42,6 +41,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
+SMALLEST = 1e-12  # damping that is as good as none
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
 
@@ -53,7 +53,6 @@ class Solution:
         estimate: the minimum.
         cost: half the sum of squared whitened residuals.
         shared: layout of the shared values.
-        systems: normal equations of each recording at the estimate.
         iterations: history.
         converged: False if the iterations ended before the step became small.
         flat: the iterations ended because a model that contradicts its recording gained nothing any more.
@@ -62,7 +61,6 @@ class Solution:
     estimate: Estimate
     cost: float
     shared: SharedLayout
-    systems: list[NormalEquations]
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
@@ -132,12 +130,12 @@ def solve(
     graph.cost(descent.values)  # the stretches remember the point where they were evaluated last
     estimate = graph.estimate(descent.values)
     end = (descent.iterations, descent.converged, descent.flat)
-    return Solution(estimate, descent.cost, graph.shared, graph.systems(estimate), *end)
+    return Solution(estimate, descent.cost, graph.shared, *end)
 
 
 @dataclass
 class _Descent:
-    """The iterations of one solve; attributes as in `Solution`, `costs` by tick and the damping that they ask for."""
+    """The iterations of one solve; as in `Solution`, `costs` by tick, their damping, whether a step was rejected."""
 
     graph: CondensedGraph
     values: gtsam.Values
@@ -147,6 +145,7 @@ class _Descent:
     iterations: list[Iteration] = field(default_factory=list)
     converged: bool = False
     flat: bool = False
+    rejected: bool = False
 
     def run(self, most: int, tolerance: float, measured: int, progress: Progress | None, damping: float) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
@@ -156,11 +155,12 @@ class _Descent:
             accepted = self._lowered(damping, tolerance, measured)
             if accepted is None:
                 return
-            self.converged = has_converged(self.iterations, tolerance, measured, accepted <= LAMBDA_START)
+            undamped, smooth = accepted <= LAMBDA_START, not self.rejected
+            self.converged = has_converged(self.iterations, tolerance, measured, undamped, smooth)
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
-            damping = max(accepted / LAMBDA_FACTOR, 1e-12)
+            damping = _next(accepted)
             self.bends.relaxed()
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
 
@@ -168,11 +168,13 @@ class _Descent:
         """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
         while True:
             step = damped_step(self.graph, self.values, damping, self.bends.values)
+            self.graph.expect(damping_of_states(_next(damping)), self.bends.later)
             cost, costs = self.graph.cost(step.values), self.graph.costs
             if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
                 self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
                 self.values, self.cost, self.costs = step.values, cost, costs
                 return damping
+            self.rejected = True
             if self.bends.raised(self.costs, costs):
                 continue
             # a start says nothing yet about how well the model can fit
@@ -196,6 +198,11 @@ class _Descent:
         self.converged = True
 
 
+def _next(damping: float) -> float:
+    """Damping after a step that was accepted."""
+    return max(damping / LAMBDA_FACTOR, SMALLEST)
+
+
 @dataclass(frozen=True)
 class NewtonStep:
     """A Gauss-Newton step.
@@ -217,49 +224,41 @@ def newton_step(
     problems: Sequence[Problem],
     solution: Solution,
     hold: Sequence[str] = (),
-    damping: float = 0.0,
     eliminations: Sequence[Elimination] | None = None,
 ) -> NewtonStep:
-    """One step from the solution's normal equations, not checked against the cost.
+    """One step from a solution, not checked against the cost.
 
     Args:
         problems: factors of each recording.
-        solution: estimate with its normal equations.
+        solution: where it begins.
         hold: blocks that stay.
-        damping: Levenberg-Marquardt lambda, relative to the diagonal.
-        eliminations: of the solution's systems without damping, where they are there already.
+        eliminations: at the solution, where they are there already.
     """
-    shared = solution.shared
+    shared, estimate = solution.shared, solution.estimate
     free = free_indices(shared, hold)
     if eliminations is None:
-        eliminations = [eliminate(system, damping_of_states(damping)) for system in solution.systems]
+        eliminations = eliminations_of(problems, estimate)
     H, g = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
-    dp, in_sigmas = shared_step(H, g, free, damping, shared, solution.estimate.calibrations[0])
+    dp, in_sigmas = shared_step(H, g, free, 0.0, shared, solution.estimate.calibrations[0])
     dx = [e.states(dp[shared.indices(b)]) for b, e in enumerate(eliminations)]
     return NewtonStep(solution.estimate.moved(dx, dp, shared), in_sigmas, dx, dp)
 
 
 def first_step(problems: Sequence[Problem], estimate: Estimate, hold: Sequence[str] = ()) -> Estimate | None:
     """Where one hardly damped step leads; None where the cost does not fall."""
-    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    systems = [linearized(problem, x, calibration) for problem, x, calibration in bags]
-    here = Solution(estimate, float("nan"), SharedLayout.of(estimate.calibrations, owners(problems)), systems)
-    there = newton_step(problems, here, hold, LAMBDA_START).estimate
-    return there if total_cost(problems, there) < cost_at(problems, here) else None
+    graph, values = CondensedGraph.of(problems, estimate, hold)
+    begin, step = graph.cost(values), damped_step(graph, values, LAMBDA_START)
+    return graph.estimate(step.values) if graph.cost(step.values) < begin else None
 
 
 def total_cost(problems: Sequence[Problem], estimate: Estimate) -> float:
     """Cost of all recordings and of the priors they share."""
     bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
-    return sum(cost_of(*bag) for bag in bags) + _prior_cost(problems, estimate.calibrations)
+    return sum(cost_of(*bag) for bag in bags) + prior_cost(problems, estimate.calibrations)
 
 
-def cost_at(problems: Sequence[Problem], solution: Solution) -> float:
-    """As `total_cost`, where the solution's systems know what the recordings cost."""
-    return sum(system.cost for system in solution.systems) + _prior_cost(problems, solution.estimate.calibrations)
-
-
-def _prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:
+def prior_cost(problems: Sequence[Problem], calibrations: Sequence[Calibration]) -> float:
+    """Cost of what recordings share."""
     residuals = ((p.residual((), calibrations[i]) / p.sigmas) for p, i in priors_of(problems, calibrations))
     return 0.5 * sum(float(np.sum(r**2)) for r in residuals)
 

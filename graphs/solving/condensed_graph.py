@@ -11,7 +11,7 @@ Every condensed factor touches the shared blocks, too; P are priors and biases, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import gtsam
@@ -29,9 +29,9 @@ from jointscope.factors.single import (
 )
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.normal_equations import NormalEquations, build
 from jointscope.graphs.solving.set_problem import Problem, motions, owners, priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.graphs.solving.stretch import Elsewhere, GraphStretch, Place, cut
 from jointscope.graphs.solving.whole_set import WholeSet
 
@@ -116,12 +116,21 @@ class CondensedGraph:
         """Half the sum of squared whitened residuals, priors of held blocks included."""
         if self.elsewhere:
             self.elsewhere.visit(self._places(values))
+        else:
+            self._visit_side_by_side(values)
         return float(self.graph.error(values)) + self.held_cost
 
     @property
     def costs(self) -> list[Array]:
         """Cost of each tick of each piece where it was evaluated last, shape (m,)."""
         return [_overlapped([stretch.costs for stretch in cuts]) for cuts in self.stretches]
+
+    def expect(self, damping: float, bends: Sequence[Array]) -> None:
+        """Says how states will be damped where the next point is accepted; arguments as of `linearized`."""
+        for piece, cuts in enumerate(self.stretches):
+            if isinstance(self.problems[piece], BagProblem):
+                for stretch in cuts:
+                    stretch.damp(damping, bends[piece])
 
     def linearized(
         self, values: gtsam.Values, damping: float = 0.0, bends: Sequence[Array] = ()
@@ -138,7 +147,24 @@ class CondensedGraph:
                 stretch.damp(damping, bends[piece] if len(bends) else None)
         if self.elsewhere:
             self.elsewhere.linearise(self._places(values), damping, bends)
+        else:
+            self._visit_side_by_side(values, settle=True)
         return self.graph.linearize(values)
+
+    def _visit_side_by_side(self, values: gtsam.Values, settle: bool = False) -> None:
+        """Brings all stretches where GTSAM will ask for them, one after the other; they remember what they found."""
+
+        def visit(task: tuple[GraphStretch, tuple[Array, ...], Calibration]) -> None:
+            stretch, ends, calibration = task
+            stretch.visit(ends, calibration)
+            if settle:
+                stretch.settle()
+
+        motions = [cuts for cuts, p in zip(self.stretches, self.problems, strict=True) if isinstance(p, BagProblem)]
+        places = zip(motions, self._places(values), strict=True)
+        tasks = [(s, ends, at.calibration) for cuts, at in places for s, ends in zip(cuts, at.ends, strict=True)]
+        for _ in side_by_side(visit, tasks):
+            pass
 
     def _places(self, values: gtsam.Values) -> list[Place]:
         """Where each recording of motion is, at some values."""
@@ -197,21 +223,6 @@ class CondensedGraph:
         )
         return Estimate(states, calibrations)
 
-    def systems(self, estimate: Estimate) -> list[NormalEquations]:
-        """Normal equations of each piece where it was evaluated last, the states between stretches included."""
-        found = []
-        for problem, cuts, x, calibration in zip(
-            self.problems, self.stretches, estimate.states, estimate.calibrations, strict=True
-        ):
-            if not isinstance(problem, BagProblem):
-                found.append(cuts[0].system)
-                continue
-            alone = replace(problem, placed=tuple(p for p in problem.placed if p.factor.states == 0))
-            system = _joined([stretch.system for stretch in cuts])
-            _add_shared(system, alone, x[:2], calibration)
-            found.append(system)
-        return found
-
 
 def _between(cuts: Sequence[GraphStretch]) -> list[int]:
     """Ticks at the ends of stretches."""
@@ -240,16 +251,6 @@ def _add_rows_without_states(
     return held
 
 
-def _joined(parts: Sequence[NormalEquations]) -> NormalEquations:
-    """Systems of stretches side by side as one chain."""
-    if len(parts) == 1:
-        return replace(parts[0], C=parts[0].C.copy(), g_p=parts[0].g_p.copy())
-    D, B, g, costs = (_overlapped([getattr(part, name) for part in parts]) for name in ("D", "B", "g_x", "costs"))
-    E = np.concatenate([part.E for part in parts])
-    C, g_p = sum(part.C for part in parts), sum(part.g_p for part in parts)
-    return NormalEquations(D, E, B, np.asarray(C), g, np.asarray(g_p), sum(part.cost for part in parts), costs)
-
-
 def _overlapped(parts: Sequence[Array]) -> Array:
     """Arrays one after the other; the last entry of each is the first one of the next."""
     joined = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
@@ -258,12 +259,3 @@ def _overlapped(parts: Sequence[Array]) -> Array:
         place += len(before) - 1
         joined[place] = before[-1] + after[0]
     return joined
-
-
-def _add_shared(system: NormalEquations, alone: BagProblem, x: Array, calibration: Calibration) -> None:
-    """Adds the factors of a piece that touch no state."""
-    none = replace(alone, dynamics=alone.dynamics.select(slice(0, 0)))
-    rest = build(none, x, calibration)
-    system.C += rest.C
-    system.g_p += rest.g_p
-    system.cost += rest.cost

@@ -16,6 +16,7 @@ from jointscope.graphs.solving.set_problem import Problem, motions
 
 SLOW = 5.0  # [step tolerance] distance that may remain where steps shrink slowly, along directions nearly free
 SMALL_FALL = 1e-3  # relative fall of the cost at which a short step has arrived
+SURE, SHRINKS = 0.1, 0.5  # [short step], [step before] steps after which only states move
 COST_TOLERANCE = 1e-10  # relative fall of the cost that is rounding
 CONTRADICTS = 2.0  # [sigma] root mean square residual from which a model contradicts its recording
 FLAT, FLAT_STEPS = 1e-5, 3  # relative fall of such a model's cost, so many times in a row, that ends the search
@@ -55,7 +56,9 @@ def short_step(cost: float, tolerance: float, measured: int) -> float:
     return tolerance * misfit(cost, measured)
 
 
-def has_converged(iterations: Sequence[Iteration], tolerance: float, measured: int, undamped: bool) -> bool:
+def has_converged(
+    iterations: Sequence[Iteration], tolerance: float, measured: int, undamped: bool, smooth: bool = False
+) -> bool:
     """Whether the last step was short enough and the next ones will be shorter.
 
     Args:
@@ -63,11 +66,13 @@ def has_converged(iterations: Sequence[Iteration], tolerance: float, measured: i
         tolerance: step [sigma] that is short enough.
         measured: number of measured values.
         undamped: whether the last step was an undamped one.
+        smooth: whether no step was rejected: the cost has no kinks here, and steps shrink quadratically.
     """
     last = iterations[-1]
     enough = short_step(last.cost_after, tolerance, measured)
     arrived = last.step_in_sigmas < enough and _remaining(iterations) < SLOW * enough
-    return (arrived and last.fall < SMALL_FALL) or (last.fall < COST_TOLERANCE and undamped)
+    done = last.fall < SMALL_FALL or (smooth and _only_states_move(iterations, enough))
+    return (arrived and done) or (last.fall < COST_TOLERANCE and undamped)
 
 
 def is_flat(iterations: Sequence[Iteration], measured: int) -> bool:
@@ -100,3 +105,12 @@ def _remaining(iterations: Sequence[Iteration]) -> float:
         return last
     ratio = min(last / max(iterations[-2].step_in_sigmas, 1e-300), 0.97)
     return last * ratio / (1.0 - ratio)
+
+
+def _only_states_move(iterations: Sequence[Iteration], enough: float) -> bool:
+    """Whether the last step moved the shared values by next to nothing, and the cost will fall by as little."""
+    if len(iterations) < 2:
+        return False
+    before, last = iterations[-2:]
+    falls = last.fall * last.fall / max(before.fall, 1e-300)  # the next one, if they go on shrinking like that
+    return falls < SMALL_FALL and 0.0 < last.step_in_sigmas < min(SURE * enough, SHRINKS * before.step_in_sigmas)

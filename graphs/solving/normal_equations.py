@@ -10,7 +10,8 @@ States form a chain, so the Hessian is block tridiagonal with a border for the s
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor, Linearization
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import Placed
+from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -73,7 +75,13 @@ class NormalEquations:
         )
 
 
-def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool = False) -> NormalEquations:
+def build(
+    problem: BagProblem,
+    x: Array,
+    calibration: Calibration,
+    split: bool = False,
+    into: NormalEquations | None = None,
+) -> NormalEquations:
     """Linearises all factors of a recording.
 
     Args:
@@ -81,8 +89,9 @@ def build(problem: BagProblem, x: Array, calibration: Calibration, split: bool =
         x: states, shape (m, 4n).
         calibration: shared values, with the biases of this recording.
         split: keep apart what reaches on to the next state, as a filter needs it.
+        into: an empty system that takes them, if there is memory already.
     """
-    return accumulate(linearize_all(problem, x, calibration), x, calibration, split)
+    return accumulate(linearize_all(problem, x, calibration), x, calibration, split, into=into)
 
 
 def accumulate(
@@ -91,6 +100,7 @@ def accumulate(
     calibration: Calibration,
     split: bool = False,
     with_shared: bool = True,
+    into: NormalEquations | None = None,
 ) -> NormalEquations:
     """Sums linearised factors; arguments as in `build`.
 
@@ -98,7 +108,7 @@ def accumulate(
     """
     columns = calibration.columns
     p = calibration.size if with_shared else 0
-    system = NormalEquations.zeros(len(x), x.shape[1], p, split)
+    system = into or NormalEquations.zeros(len(x), x.shape[1], p, split)
     for factor, ticks, linear in linearized:
         _accumulate(system, factor, ticks, linear, columns)
     return system
@@ -109,13 +119,36 @@ def linearize_all(
 ) -> Iterator[Linearized]:
     """All factors chunk by chunk: factor, first tick of each sample, linearization."""
     m = len(problem.dynamics)
-    for start in range(0, m, CHUNK):
+
+    def steps(start: int) -> Linearized:
         stop = min(start + CHUNK, m)
         part = problem.dynamics.select(slice(start, stop))
-        yield part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
-    for placed in () if dynamics_only else problem.placed:
-        for factor, ticks in chunks(placed):
-            yield factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
+        return part, np.arange(start, stop), part.linearize_chain(x[start : stop + 1], calibration)
+
+    def samples(piece: tuple[Factor, NDArray[np.intp]]) -> Linearized:
+        factor, ticks = piece
+        return factor, ticks, factor.linearize(states_of(factor, ticks, x), calibration)
+
+    threads = 0 if m > CHUNK else 1  # handing over takes longer than what is short
+    yield from side_by_side(steps, range(0, m, CHUNK), threads)
+    if not dynamics_only:
+        yield from side_by_side(samples, (piece for placed in problem.placed for piece in chunks(placed)), threads)
+
+
+def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
+    """First and last tick of each stretch, and its factors; side by side, of about `length` steps each."""
+    steps = len(problem.dynamics)
+    edges = np.linspace(0, steps, max(round(steps / length), 1) + 1).round().astype(int)
+    for a, b in pairwise(edges.tolist()):
+        placed = []
+        for p in problem.placed:
+            if p.factor.states == 0:
+                continue
+            inside = (p.ticks >= a) & ((p.ticks < b) | (b == steps))
+            chosen = np.flatnonzero(inside)
+            if len(chosen):
+                placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
+        yield a, b, replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))
 
 
 def cost(problem: BagProblem, x: Array, calibration: Calibration) -> float:

@@ -21,13 +21,38 @@ from scipy.linalg import cho_factor, cho_solve
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.factor import Factor
-from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution, free_indices, reduced_system
-from jointscope.graphs.solving.normal_equations import Linearized, whitened
+from jointscope.graphs.solving.normal_equations import CHUNK, Linearized, whitened
 from jointscope.graphs.solving.set_problem import Problem
+from jointscope.graphs.solving.solver_context import side_by_side
 from jointscope.graphs.solving.unobservable import unobservable
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StateSpread:
+    """Variances of one recording's states.
+
+    Attributes:
+        given_shared: of each state for known shared values, shape (m, d).
+        response: X = A^-1 B, change of each state against the shared values, shape (m, d, p).
+        shared: covariance of this recording's shared values, shape (p, p).
+    """
+
+    given_shared: Array
+    response: Array
+    shared: Array
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviation of every state component, shape (m, d)."""
+        found = self.given_shared.copy()
+        for start in range(0, len(found), CHUNK):
+            X = self.response[start : start + CHUNK]
+            found[start : start + CHUNK] += np.sum((X @ self.shared) * X, axis=2)
+        return np.sqrt(found)
 
 
 @dataclass(frozen=True)
@@ -53,15 +78,26 @@ class StatePosterior:
 
         m, d, _ = elimination.columns.shape
         P, neighbours = np.empty((m, d, d)), np.empty((max(m - 1, 0), d, d))
-        selected_inverse(elimination.columns, P, neighbours)
-        X = elimination.solve_transposed(elimination.W).reshape(m, d, elimination.W.shape[1])
+
+        def inverse() -> Array:
+            selected_inverse(elimination.columns, P, neighbours)
+            return P
+
+        def response() -> Array:
+            return elimination.solve_transposed(elimination.W).reshape(m, d, elimination.W.shape[1])
+
+        _, X = side_by_side(lambda task: task(), (inverse, response), threads=0 if m > CHUNK else 1)
         return StatePosterior(P, neighbours, X, shared)
+
+    @property
+    def spread(self) -> StateSpread:
+        """What is left of it where only standard deviations are wanted."""
+        return StateSpread(np.einsum("kii->ki", self.given_shared).copy(), self.response, self.shared)
 
     @property
     def sigmas(self) -> Array:
         """Standard deviation of every state component, shape (m, d)."""
-        widened = np.einsum("kip,pq,kiq->ki", self.response, self.shared, self.response, optimize=True)
-        return np.sqrt(np.einsum("kii->ki", self.given_shared) + widened)
+        return self.spread.sigmas
 
     def covariance(self, tick: int) -> Array:
         """Full covariance of one state, shape (d, d)."""
@@ -88,7 +124,7 @@ def posteriors(
     """
     shared = solution.shared
     if eliminations is None:
-        eliminations = [eliminate(system) for system in solution.systems]
+        eliminations = eliminations_of(problems, solution.estimate)
     H, _ = reduced_system(problems, eliminations, shared, solution.estimate.calibrations)
     free = free_indices(shared, hold)
     covariance = np.zeros_like(H)
@@ -96,11 +132,12 @@ def posteriors(
         covariance[np.ix_(free, free)] = cho_solve(cho_factor(H[np.ix_(free, free)]), np.eye(len(free)))
     except np.linalg.LinAlgError as err:
         raise unobservable(H, free, shared, solution.estimate.calibrations[0]) from err
-    found = []
-    for i, elimination in enumerate(eliminations):
+
+    def posterior(i: int) -> StatePosterior:
         index = shared.indices(i)
-        found.append(StatePosterior.of(elimination, covariance[np.ix_(index, index)]))
-    return found, covariance
+        return StatePosterior.of(eliminations[i], covariance[np.ix_(index, index)])
+
+    return list(side_by_side(posterior, range(len(eliminations)))), covariance
 
 
 @dataclass(frozen=True)
@@ -136,7 +173,9 @@ def residual_parts(
 
     columns = calibration.columns
     p = posterior.shared.shape[0]
-    for factor, ticks, linear in linearized:
+
+    def part(piece: Linearized) -> ResidualPart:
+        factor, ticks, linear = piece
         r, J, by_block = whitened(factor, linear)
         by_shared, leverage = np.zeros((*r.shape, p)), np.zeros(r.shape)
         for block, J_block in by_block.items():
@@ -145,4 +184,7 @@ def residual_parts(
         sides = (np.ascontiguousarray(J_i) for J_i in (*J, none, none)[:2])
         known = (posterior.given_shared, posterior.neighbours, posterior.response, posterior.shared)
         absorb(*sides, np.asarray(ticks, dtype=np.intp), *map(np.ascontiguousarray, known), by_shared, leverage)
-        yield ResidualPart(factor, ticks, r, leverage, by_shared)
+        return ResidualPart(factor, ticks, r, leverage, by_shared)
+
+    threads = 0 if len(posterior.given_shared) > CHUNK else 1  # handing over takes longer than what is short
+    yield from side_by_side(part, linearized, threads)

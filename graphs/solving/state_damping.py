@@ -73,9 +73,11 @@ class StateDamping:
             values[here] = np.maximum(FACTOR * values[here], FIRST)
         return True
 
+    @property
+    def later(self) -> list[Array]:
+        """What it will be after a step that is accepted."""
+        return [np.where(values / FACTOR < FIRST / FACTOR, 0.0, values / FACTOR) for values in self.values]
+
     def relaxed(self) -> None:
         """Lowers it after a step that was accepted."""
-        self.tries = 0
-        for values in self.values:
-            values /= FACTOR
-            values[values < FIRST / FACTOR] = 0.0
+        self.tries, self.values = 0, self.later

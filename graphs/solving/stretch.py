@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -13,33 +12,13 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.inner_states import InnerStates
-from jointscope.graphs.solving.normal_equations import NormalEquations, build
+from jointscope.graphs.solving.inner_states import LinearisedStretch
+from jointscope.graphs.solving.normal_equations import parts_of
+from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
-
-@dataclass
-class Point:
-    """Where a stretch was evaluated.
-
-    Attributes:
-        x: all its states, shape (m, d).
-        calibration: shared values.
-        system: normal equations there, all blocks included.
-    """
-
-    x: Array
-    calibration: Calibration
-    system: NormalEquations
-
-    def is_at(self, first: Array, last: Array, calibration: Calibration) -> bool:
-        """Whether that is the same place, to the last digit."""
-        return (
-            np.array_equal(self.x[0], first)
-            and np.array_equal(self.x[-1], last)
-            and self.calibration.is_at(calibration)
-        )
+LONG = 20_000  # states of a recording from which memory is what is scarce
 
 
 @dataclass(frozen=True)
@@ -64,10 +43,6 @@ class GraphStretch(Protocol):
     @property
     def states(self) -> Array:
         """All states at the last evaluated point, shape (m, d)."""
-
-    @property
-    def system(self) -> NormalEquations:
-        """Normal equations at the last evaluated point."""
 
     @property
     def costs(self) -> Array:
@@ -107,27 +82,40 @@ class Elsewhere(Protocol):
 class RecordingStretch:
     """Samples of one recording between two ticks.
 
+    Inner states follow from where the stretch was linearised last; after that this linearisation is not needed unless
+    the step is rejected. So a trial may take its memory until a first one is rejected, from when on both are kept.
+
     Args:
         problem: the factors of these samples alone, ticks counted from the first.
         x: states to begin with, shape (m, d), m >= 2.
         calibration: shared values to begin with.
         start: tick of the first state in its recording.
         blocks: names of the blocks that may change.
+        keeps_both: whether both are kept from the beginning: short recordings have room for what they may need again.
 
     Attributes:
         damping: Levenberg-Marquardt lambda of each state, relative to the diagonal, shape (m,).
     """
 
-    def __init__(self, problem: BagProblem, x: Array, calibration: Calibration, start: int, blocks: Sequence[str]):
+    def __init__(
+        self,
+        problem: BagProblem,
+        x: Array,
+        calibration: Calibration,
+        start: int,
+        blocks: Sequence[str],
+        keeps_both: bool = True,
+    ):
         self.problem, self._start = problem, start
         self.damping = np.zeros(len(x))
-        self._d = x.shape[1]
         own = calibration.columns
-        self._kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
-        self._columns, self._size = rim_columns(self._d, calibration, blocks)
-        self._base = self._trial = self._evaluated(x.copy(), calibration)
-        self._inner: InnerStates | None = None
-        self._eliminated_with = self.damping
+        kept = np.concatenate([np.arange(own[b].start, own[b].stop) for b in blocks] or [np.zeros(0, int)])
+        self._columns, self._size = rim_columns(x.shape[1], calibration, blocks)
+        self._keeps_both = keeps_both
+        self._sizes = problem, kept, start, len(x), x.shape[1], calibration.size
+        self._kept = [self._room()]
+        self._base = self._trial = self._kept[0].move(x.copy(), calibration, self.damping)
+        self._damped_with = self.damping
 
     @property
     def ticks(self) -> tuple[int, ...]:
@@ -145,14 +133,9 @@ class RecordingStretch:
         return self._trial.x
 
     @property
-    def system(self) -> NormalEquations:
-        """Normal equations at the last evaluated point."""
-        return self._trial.system
-
-    @property
     def costs(self) -> Array:
         """Cost of each tick there, shape (m,)."""
-        return self._trial.system.costs
+        return self._trial.costs
 
     def columns(self, block: str) -> slice:
         """Columns of a free block."""
@@ -170,35 +153,49 @@ class RecordingStretch:
         if self._base.is_at(first, last, calibration):
             self._trial = self._base
         elif not self._trial.is_at(first, last, calibration):
-            self._trial = self._evaluated(self._following(first, last, calibration), calibration)
-        return self._trial.system.cost
+            self._trial = self._base
+            x = self._following(first, last, calibration)
+            self._trial = self._free_room().move(x, calibration, self.damping)
+        return self._trial.cost
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
-        same = self._inner is not None and np.array_equal(self._eliminated_with, self.damping)
-        if self._base is not self._trial or not same:
-            self._base, self._inner = self._trial, None
-        found = self._eliminated()
-        return found.H, found.g, self._base.system.cost - found.gain
+        self._base, self._damped_with = self._trial, self.damping
+        found = self._linearised().inner
+        return found.H, found.g, self._base.cost - found.gain
 
-    def _evaluated(self, x: Array, calibration: Calibration) -> Point:
-        return Point(x, calibration, build(self.problem, x, calibration))
+    def _linearised(self) -> LinearisedStretch:
+        """The linearisation at the base, made anew where a trial has taken its memory."""
+        own = next((found for found in self._kept if found.point is self._base), None)
+        if own is not None and own.is_damped(self._damped_with):
+            return own
+        if own is None and not self._keeps_both:  # a step was rejected
+            self._keeps_both = True
+            self._kept = [self._room()]
+        room = own or self._free_room()
+        self._base = self._trial = room.move(self._base.x, self._base.calibration, self._damped_with)
+        return room
 
-    def _eliminated(self) -> InnerStates:
-        if self._inner is None:
-            self._inner = InnerStates.of(self._base.system, self._kept, self.damping, self._start)
-            self._eliminated_with = self.damping
-        return self._inner
+    def _room(self) -> LinearisedStretch:
+        return LinearisedStretch(*self._sizes, whole=self._keeps_both)
+
+    def _free_room(self) -> LinearisedStretch:
+        """Memory for another linearisation."""
+        free = [found for found in self._kept if found.point is not self._base]
+        if not free and self._keeps_both:
+            free = [self._room()]
+            self._kept += free
+        return (free or self._kept)[0]
 
     def _following(self, first: Array, last: Array, calibration: Calibration) -> Array:
         """All states, the inner ones where the last linearisation puts them for new ends and shared values."""
-        base = self._base
+        inner, base = self._linearised().inner, self._base
         x = base.x.copy()
         x[0], x[-1] = first, last
         change = np.zeros(base.calibration.size)
         for block in self._columns:
             change[base.calibration.columns[block]] = base.calibration.local(calibration, block)
-        x[1:-1] += self._eliminated().states(base.system, first - base.x[0], last - base.x[-1], change)
+        x[1:-1] += inner.states(first - base.x[0], last - base.x[-1], change)
         return x
 
 
@@ -223,21 +220,9 @@ def cut(
         length: steps in one stretch.
         blocks: names of the blocks that may change.
     """
-    for a, b, part in parts_of(problem, length):
-        yield RecordingStretch(part, x[a : b + 1], calibration, a, blocks)
 
+    def stretch(part: tuple[int, int, BagProblem]) -> RecordingStretch:
+        a, b, samples = part
+        return RecordingStretch(samples, x[a : b + 1], calibration, a, blocks, keeps_both=len(x) < LONG)
 
-def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagProblem]]:
-    """First and last tick of each stretch, and its factors; arguments as of `cut`."""
-    steps = len(problem.dynamics)
-    edges = np.linspace(0, steps, max(round(steps / length), 1) + 1).round().astype(int)
-    for a, b in pairwise(edges.tolist()):
-        placed = []
-        for p in problem.placed:
-            if p.factor.states == 0:
-                continue
-            inside = (p.ticks >= a) & ((p.ticks < b) | (b == steps))
-            chosen = np.flatnonzero(inside)
-            if len(chosen):
-                placed.append(replace(p, factor=p.factor.select(chosen), ticks=p.ticks[chosen] - a))
-        yield a, b, replace(problem, dynamics=problem.dynamics.select(slice(a, b)), placed=tuple(placed))
+    return side_by_side(stretch, parts_of(problem, length))

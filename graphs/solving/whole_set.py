@@ -4,21 +4,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.solving.banded_solver import Elimination, eliminate
+from jointscope.graphs.solving.inner_states import Point
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.set_problem import SetProblem
-from jointscope.graphs.solving.stretch import Point
 
 Array = NDArray[np.float64]
 
 MOST_STEPS = 10  # of the states alone
 ARRIVED = 1e-12  # fall of the cost, relative or in absolute terms, that is rounding
+
+
+@dataclass
+class SetPoint(Point):
+    """The same with the normal equations there."""
+
+    system: NormalEquations
 
 
 class WholeSet:
@@ -64,7 +71,7 @@ class WholeSet:
     @property
     def costs(self) -> Array:
         """Cost of each state there, shape (m,)."""
-        return self._trial.system.costs
+        return self._trial.costs
 
     def columns(self, block: str) -> slice:
         """Columns of a free block."""
@@ -84,16 +91,16 @@ class WholeSet:
             step = [base.calibration.local(calibration, block) for block in self._free.blocks]
             x = base.x + self._eliminated().states(np.concatenate([*step, np.zeros(0)]))
             self._trial = self._settled(x, calibration)
-        return self._trial.system.cost
+        return self._trial.cost
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
         if self._base is not self._trial:
             self._base, self._elimination = self._trial, None
         found = self._eliminated()
-        return found.S, found.s, self._base.system.cost - 0.5 * float(found.w @ found.w)
+        return found.S, found.s, self._base.cost - 0.5 * float(found.w @ found.w)
 
-    def _settled(self, x: Array, calibration: Calibration) -> Point:
+    def _settled(self, x: Array, calibration: Calibration) -> SetPoint:
         """The point to which the states go for given shared values, by Newton steps of the states alone.
 
         They cost little, and equations of rest bind states so tightly that linear steps of both would have to be short.
@@ -107,7 +114,7 @@ class WholeSet:
             if not there.cost < system.cost:
                 break
             x, system = x + step, there
-        return Point(x.copy(), calibration, system)
+        return SetPoint(x.copy(), calibration, system.cost, system.costs, system)
 
     def _eliminated(self) -> Elimination:
         if self._elimination is None:

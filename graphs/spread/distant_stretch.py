@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.normal_equations import NormalEquations, build
 from jointscope.graphs.solving.stretch import rim_columns
 
 Array = NDArray[np.float64]
@@ -20,7 +18,6 @@ class DistantStretch:
     """Takes the place of a `RecordingStretch`.
 
     Args:
-        problem: its factors.
         ticks: first and last tick in the recording.
         d: size of a state.
         calibration: any of the recording.
@@ -34,20 +31,12 @@ class DistantStretch:
         calibration: shared values there.
     """
 
-    def __init__(
-        self, problem: BagProblem, ticks: tuple[int, int], d: int, calibration: Calibration, blocks: Sequence[str]
-    ):
+    def __init__(self, ticks: tuple[int, int], d: int, calibration: Calibration, blocks: Sequence[str]):
         self.ticks, self.calibration = ticks, calibration
-        self._problem = problem
         self._columns, self.size = rim_columns(d, calibration, blocks)
         self.cost, self.costs = 0.0, np.zeros(ticks[1] - ticks[0] + 1)
         self.rim = (np.zeros((0, 0)), np.zeros(0), 0.0)
         self.states = np.zeros((0, d))
-
-    @property
-    def system(self) -> NormalEquations:
-        """Normal equations at the end, built here: they are far larger than what they follow from."""
-        return build(self._problem, self.states, self.calibration)
 
     def columns(self, block: str) -> slice:
         """Columns of a free block."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from jointscope.graphs.solving.stretch import Place, parts_of
+from jointscope.graphs.solving.normal_equations import parts_of
+from jointscope.graphs.solving.stretch import Place
 from jointscope.graphs.spread.distant_stretch import DistantStretch
 from jointscope.graphs.spread.kept_recording import (
     Beginning,
@@ -42,7 +43,7 @@ class SpreadRecording:
         self._told = False
         d, calibration, blocks = beginning.x.shape[1], beginning.calibration, beginning.blocks
         parts = parts_of(beginning.problem, beginning.length)
-        self.stretches = tuple(DistantStretch(part, (a, b), d, calibration, blocks) for a, b, part in parts)
+        self.stretches = tuple(DistantStretch((a, b), d, calibration, blocks) for a, b, _ in parts)
 
     def ask(self, question: Question) -> None:
         """Asks; the worker begins."""

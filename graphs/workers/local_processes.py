@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from jointscope.graphs.solving.solver_context import work_alone
 from jointscope.graphs.workers.crew import WorkerLost
 
 MEMORY_LINE = "MemAvailable:"
@@ -90,8 +91,9 @@ class _Pending:
 
 
 def made_ready(effect_files: Sequence[Path]) -> None:
-    """Prepares a process: it knows the user's effects, and Ctrl-C is for the one that asked."""
+    """Prepares a process: it knows the user's effects, is one of many, and Ctrl-C is for the one that asked."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    work_alone()
     from jointscope.robots.files.effect_catalogue import add_user_effects
 
     for file in effect_files:

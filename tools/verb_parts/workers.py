@@ -33,7 +33,8 @@ def workers_of(args: argparse.Namespace) -> Iterator[SideBySide]:
     Raises:
         ClusterError: the cluster cannot be used.
     """
-    from jointscope.graphs.discovery.side_by_side import SideBySide, available_cores
+    from jointscope.graphs.discovery.side_by_side import SideBySide
+    from jointscope.graphs.solving.solver_context import available_cores
 
     if args.scheduler is None:
         with SideBySide(args.workers or available_cores(), args.effects) as workers:

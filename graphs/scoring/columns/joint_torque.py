@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -80,14 +79,11 @@ def signals_with_memory(effect: JointTorque, signals: JointSignals, p: dict[str,
     Each step takes dz/dt = f(z) as f(z_k) + f'(z_k) (z - z_k) and solves that exactly; for rates that are linear in z
     between kinks of the motion nothing else is needed.
     """
+    from jointscope.graphs.kernels.implicit_steps import implicit_steps  # numba takes half a second to import
+
     assert effect.memory is not None
     rate, h = effect.memory.rate, np.diff(ticks)
     at = [np.broadcast_to(np.real(rate(replace(signals, memory=z), p)), ticks.shape) for z in (0.0, 1.0, -1.0)]
     constant, slope, bend = at[0], 0.5 * (at[1] - at[2]), 0.5 * (at[1] + at[2]) - at[0]
     constant, slope, bend = (0.5 * (part[1:] + part[:-1]) for part in (constant, slope, bend))
-    z = [0.0]
-    for step, f0, f1, f2 in zip(h.tolist(), constant.tolist(), slope.tolist(), bend.tolist(), strict=True):
-        now = z[-1]
-        f, df = f0 + f1 * now + f2 * now * now, f1 + 2.0 * f2 * now
-        z.append(now + (step * f if abs(df * step) < 1e-9 else f * math.expm1(df * step) / df))
-    return replace(signals, memory=np.array(z))
+    return replace(signals, memory=implicit_steps(h, constant, slope, bend))

@@ -125,7 +125,9 @@ class ScoreSignals:
         layout = self.model.layout
         n = layout.n_link
         a = np.zeros((len(tau), layout.n_rates))
-        a[:, :n] = np.einsum("kij,kj->ki", self.M_inverse, tau[:, :n])
+        for j in range(n):
+            if np.any(tau[:, j]):  # most effects act on one joint
+                a[:, :n] += self.M_inverse[:, :, j] * tau[:, j, None]
         elastic = [layout.joints.index(joint) for joint in layout.motors]
         a[:, n : n + layout.n_motor] = tau[:, n : n + layout.n_motor] / self.inertia[elastic]
         return a

@@ -22,5 +22,6 @@ def transmission_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     model = ElasticJoints(robot)
     by_name = dict(zip(s.model.names, s.parameters.tolist(), strict=True))
     parameters = np.array([by_name.get(name, 0.0) for name in model.names])
-    rates = model.with_derivatives(s.x, np.vstack([s.u, s.u[-1:]]), parameters)
-    return [Column(at_ticks=rates.by_parameter[:, :, model.names.index(name)]) for name in sizes]
+    torques = model.torques(s.x, np.vstack([s.u, s.u[-1:]]), parameters).by_parameter
+    assert torques is not None
+    return [Column(at_ticks=s.accelerations(torques[:, :, model.names.index(name)])) for name in sizes]

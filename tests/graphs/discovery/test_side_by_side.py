@@ -11,7 +11,8 @@ import signal
 import numpy as np
 import pytest
 
-from jointscope.graphs.discovery.side_by_side import SideBySide, available_cores
+from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.solving.solver_context import available_cores
 
 
 @pytest.mark.parametrize("workers", (1, 2))

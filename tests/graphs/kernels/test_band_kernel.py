@@ -117,5 +117,5 @@ def test_a_chain_without_its_inner_states_equals_the_dense_schur_complement(d, p
     step = np.random.default_rng(7).normal(size=len(rim))
     change = np.zeros(p)
     change[kept] = step[2 * d :]
-    moved = found.states(system, step[:d], step[d : 2 * d], change)
+    moved = found.states(step[:d], step[d : 2 * d], change)
     np.testing.assert_allclose(moved.ravel(), -np.linalg.solve(A, g[inner] + B @ step), rtol=1e-8, atol=1e-10)

@@ -21,7 +21,7 @@ def _chain(rng: np.random.Generator, m: int, d: int) -> tuple[np.ndarray, np.nda
     D = np.array([blocks[k, :, k] for k in range(m)])
     E = np.array([blocks[k + 1, :, k] for k in range(m - 1)]).reshape(m - 1, d, d)
     columns = np.zeros((m, d, 2 * d))
-    assert factorise(D, E, np.ones(m), columns, np.zeros((m, d, 0))) == 0
+    assert factorise(D, E, np.ones(m), 0, columns, np.zeros((m, d, 0))) == 0
     return A, columns
 
 

@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving import solver_context, stretch
 from jointscope.graphs.solving.banded_solver import eliminate
-from jointscope.graphs.solving.batch_solver import reduced_system, total_cost
+from jointscope.graphs.solving.batch_solver import reduced_system, solve, total_cost
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.damped_step import damped_step
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import build
 from jointscope.graphs.starts.initial_guess import initial_states
+from jointscope.robots.errors import SolveError
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +53,82 @@ def test_what_the_states_leave_on_the_shared_values_is_that_of_the_whole_band(mo
     assert H / scale / scale[:, None] == pytest.approx(wanted[np.ix_(index, index)] / scale / scale[:, None], abs=1e-8)
 
 
-def test_the_joined_systems_of_stretches_are_the_system_of_the_recording(moving):
+def reduced(graph, values, *damping):
+    """Hessian and right side that the states leave on the shared values."""
+    _, rest = graph.linearized(values, *damping).eliminatePartialSequential(graph.states_ordering)
+    return rest.hessian(graph.shared_ordering)
+
+
+def assert_alike(one, other):
+    """To the last digit."""
+    for a, b in zip(one, other, strict=True):
+        assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("long", [0, 20_000])
+def test_a_rejected_step_leaves_the_graph_as_if_it_had_not_been_tried(moving, long, monkeypatch):
+    """A trial takes the memory of the linearisation that it follows from, until a first one is rejected."""
+    monkeypatch.setattr(stretch, "LONG", long)
     problems, estimate = moving
-    graph, values = CondensedGraph.of(problems, estimate, length=60)
-    graph.cost(values)
-    for joined, problem, x, calibration in zip(
-        graph.systems(estimate), problems, estimate.states, estimate.calibrations, strict=True
-    ):
-        whole = build(problem, x, calibration)
-        for name in ("D", "E", "B", "C", "g_x", "g_p"):
-            reference = getattr(whole, name)
-            assert getattr(joined, name) == pytest.approx(reference, abs=1e-9 * np.abs(reference).max()), name
-        assert joined.cost == pytest.approx(whole.cost, rel=1e-12)
+    (tried, values), (fresh, _) = (CondensedGraph.of(problems, estimate, length=60) for _ in range(2))
+    steps = [damped_step(tried, values, damping).values for damping in (1e-9, 10.0, 0.1)]
+    begin = tried.cost(values)
+    tried.linearized(values)
+    costs = [[tried.cost(step), tried.cost(values)] for step in steps]
+    assert [cost for _, cost in costs] == [begin] * 3
+    fresh.linearized(values)
+    assert [cost for cost, _ in costs] == [fresh.cost(step) for step in steps]
+    assert_alike(*(reduced(graph, steps[-1]) for graph in (tried, fresh)))
+
+
+@pytest.mark.parametrize("long", [0, 20_000])
+@pytest.mark.parametrize("bent", [False, True])
+def test_damping_that_was_not_expected_is_heeded(moving, bent, long, monkeypatch):
+    monkeypatch.setattr(stretch, "LONG", long)
+    problems, estimate = moving
+    (told, values), (surprised, _) = (CondensedGraph.of(problems, estimate, length=60) for _ in range(2))
+    bends = [np.where(np.arange(len(x)) % 7 == 0, 1e-3 * bent, 0.0) for x in estimate.states]
+    step = damped_step(told, values, 1e-9).values
+    damped_step(surprised, values, 1e-9)
+    told.expect(1e-9, bends)
+    found = []
+    for graph in (told, surprised):
+        graph.cost(step)
+        found.append(reduced(graph, step, 1e-9, bends))
+    assert_alike(*found)
+
+
+def test_a_long_recording_is_solved_like_a_short_one(moving, monkeypatch):
+    problems, estimate = moving
+    found = []
+    for long in (0, 20_000):
+        monkeypatch.setattr(stretch, "LONG", long)
+        solution = solve(problems, estimate, length=60)
+        found.append((solution.cost, *solution.estimate.states, solution.estimate.calibrations[0].values))
+    for one, other in zip(*found, strict=True):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+
+
+def test_a_state_that_nothing_tells_is_named_in_a_long_recording_too(moving, monkeypatch):
+    problems, estimate = moving
+    monkeypatch.setattr(stretch, "LONG", 0)
+    problem = problems[0]
+    steps = replace(problem.dynamics.steps, free=np.full((len(problem.dynamics), 6), np.inf))
+    blind = [replace(problem, placed=problem.placed[:1], dynamics=replace(problem.dynamics, steps=steps))]
+    graph, values = CondensedGraph.of(blind, Estimate(estimate.states[:1], estimate.calibrations[:1]))
+    with pytest.raises(SolveError, match="is not determined by the recording"):
+        graph.linearized(values)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_no_result_depends_on_the_number_of_threads(moving, threads, monkeypatch):
+    problems, estimate = moving
+    found = []
+    for count in (1, threads):
+        monkeypatch.setattr(solver_context, "thread_count", lambda count=count: count)
+        solution = solve(problems, estimate, max_iterations=3, length=50)
+        found.append((solution.cost, *solution.estimate.states, solution.estimate.calibrations[0].values))
+    assert_alike(*found)
 
 
 def test_inner_states_follow_a_step_of_the_shared_values(moving):

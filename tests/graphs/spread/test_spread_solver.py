@@ -47,9 +47,6 @@ def assert_same(one, other):
         np.testing.assert_allclose(a.values, b.values, rtol=1e-9)
     for a, b in zip(one.estimate.states, other.estimate.states, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-9)
-    for a, b in zip(one.systems, other.systems, strict=True):
-        np.testing.assert_allclose(a.C, b.C, rtol=1e-9, atol=1e-9 * np.max(np.abs(b.C)))
-        np.testing.assert_allclose(a.B, b.B, rtol=1e-9, atol=1e-9 * np.max(np.abs(b.B)))
 
 
 def spread_over(crew, three, progress=None):
