@@ -26,7 +26,7 @@ NOTHING = "does nothing while nothing moves"
 def tried_and_silent(robot: Robot) -> tuple[list[EffectHypothesis], dict[str, str]]:
     """What is tried, with each of its shapes, and the reason why another effect is not, by label."""
     tried, silent = [], dict[str, str]()
-    for hypothesis in hypotheses_of(robot):
+    for hypothesis in hypotheses_of(robot, at_rest=True):
         why = _why_silent(robot, hypothesis)
         if why:
             silent[hypothesis.label] = why
@@ -66,7 +66,7 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
     effect, owner = hypothesis.here.effect, hypothesis.here.owner
     if isinstance(effect, TimeShift | SmoothedReading):
         return NOTHING
-    if isinstance(effect, Structure) and effect.form != "gravity":
+    if isinstance(effect, Structure) and effect.form not in ("gravity", "loads"):
         hinges = effect.form in ("bearing", "elasticity")
         return "needs coordinates of its own, which are tried with recordings of motion only" if hinges else NOTHING
     if isinstance(effect, ReadingEffect) and owner.removesuffix(LINK_SIDE) not in robot.joints:
