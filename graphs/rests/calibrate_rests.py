@@ -18,6 +18,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.band_posterior import band_posterior
+from jointscope.graphs.rests.doubts import Doubt, doubts
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.settling import settled
@@ -50,6 +51,7 @@ class RestCalibration:
         derived: what follows from them.
         silent: names of the parameters of which they say nothing.
         covariance: of the values of all free parameters, shape (p, p).
+        doubts: what would make the rests far likelier.
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.
@@ -64,6 +66,7 @@ class RestCalibration:
     derived: tuple[ParameterEstimate, ...]
     silent: tuple[str, ...]
     covariance: Array
+    doubts: tuple[Doubt, ...]
     before: RestErrors
     errors: RestErrors
     iterations: int
@@ -93,6 +96,7 @@ class RestCalibration:
             "cost": self.cost,
             "parameters": table | derived,
             "undetermined": list(self.silent),
+            "doubts": [{"label": d.label, "chi2_falls_by": d.fall, "p_value": d.p_value} for d in self.doubts],
             "repeatability": dict(zip(self.robot.joints, self.problems[0].repeatability.tolist(), strict=True)),
             "channels": self.errors.to_json(self.robot),
         }
@@ -116,7 +120,8 @@ def calibrate_rests(
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     problems, solution, iterations = settled_rests(robot, recordings, report, near)
     (x,), (likeliest,) = solution.estimate.states, solution.estimate.calibrations
-    calibration, covariance = band_posterior(RestSet.joined(problems), robot, x, likeliest)
+    whole = RestSet.joined(problems)
+    calibration, covariance = band_posterior(whole, robot, x, likeliest)
     sigmas, scale = np.sqrt(np.diag(covariance)), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
@@ -138,6 +143,7 @@ def calibrate_rests(
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
         covariance=covariance * np.outer(scale, scale),
+        doubts=doubts(whole, robot, x, likeliest),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,

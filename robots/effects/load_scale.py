@@ -15,8 +15,8 @@ EFFECT = Structure(
     card=Card(
         title="loads of another size than said",
         law="F = F_load (1 + share), with F_load the force of /load at a rest",
-        explanation="The scale was not tared, the hook and the rope weigh something, grams or pounds were taken for "
-        "newtons, or the rope runs over a pulley with friction: all loads are larger or smaller than said by one share. "
+        explanation="The scale was not tared, hook and rope weigh something, kilograms were taken for newtons, or "
+        " the rope runs over a pulley with friction: all loads are larger or smaller than said by one share. "
         "Correct the loads; this is no physics of the robot.",
         source="OIML R 111-1 (2004), Weights of classes E1 to M3, on what the nominal mass of a weight is worth",
         typical="1 to 10 % of a load; 90 % where kilograms were taken for newtons",
