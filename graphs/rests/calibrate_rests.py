@@ -44,6 +44,7 @@ class RestCalibration:
 
     Attributes:
         robot: with the values that were found and their sigmas.
+        likeliest: with the values of largest likelihood, masses and loads as they are said to be.
         start: before.
         problems: the rests of each recording, with their weights.
         states: where links and motors stand, shape (m, d) each.
@@ -59,6 +60,7 @@ class RestCalibration:
     """
 
     robot: Robot
+    likeliest: Robot
     start: Robot
     problems: tuple[RestSet, ...]
     states: tuple[Array, ...]
@@ -127,6 +129,8 @@ def calibrate_rests(
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
     told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
     known = {p.name for p in told}
+    of_likeliest = zip(likeliest.names, likeliest.values.tolist(), strict=True)
+    peak = robot.with_values({name: value for name, value in of_likeliest if name in known})
     found = robot.with_values({p.name: p.value for p in told})
     found = replace(found, parameters=with_sigmas(found.parameters, {p.name: p.sigma for p in told}))
     derived = [
@@ -136,6 +140,7 @@ def calibrate_rests(
     report("done", 1.0)
     return RestCalibration(
         robot=found,
+        likeliest=peak,
         start=robot,
         problems=tuple(problems),
         states=states_of(problems, solution),
