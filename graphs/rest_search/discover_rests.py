@@ -139,10 +139,10 @@ def diagnosed(
     result = calibrate_rests(robot, recordings, report, near)
     report("looking for effects", 0.5)
     # scales of torques are those of the values found, not of the start
-    problems = [RestSet.of(result.robot, rests) for rests in recordings]
+    problems = [RestSet.of(result.likeliest, rests) for rests in recordings]
     weight = result.problems[0].repeatability
     whole = replace(RestSet.joined(problems), repeatability=weight, per_command=True, scoring=True)
-    values = Calibration.of(result.robot).only([DYNAMICS])
+    values = Calibration.of(result.likeliest).only([DYNAMICS])
     base = fit_rests(whole, np.concatenate(result.states), values)
     return RestStep(added, result, judge_rests(base, folds_of(recordings)))
 

@@ -16,7 +16,6 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
-from jointscope.robots.files.effect_editing import parameter_of
 from jointscope.robots.model.robot import Robot
 
 FAST = 1e3  # [s/m, s/rad] no damping is so large beside its own size
@@ -26,27 +25,13 @@ NOTHING = "does nothing while nothing moves"
 def tried_and_silent(robot: Robot) -> tuple[list[EffectHypothesis], dict[str, str]]:
     """What is tried, with each of its shapes, and the reason why another effect is not, by label."""
     tried, silent = [], dict[str, str]()
-    for hypothesis in hypotheses_of(robot):
+    for hypothesis in hypotheses_of(robot, at_rest=True):
         why = _why_silent(robot, hypothesis)
         if why:
             silent[hypothesis.label] = why
         else:
             tried.append(hypothesis)
     return tried, silent
-
-
-def at_null(robot: Robot, hypotheses: Sequence[EffectHypothesis]) -> Robot:
-    """The robot with effects that do nothing yet; their sizes are free about their null values, shapes are held.
-
-    It has no document, so that it cannot be written; labels must differ.
-    """
-    parameters = dict(robot.parameters)
-    for h in hypotheses:
-        for p in h.here.effect.parameters_at(robot, h.here.owner):
-            value = h.shapes[p.name] if p.name in h.shapes else p.null
-            parameter = parameter_of(h.here, p, value)
-            parameters[parameter.name] = replace(parameter, positive=False, fixed=p.is_shape, prior=value)
-    return replace(robot, parameters=parameters, effects=(*robot.effects, *(h.here for h in hypotheses)))
 
 
 def batches(hypotheses: Sequence[EffectHypothesis]) -> list[list[EffectHypothesis]]:
@@ -66,7 +51,7 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
     effect, owner = hypothesis.here.effect, hypothesis.here.owner
     if isinstance(effect, TimeShift | SmoothedReading):
         return NOTHING
-    if isinstance(effect, Structure) and effect.form != "gravity":
+    if isinstance(effect, Structure) and effect.form not in ("gravity", "loads"):
         hinges = effect.form in ("bearing", "elasticity")
         return "needs coordinates of its own, which are tried with recordings of motion only" if hinges else NOTHING
     if isinstance(effect, ReadingEffect) and owner.removesuffix(LINK_SIDE) not in robot.joints:

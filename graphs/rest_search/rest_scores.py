@@ -19,9 +19,10 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import chdtrc
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rest_search.rest_hypotheses import at_null, batches
+from jointscope.graphs.rest_search.rest_hypotheses import batches
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.taken_for_granted import at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
 from jointscope.graphs.solving.normal_equations import NormalEquations

@@ -24,6 +24,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.friction_band import band_cost, piled_cost
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.taken_for_granted import unsure
 from jointscope.graphs.rests.walkers import moments
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
@@ -31,7 +32,9 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 TOLD = 0.25  # information, over that without bands, of a combination of which a motor's bands tell something
 WALKERS, SEED = 64, 1
-MOST_ODDS = 10.0  # logit of a share in piles that is none, or all
+MOST_ODDS = 10.0  # logit of a share in piles that is all
+FEW, NONE = -4.0, -14.0  # logits from where to where the share is none
+BELIEF = 10.0  # how much likelier piles must make rests to be believed as much as none
 DEPTHS = np.log((0.01, 0.5))  # of the piles below the edges, of the band; deeper ones are spread over it
 BLURS = np.log((0.1 * EDGE, EDGE))  # of the edges, of the friction
 MOST_SHRINKS = 100  # of where walkers begin, towards the likeliest values
@@ -54,24 +57,62 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
     Raises:
         SolveError: a band that closes at a rest.
     """
+    known, robot, count = calibration, unsure(robot, problem.rests), len(calibration.names)
+    calibration = known.carried_to(Calibration.of(robot).only([DYNAMICS]))
     free = [robot.parameters[name] for name in calibration.names]
     prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
     weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
     pull = weight * (calibration.dynamics - prior)
-    commands = replace(problem, per_command=True)  # what was recorded has the likelihood
+    commands = replace(problem.of_robot(robot), per_command=True)  # what was recorded has the likelihood
     linear = LinearRests.of(commands, x, calibration, weight, pull)
     values, size = calibration.values, calibration.value_by_coordinate
     friction = calibration.positive & np.any(linear.H != 0.0, axis=0)
-    own = friction / np.array([p.prior_sigma**2 for p in free])
-    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(own)
-    b = (linear.b - pull * friction) / size + own * (values - np.array([p.prior for p in free]))
+    loose = friction / np.array([p.prior_sigma**2 for p in free])
+    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(loose)
+    b = (linear.b - pull * friction) / size + loose * (values - np.array([p.prior for p in free]))
     linear = replace(linear, A=A, b=b, Y=linear.Y / size, H=linear.H / size)
-    change, covariance = _moments(linear, np.where(friction, -values, -np.inf))
+    scaled = [j for j, joint in enumerate(robot.joints) if f"{joint}.{robot.drive_gain}" in known.names]
+    linear, least = _of_each(linear, count, scaled), np.where(friction, -values, -np.inf)[:count]
+    d = np.zeros(len(linear.b))
+    if len(d) > count:  # walkers begin where the rests are likeliest, whatever masses and loads are
+        d = linear.minimum(np.arange(len(d)))[0]
+        d *= min(1.0, (1.0 - SMALLEST_SHARE) / max(float(np.max(d[:count] / least)), 1e-300))  # above zero
+    linear = replace(linear, b=linear.b + linear.A @ d, y=linear.y + linear.Y @ d, half=linear.half + linear.H @ d)
+    least = np.append(least, np.full(len(d) - count, -np.inf)) - d
+    change, covariance = _moments(linear, least)
+    change, covariance = (change + d)[:count], covariance[:count, :count]
+    values, size, friction = values[:count], size[:count], friction[:count]
     moved = np.log(np.where(friction, np.maximum(values + change, SMALLEST_SHARE * values), 1.0))
-    coordinates = np.where(friction, moved, calibration.dynamics + change / size)
-    found = calibration.with_points({DYNAMICS: coordinates})
+    found = known.with_points({DYNAMICS: np.where(friction, moved, known.dynamics + change / size)})
     scale = np.where(friction, found.value_by_coordinate, size)
     return found, covariance / np.outer(scale, scale)
+
+
+def _of_each(linear: LinearRests, count: int, scaled: list[int]) -> LinearRests:
+    """Masses and loads behind the first `count` values as values that each motor has for itself.
+
+    Moments of a motor's bands are joined as Gaussians, and what two bands share near their sharp edges is none. A drive
+    whose gain is asked of the rests has its scale from the masses, and none of them for itself.
+
+    Args:
+        linear: the rests.
+        count: of the values that are asked.
+        scaled: motors whose gain is one of them.
+    """
+    motors = [j for j in np.unique(linear.motor).tolist() if j not in scaled]
+    own = [
+        np.where((linear.motor == j)[:, None], part[:, count:], 0.0) for part in (linear.Y, linear.H) for j in motors
+    ]
+    Y, H = (
+        np.hstack([part[:, :count], *own[k * len(motors) : (k + 1) * len(motors)]])
+        for k, part in enumerate((linear.Y, linear.H))
+    )
+    A = np.zeros((Y.shape[1], Y.shape[1]))
+    A[:count, :count] = linear.A[:count, :count]
+    np.fill_diagonal(A[count:, count:], np.tile(np.diag(linear.A)[count:], len(motors)))
+    b = np.append(linear.b[:count], np.zeros(len(A) - count))
+    told = np.any(Y != 0.0, axis=0) | np.any(H != 0.0, axis=0) | (np.arange(len(A)) < count)
+    return replace(linear, A=A[np.ix_(told, told)], b=b[told], Y=Y[:, told], H=H[:, told])
 
 
 def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
@@ -133,7 +174,9 @@ class MotorBands:
         )
         V = vectors[:, told > TOLD]
         slope, Y, H = Y.T @ found.by_torque + H.T @ found.by_half, Y @ V, H @ V
-        yy, yh, hh = (part[:, None] for part in found.curvature)
+        # edges of n rests lie some share r / n of the band beyond the outermost: walkers begin as far apart
+        wide = half * V.shape[1] / len(half)
+        yy, yh, hh = (part[:, None] for part in band_cost(y, half, np.hypot(wide, noise)).curvature)
         curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H)
         start = np.linalg.inv(np.eye(V.shape[1]) + curved)
         return MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
@@ -149,7 +192,9 @@ class MotorBands:
             slope: of the cost without these bands, shape (r,).
         """
         half, found = self.half + z @ self.H.T, np.full(len(z), np.inf)
-        inside = np.all(half > 0.0, axis=1) & np.all(z @ self.T.T > self.least, axis=1) & (np.abs(odds) < MOST_ODDS)
+        inside = (
+            np.all(half > 0.0, axis=1) & np.all(z @ self.T.T > self.least, axis=1) & (odds < MOST_ODDS) & (odds > NONE)
+        )
         for value, (low, high) in ((depth, DEPTHS), (blur, BLURS)):
             inside &= (value > low) & (value < high)
         if inside.any():
@@ -158,6 +203,7 @@ class MotorBands:
             bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
             costs = bands + np.log(sigma)  # of densities, whose blur is not the same
             jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit
+            jeffreys = np.where(odds[inside] < FEW, -np.log(BELIEF * np.pi / (FEW - NONE)), jeffreys)
             found[inside] = jeffreys + costs.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ slope
         return found
 
@@ -165,7 +211,7 @@ class MotorBands:
         """Mean and covariance of z; `slope` as of `cost`."""
         rng, r = np.random.default_rng(SEED), len(slope)
         z = rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(self.start).T
-        rest = rng.uniform((-2.0, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
+        rest = rng.uniform((NONE, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
 
         def cost(point: Array) -> Array:
             return self.cost(point[:, :r], point[:, r], point[:, r + 1], point[:, r + 2], slope)

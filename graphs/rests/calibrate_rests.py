@@ -18,6 +18,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.band_posterior import band_posterior
+from jointscope.graphs.rests.doubts import Doubt, doubts
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.settling import settled
@@ -43,6 +44,7 @@ class RestCalibration:
 
     Attributes:
         robot: with the values that were found and their sigmas.
+        likeliest: with the values of largest likelihood, masses and loads as they are said to be.
         start: before.
         problems: the rests of each recording, with their weights.
         states: where links and motors stand, shape (m, d) each.
@@ -50,6 +52,7 @@ class RestCalibration:
         derived: what follows from them.
         silent: names of the parameters of which they say nothing.
         covariance: of the values of all free parameters, shape (p, p).
+        doubts: what would make the rests far likelier.
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.
@@ -57,6 +60,7 @@ class RestCalibration:
     """
 
     robot: Robot
+    likeliest: Robot
     start: Robot
     problems: tuple[RestSet, ...]
     states: tuple[Array, ...]
@@ -64,6 +68,7 @@ class RestCalibration:
     derived: tuple[ParameterEstimate, ...]
     silent: tuple[str, ...]
     covariance: Array
+    doubts: tuple[Doubt, ...]
     before: RestErrors
     errors: RestErrors
     iterations: int
@@ -93,6 +98,7 @@ class RestCalibration:
             "cost": self.cost,
             "parameters": table | derived,
             "undetermined": list(self.silent),
+            "doubts": [{"label": d.label, "chi2_falls_by": d.fall, "p_value": d.p_value} for d in self.doubts],
             "repeatability": dict(zip(self.robot.joints, self.problems[0].repeatability.tolist(), strict=True)),
             "channels": self.errors.to_json(self.robot),
         }
@@ -116,12 +122,15 @@ def calibrate_rests(
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     problems, solution, iterations = settled_rests(robot, recordings, report, near)
     (x,), (likeliest,) = solution.estimate.states, solution.estimate.calibrations
-    calibration, covariance = band_posterior(RestSet.joined(problems), robot, x, likeliest)
+    whole = RestSet.joined(problems)
+    calibration, covariance = band_posterior(whole, robot, x, likeliest)
     sigmas, scale = np.sqrt(np.diag(covariance)), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
     told = [p for p, sigma, prior in zip(table, sigmas, priors, strict=True) if sigma < TOUCHED * prior]
     known = {p.name for p in told}
+    of_likeliest = zip(likeliest.names, likeliest.values.tolist(), strict=True)
+    peak = robot.with_values({name: value for name, value in of_likeliest if name in known})
     found = robot.with_values({p.name: p.value for p in told})
     found = replace(found, parameters=with_sigmas(found.parameters, {p.name: p.sigma for p in told}))
     derived = [
@@ -131,6 +140,7 @@ def calibrate_rests(
     report("done", 1.0)
     return RestCalibration(
         robot=found,
+        likeliest=peak,
         start=robot,
         problems=tuple(problems),
         states=states_of(problems, solution),
@@ -138,6 +148,7 @@ def calibrate_rests(
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
         covariance=covariance * np.outer(scale, scale),
+        doubts=doubts(whole, robot, x, likeliest),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,

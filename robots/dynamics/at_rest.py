@@ -24,6 +24,8 @@ from jointscope.robots.parts.state_layout import Columns
 
 Array = NDArray[np.float64]
 SLIPPING, AT_ONCE = 1e-9, 1e12  # [rad/s] and [s/rad]: their product is far beyond where tanh is one
+LOAD_SHARE = "robot.load_scale.share"  # by which known loads are larger than they were said to be
+TINY = 1e-6  # step of a difference by it
 
 
 @dataclass(frozen=True)
@@ -84,12 +86,21 @@ def at_rest(
     speeds: list[Array | float] = [0.0, SLIPPING, -SLIPPING]
     if creep is not None and np.any(creep):
         speeds.append(creep)
-    found = _at_speeds(model, x, u, parameters, loads.torque[:, layout.joint_link], speeds)
+    scale = 1.0 + values.get(LOAD_SHARE, 0.0)
+    outside = loads.torque[:, layout.joint_link]
+    found = _at_speeds(model, x, u, parameters, scale * outside, speeds)
+    if LOAD_SHARE in model.names:
+        more = (_at_speeds(model, x, u, parameters, (scale + side * TINY) * outside, speeds) for side in (1.0, -1.0))
+        for part, up, down in zip(found, *more, strict=True):
+            assert part.by_parameter is not None
+            part.by_parameter[:, :, model.names.index(LOAD_SHARE)] += (up.value - down.value) / (2.0 * TINY)
     terms, plain, *sliding = found[0], *(_rows(part, layout.motor_row, layout.positions) for part in found)
     assert terms.by_state is not None and terms.by_parameter is not None
     bodies, n = model.tree.bodies(values), layout.n_link
-    terms.value[:, :n] += loads.torque - bodies.torque(q, still, still)
-    terms.by_state[:, :n, layout.q_link] += loads.by_q - bodies.gravity_derivatives(q)
+    terms.value[:, :n] += scale * loads.torque - bodies.torque(q, still, still)
+    terms.by_state[:, :n, layout.q_link] += scale * loads.by_q - bodies.gravity_derivatives(q)
+    if LOAD_SHARE in model.names:
+        terms.by_parameter[:, :n, model.names.index(LOAD_SHARE)] += loads.torque
     for name, weight in model.tree.gravity_by_parameter(q, values).items():
         if name in model.names:
             terms.by_parameter[:, :n, model.names.index(name)] -= weight

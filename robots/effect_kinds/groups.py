@@ -28,5 +28,5 @@ def group_of(effect: Effect) -> str:
     if isinstance(effect, InertiaEffect):
         return "link"
     if isinstance(effect, Structure):
-        return "link" if effect.form in ("coriolis", "gravity") else "structure"
+        return "link" if effect.form in ("coriolis", "gravity", "loads") else "structure"
     return "sensors"

@@ -68,6 +68,7 @@ EFFECT = LinkMass(
         typical="5 to 40 % of a mass from a drawing",
         excitation="slow motion in several postures, and accelerations of all joints before the link",
         look_alikes={
+            "load_scale": "a load that is always the same is a mass of the link that it hangs on",
             "torque_constant_error": "a drive that makes less torque is as one that moves heavier links",
             "inertia_error": "where little gravity acts, a heavier link is one with more inertia",
             "gravity_imbalance": "at one joint a wrong first moment is a weight that turns with the angle",

@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
-from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rests.rest_errors import SURELY, RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.robots.model.command_words import bag_arguments, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.rest_doubts import doubts_said
 
 LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
@@ -67,10 +71,12 @@ def verdict(result: RestCalibration) -> str:
     error = result.errors.error
     if error > DOUBTFUL:
         return "No, do not rely on this yet: links do not rest where the model says."
-    if doubt := _misfit(result):
-        return f"No, do not rely on this yet: {doubt}; something is missing: {_diagnosis(result)}"
     if doubt := _following(result):
         return f"No, do not rely on this yet: {doubt}."
+    if doubt := doubts_said(result):
+        return doubt
+    if doubt := _misfit(result):
+        return f"No, do not rely on this yet: {doubt}; something is missing: {_diagnosis(result)}"
     for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
@@ -81,10 +87,17 @@ def verdict(result: RestCalibration) -> str:
     if loose:
         names = ", ".join(f"{p.name} (+-{significant(100 * p.sigma / p.value, 2)} %)" for p in loose)
         so = "No, do not rely on this yet" if len(loose) == len(told) else "Usable, with reservations"
-        return f"{so}: these rests hardly tell {names}; let it rest in more postures, or with other weights."
+        return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}."
     if error > AS_EXPECTED or _widened(result)[1] > WIDENED:
         return "Usable, with reservations: links rest further from where the model says than their encoders explain."
     return "Yes, the model holds at these rests."
+
+
+def _more(result: RestCalibration, loose: Sequence[ParameterEstimate]) -> str:
+    """How many rests more would tell loose values: edges of a band are known as well as rests lie apart in it."""
+    times = max(p.sigma / p.value for p in loose) / LOOSE
+    more = int(np.ceil((times - 1.0) * result.count))
+    return f"about {counted(more, 'time')} more, in other postures or with other weights"
 
 
 def _widened(result: RestCalibration) -> tuple[str, float]:
@@ -102,10 +115,12 @@ def _misfit(result: RestCalibration) -> str:
             f"{joint} rests {significant(widened, 2)} sigmas of its encoder away, and its sigma was widened by as much "
             "to go on, unless other loads hung there than /load says"
         )
-    bands = result.errors.bands
+    bands, rigid = result.errors.bands, all_rigid(result.robot)
     for j, joint in enumerate(result.robot.joints):
         beyond = float(result.errors.certain[:, j].max(initial=0.0))
-        if beyond > BEYOND * bands[j]:
+        # friction of a rigid joint is that of any masses and loads that these might be instead, as well as it is known
+        known = sum(p.sigma for p in result.parameters if p.name.startswith(f"{joint}.")) if rigid else 0.0
+        if beyond > BEYOND * bands[j] + SURELY * known:
             return (
                 f"friction of {joint} would have to hold {significant(1e3 * beyond, 2)} mN m beyond a band of "
                 f"{significant(1e3 * bands[j], 2)} mN m"

@@ -41,19 +41,24 @@ class EffectHypothesis:
         return self.here.label
 
 
-def hypotheses_of(robot: Robot, scanned_orders: Mapping[str, Sequence[float]] | None = None) -> list[EffectHypothesis]:
+def hypotheses_of(
+    robot: Robot, scanned_orders: Mapping[str, Sequence[float]] | None = None, at_rest: bool = False
+) -> list[EffectHypothesis]:
     """All hypotheses that make sense for a robot.
 
     Args:
         robot: the model.
         scanned_orders: orders (periods per turn) at which a spectrum of the missing torque has its peaks, by joint;
             they take the place of the grid of effects that repeat with the position.
+        at_rest: whether known loads are part of what was recorded.
     """
     found = []
     for effect in catalogue().values():
         for owner in effect.owners_of(robot):
             here = EffectAt(effect, owner)
             if robot.has_effect(effect.id, owner) or cannot_be_added(robot, here):
+                continue
+            if isinstance(effect, Structure) and effect.form == "loads" and not at_rest:
                 continue
             if isinstance(effect, Structure) and effect.form == "integration":
                 found.append(EffectHypothesis(here, (WHOLE_DEFECT,)))

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery
 from jointscope.graphs.rest_search.rest_judge import RestCandidate
-from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 8
+LOADS = "load_scale@robot"
 MOST_NAMES = 4  # look-alikes that are named in a row
 
 
@@ -46,12 +47,26 @@ def headline(found: RestDiscovery) -> str:
     """Whether something is missing."""
     missing = [c.label for c in found.candidates if c.verdict == "missing"]
     if missing:
-        return f"Missing: {', '.join(missing)}."
+        return f"Missing: {', '.join(missing)}.{loads_said(found.candidates)}"
     small = [c.label for c in found.candidates if c.verdict == "possible"]
     said = "Nothing of the catalogue is missing at these rests."
     if small:
         said += f" There may be a little of {', '.join(small[:MOST_NAMES])}, too small to tell on rests left out."
-    return said
+    return said + loads_said(found.candidates)
+
+
+def loads_said(candidates: Sequence[RestCandidate]) -> str:
+    """How large known loads are where they are not as large as said; empty where nothing speaks of it."""
+    scale = next((c for c in candidates if c.label == LOADS and c.verdict in ("missing", "possible")), None)
+    if scale is None:
+        return ""
+    share, sigma, _ = scale.sizes["share"]
+    value, off = with_sigma(1.0 + share, sigma)
+    if scale.verdict == "missing":
+        return f" The loads are {value} +- {off} of what /load says."
+    others = ", ".join(c.label for c in candidates if c.verdict == "missing")
+    instead = f"in place of {others} " if others else ""
+    return f" Or {instead}the loads are {value} +- {off} of what /load says: these rests hardly tell which."
 
 
 def ranking_text(found: RestDiscovery) -> str:

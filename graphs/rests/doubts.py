@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What else would make rests of rigid joints far likelier: their bands are the only witnesses.
+
+Friction is spread evenly over its band and knows nothing of what the joint carries. If a band gets narrower by a factor
+r once k values more are free, the likelihood grows by r^-n, and what evenly spread torques of n rests do by chance is
+
+    p = P(R < r),   R ~ Beta(n - k, k)       [largest deviation over that around k fitted values]
+
+exact for k = 1, a constant; the logarithm of it is half a chi2 of 2 k degrees of freedom where rests are many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc
+
+from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.rests.linear_rests import LinearRests
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.taken_for_granted import all_rigid, at_null
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.robots.model.robot import Robot
+
+Array = NDArray[np.float64]
+ASKED = ("link_mass", "load_scale", "encoder_offset", "torque_offset", "load_dependent_friction")
+PLACE = "friction_by_angle"  # s (1 + a cos q + b sin q)
+LIKELY = 1e-2  # probability of any of them by chance, that is none
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A change of the model that rests ask for.
+
+    Attributes:
+        label: ID@OWNER of an effect, or PLACE@JOINT.
+        fall: of chi2.
+        p_value: by chance, of any that was asked.
+        size: of the first value of the effect, in its unit.
+    """
+
+    label: str
+    fall: float
+    p_value: float
+    size: float
+
+
+def doubts(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Doubt, ...]:
+    """All that is no chance, least likely first; none of robots with springs, whose encoders are asked.
+
+    Args:
+        problem: all rests with their weights.
+        robot: with the priors.
+        x: states of largest likelihood, shape (m, d).
+        calibration: values there.
+    """
+    if not all_rigid(robot):
+        return ()
+    tried = [h for h in hypotheses_of(robot, at_rest=True) if h.here.effect.id in ASKED]
+    wide = at_null(robot, tried)
+    at = calibration.carried_to(Calibration.of(wide).only([DYNAMICS]))
+    free = [wide.parameters[name] for name in at.names]
+    prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
+    weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
+    linear = LinearRests.of(
+        replace(problem.of_robot(wide), per_command=True), x, at, weight, weight * (at.dynamics - prior)
+    )
+    base = np.arange(len(calibration.names))
+    groups = {h.label: _columns(h, at.names) for h in tried}
+    linear, places = _by_angle(linear, problem, robot)
+    groups |= places
+    least, found = linear.minimum(base)[1], []
+    for label, columns in groups.items():
+        n, k = _told(linear, columns)
+        if 0 < k < n:
+            d, cost = linear.minimum(np.concatenate([base, columns]))
+            fall = max(2.0 * (least - cost), 0.0)
+            found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), float(d[len(base)])))
+    counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
+    return tuple(sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, -d.fall)))
+
+
+def _columns(hypothesis: EffectHypothesis, names: tuple[str, ...]) -> NDArray[np.intp]:
+    return np.array([names.index(hypothesis.here.parameter(size.name)) for size in hypothesis.sizes], dtype=np.intp)
+
+
+def _by_angle(linear: LinearRests, problem: RestSet, robot: Robot) -> tuple[LinearRests, dict[str, NDArray[np.intp]]]:
+    """Bands that are wider at some angles of their own joint, as two more values of each."""
+    counts = problem.rests.moved & (problem.rests.creep == 0.0)
+    angle, H = problem.rests.q_motor[counts], [linear.H]
+    places: dict[str, NDArray[np.intp]] = {}
+    for j in np.unique(linear.motor).tolist():
+        own = (linear.motor == j) * linear.half
+        places[f"{PLACE}@{robot.joints[j]}"] = linear.H.shape[1] + 2 * len(places) + np.arange(2)
+        H.append(np.column_stack([own * np.cos(angle), own * np.sin(angle)]))
+    more = 2 * len(places)
+    A = np.eye(len(linear.b) + more)
+    A[:-more, :-more] = linear.A
+    Y = np.hstack([linear.Y, np.zeros((len(linear.y), more))])
+    return replace(linear, A=A, b=np.append(linear.b, np.zeros(more)), Y=Y, H=np.hstack(H)), places
+
+
+def _told(linear: LinearRests, columns: NDArray[np.intp]) -> tuple[int, int]:
+    """Rests of the motor with most of them, and combinations of values that shift bands beyond chance."""
+    size = 1.0 / np.sqrt(np.diag(linear.A)[columns])
+    rows = np.vstack([linear.Y[:, columns], linear.H[:, columns]]) * size / np.tile(linear.half, 2)[:, None]
+    seen = np.any(rows != 0.0, axis=1).reshape(2, -1).any(axis=0)
+    if not seen.any():
+        return 0, 0
+    n = int(np.bincount(linear.motor[seen]).max())
+    return n, int(np.sum(np.linalg.svd(rows, compute_uv=False) > n**-0.5))
