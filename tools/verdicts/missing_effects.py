@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
-from jointscope.graphs.scoring.load_friction import LoadFriction
-from jointscope.graphs.scoring.regressed_causes import RegressedCause
-from jointscope.graphs.scoring.unsteady_gains import COMMAND, COMMANDS, SPEED, SPEEDS, TIME, UnsteadyGain
+from jointscope.graphs.scoring.regression.load_friction import LoadFriction
+from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.regression.unsteady_gains import COMMAND, COMMANDS, SPEED, SPEEDS, TIME, UnsteadyGain
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.torque_columns import TorqueColumns, has_columns
+from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
 from jointscope.graphs.starts.drive_regression import GAIN, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
 from jointscope.graphs.starts.motion_cells import motion_cells

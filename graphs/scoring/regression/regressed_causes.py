@@ -19,7 +19,7 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect

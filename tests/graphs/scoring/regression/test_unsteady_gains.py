@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, divided, moved, robot_file
 
-from jointscope.graphs.scoring.joint_regression import joint_rows
-from jointscope.graphs.scoring.regressed_causes import regressed_causes
-from jointscope.graphs.scoring.unsteady_gains import COMMAND, SPEED, SPEEDS, TIME, explain_more, unsteady_gains
+from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.unsteady_gains import (
+    COMMAND,
+    SPEED,
+    SPEEDS,
+    TIME,
+    explain_more,
+    unsteady_gains,
+)
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 

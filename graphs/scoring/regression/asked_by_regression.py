@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from jointscope.graphs.scoring.changed_load import ChangedLoad, changed_load
-from jointscope.graphs.scoring.joint_regression import joint_rows
-from jointscope.graphs.scoring.load_friction import LoadFriction, load_frictions
-from jointscope.graphs.scoring.regressed_causes import RegressedCause, confirmed, regressed_causes
+from jointscope.graphs.scoring.regression.changed_load import ChangedLoad, changed_load
+from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.load_friction import LoadFriction, load_frictions
+from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause, confirmed, regressed_causes
+from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, explain_more, unsteady_gains
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.unsteady_gains import UnsteadyGain, explain_more, unsteady_gains
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit, sigma_of
-from jointscope.graphs.scoring.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit, sigma_of
+from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
 Array = NDArray[np.float64]
