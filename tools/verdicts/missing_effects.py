@@ -40,6 +40,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Without masses this cannot be checked."
     if given(result):
         return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
+    if result.asked.link:
+        return "info", "That cannot be told as long as a link weighs something else than the URDF says."
     if result.asked.causes:
         return _named(result)
     if result.asked.gains:

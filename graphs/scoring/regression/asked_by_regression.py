@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a regression of each rigid joint alone says of a calibration's recordings.
 
-Joint by joint, without states and without process noise that takes what is missing. A cause that explains less than
-another one at the same joint is not said: two reasons for one thing are one too many.
+Without states and without process noise that takes what is missing. Reasons compete: each has what it explains at all
+joints on its side and the number of its sizes against it, and only the most plausible one is said. Two reasons for one
+thing are one too many, and at one joint alone a heavier link is like a gain that falls.
 """
 
 from __future__ import annotations
@@ -11,11 +12,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from jointscope.graphs.scoring.regression.changed_load import ChangedLoad, changed_load
-from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, joint_rows
 from jointscope.graphs.scoring.regression.load_friction import LoadFriction, load_frictions
-from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause, confirmed, regressed_causes
-from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, explain_more, unsteady_gains
+from jointscope.graphs.scoring.regression.regressed_causes import (
+    RegressedCause,
+    asked_for,
+    confirmed,
+    regressed_causes,
+)
+from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, unsteady_gains
+from jointscope.graphs.scoring.regression.wrong_links import WrongLink, wrong_link
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -26,19 +34,21 @@ class Asked:
 
     Attributes:
         causes: effects that regression names, joint by joint, and the calibration asks for, too.
+        link: which link weighs something else than the URDF says; None where nothing tells of it.
         changed: when the robot takes up or sets down a load, or is pushed; None where nothing tells of it.
         gains: drives whose constant falls with speed, command or time, which no effect of the catalogue knows.
         load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
     """
 
     causes: tuple[RegressedCause, ...] = ()
+    link: WrongLink | None = None
     changed: ChangedLoad | None = None
     gains: tuple[UnsteadyGain, ...] = ()
     load_frictions: tuple[LoadFriction, ...] = ()
 
 
 def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: ScoreTest) -> Asked:
-    """A load, a gain, or friction that changes, or effects; the first that explains most.
+    """A load, a gain, or friction that changes, a link, or effects: what is most plausible over all joints.
 
     Args:
         robot: calibrated, with noise of encoders as it was before a model that lacks something took a part of it.
@@ -48,11 +58,26 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
     rows = joint_rows(robot, recordings)
     if rows is None:
         return Asked()
-    changed = changed_load(rows, [recording.path for recording in recordings])
-    causes, gains = confirmed(regressed_causes(rows), test), unsteady_gains(rows)
-    better = [cause for cause in causes if changed and cause.joint == changed.joint]
-    if changed and not any(1.0 - cause.explained < changed.left for cause in better):
-        return Asked(changed=changed)
-    if explain_more(gains, causes):
-        return Asked(gains=gains)
-    return Asked(causes=causes, load_frictions=() if causes else load_frictions(rows))
+    paths = [recording.path for recording in recordings]
+    found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
+    if found.link and not asked_for({f"{EFFECT}@{found.link.joint}"}, test):
+        return Asked()
+    return found if found != Asked() else Asked(load_frictions=load_frictions(rows))
+
+
+def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[RegressedCause, ...]) -> Asked:
+    """Of effects, a link, gains and a load the reason with the most evidence; nothing where there is none.
+
+    Args:
+        rows: of the regression.
+        paths: of its recordings.
+        causes: effects that may be named.
+    """
+    gains, link, changed = unsteady_gains(rows), wrong_link(rows), changed_load(rows, paths)
+    options = [
+        (sum(cause.evidence for cause in causes), Asked(causes=causes)),
+        (sum(gain.evidence for gain in gains), Asked(gains=gains)),
+        (link.evidence if link else 0.0, Asked(link=link)),
+        (changed.evidence if changed else 0.0, Asked(changed=changed)),
+    ]
+    return max(options, key=lambda option: option[0])[1]

@@ -12,12 +12,21 @@ No effect of the catalogue is like this.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit, sigma_of
-from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.regression.joint_regression import (
+    Fit,
+    JointRows,
+    beyond,
+    changes_between,
+    evidence,
+    fit,
+    nearly,
+    sigma_of,
+)
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
 Array = NDArray[np.float64]
@@ -26,7 +35,6 @@ SPEED, SPEEDS, COMMAND, COMMANDS, TIME = "speed", "speeds", "command", "commands
 FORMS = (SPEED, COMMAND, TIME, SPEEDS, COMMANDS)  # simplest first
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left where it is most clear ...
 ALSO = 0.5  # ... and at the other drives; friction or loads that change leave 0.33 or more
-AS_GOOD = 1.2  # times the mean square that the best form leaves, or a named effect, up to which another is as good
 SURE = 4.5  # [sigma], over some 20 blocks: one joint in ten thousand by chance
 SMALL = 0.01  # share of the gain that is lost at the most, below which it matters to nobody
 MOST = 0.5  # share of the gain, beyond which it is something else: drives that lose more saturate
@@ -41,8 +49,10 @@ class UnsteadyGain:
         joint: whose drive.
         form: one of FORMS: with what it falls.
         lost, sigma: share of the gain that is lost where that is largest.
-        explained: share of the mean square that the plain regression leaves.
+        explained: share of the mean square that the plain regression leaves beyond the noise of the encoders.
         with_it: parameters of the joint with it over those without, by name; the constant is that without loss.
+        evidence: for it, at its joint.
+        nearly: how much less of it another cause there may have that is as good.
     """
 
     joint: str
@@ -51,6 +61,8 @@ class UnsteadyGain:
     sigma: float
     explained: float
     with_it: dict[str, float]
+    evidence: float
+    nearly: float
 
 
 def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
@@ -60,22 +72,15 @@ def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
         rows: of the regression.
     """
     found = {form: [one for j in range(rows.robot.n) if (one := _of(rows, j, form)) is not None] for form in FORMS}
-    least = {form: min((1.0 - one.explained for one in some), default=1.0) for form, some in found.items()}
-    clearest = min(least.values())
-    if clearest > LEFT:
+    some = {form: gains for form, gains in found.items() if any(one.explained >= 1.0 - LEFT for one in gains)}
+    if not some:
         return ()
-    as_good = [form for form in FORMS if least[form] <= AS_GOOD * clearest]
+    worth = {form: sum(one.evidence for one in gains) for form, gains in some.items()}
+    clearest = max(worth, key=lambda form: worth[form])
+    least = worth[clearest] - max(one.nearly for one in some[clearest])
+    as_good = [form for form in some if worth[form] >= least]
     form = max(as_good, key=lambda name: (len(found[name]), -FORMS.index(name)))
     return tuple(found[form])
-
-
-def explain_more(gains: tuple[UnsteadyGain, ...], causes: tuple[RegressedCause, ...]) -> bool:
-    """Whether gains that fall leave less open than the effects that regression names, where they do so most clearly."""
-    first = max(gains, key=lambda one: one.explained, default=None)
-    if first is None:
-        return False
-    named = max((cause.explained for cause in causes if cause.joint == first.joint), default=0.0)
-    return AS_GOOD * (1.0 - first.explained) < 1.0 - named
 
 
 def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
@@ -90,8 +95,9 @@ def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
     told = [one for width in WIDTHS if (one := _under(rows, joint, width, columns)) is not None]
     if not told or most <= 0.0:
         return None
-    plain, best, sigma = min(told, key=lambda one: one[1].left / max(one[0].left, 1e-300))
-    factor, left = float(best.more[-1]), best.left / max(plain.left, 1e-300)
+    clearest = min(told, key=lambda one: one.best.left / max(one.plain.left, 1e-300))
+    plain, best, sigma = clearest.plain, clearest.best, clearest.sigma
+    factor, left = float(best.more[-1]), beyond(best.left, clearest.noise) / max(plain.left - clearest.noise, 1e-300)
     lost = factor * most
     if left > ALSO or factor < SURE * sigma or not SMALL < lost < MOST:
         return None
@@ -99,7 +105,8 @@ def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
     changes = changes_between(rows.robot, name, plain, best)
     if min(changes.values(), default=1.0) <= 0.0:  # a constant of that sign is none
         return None
-    return UnsteadyGain(name, form, lost, sigma * most, 1.0 - left, changes)
+    worth = evidence(plain.left, best.left, clearest.seconds, 1)
+    return UnsteadyGain(name, form, lost, sigma * most, 1.0 - left, changes, worth, nearly(clearest.seconds))
 
 
 def _scale(rows: JointRows, recording: int, joint: int, form: str) -> Array:
@@ -116,12 +123,24 @@ def _scale(rows: JointRows, recording: int, joint: int, form: str) -> Array:
     return np.asarray(np.sum(sizes, axis=0))
 
 
-def _under(rows: JointRows, joint: int, width: float, columns: list[list[Array]]) -> tuple[Fit, Fit, float] | None:
-    """The regression without and with it in windows of one width [s], and the sigma of its factor."""
-    without, beside = rows.beside(joint, width, [[] for _ in columns]), rows.beside(joint, width, columns)
+class _Told(NamedTuple):
+    """Regressions without and with it in windows of one width, and the sigma of its factor."""
+
+    plain: Fit
+    best: Fit
+    sigma: float
+    noise: float
+    seconds: float
+
+
+def _under(rows: JointRows, joint: int, width: float, columns: list[list[Array]]) -> _Told | None:
+    """What windows of one width [s] say; None where there are too few."""
+    without = rows.beside(joint, width, rows.with_own(joint, [[] for _ in columns]))
+    beside = rows.beside(joint, width, rows.with_own(joint, columns))
     if without is None or beside is None:
         return None
     sigma = sigma_of(lambda found: float(found.more[-1]), rows.robot, joint, *beside, FEWEST_BLOCKS)
     if sigma is None:
         return None
-    return fit(rows.robot, joint, without[0]), fit(rows.robot, joint, beside[0]), sigma
+    plain, best = fit(rows.robot, joint, without[0]), fit(rows.robot, joint, beside[0])
+    return _Told(plain, best, sigma, rows.noise(joint, width, best), rows.seconds(width, len(beside[0])))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, divided, moved, robot_file
 
+from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
 from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.scoring.regression.unsteady_gains import (
@@ -14,7 +15,6 @@ from jointscope.graphs.scoring.regression.unsteady_gains import (
     SPEED,
     SPEEDS,
     TIME,
-    explain_more,
     unsteady_gains,
 )
 from jointscope.robots.files.robot_file import load_robot
@@ -73,7 +73,7 @@ def test_what_a_gain_falls_with_is_told_and_the_constant_without_loss(robots, un
     rows = rows_of(robots, unit, drive=drive)
     found = unsteady_gains(rows)
     assert {one.form for one in found} == {form} and tuple(one.joint for one in found) == joints
-    assert explain_more(found, regressed_causes(rows))
+    assert most_plausible(rows, ["here"], regressed_causes(rows)).gains == found
     if unit == "A" and form != TIME:
         for one in found:
             assert one.with_it[f"{one.joint}.torque_constant"] > 1.005, "the plain one has a mean loss"
@@ -113,4 +113,4 @@ def dead_band(_, u, __, ___):
 )
 def test_gains_that_stay_are_not_said_to_fall(robots, how):
     rows = rows_of(robots, "A", **how)
-    assert not explain_more(unsteady_gains(rows), regressed_causes(rows))
+    assert most_plausible(rows, ["here"], regressed_causes(rows)).gains == ()
