@@ -75,13 +75,13 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     body = robot.tree.model.inertias[robot.tree.model.getJointId(link.joint)].mass
     alike = f" (or one that {' or '.join(link.alike)} moves, which looks alike here)" if link.alike else ""
     by = f"{link.mass:+.3g} ± {significant(link.sigma, 1)} kg"
-    what = (
-        f"the link that {link.joint} moves{alike} weighs {significant(body + link.mass)} kg, not the "
-        f"{significant(body)} kg of {urdf} ({by}, {100.0 * link.share:+.2g} %)"
-        if not link.moments
-        else f"the link that {link.joint} moves{alike} carries {by} that {urdf} lacks, or has its centre of mass "
-        f"elsewhere, by {_place(link, body + link.mass)} in the frame of {link.joint}"
-    )
+    which = f"the link that {link.joint} moves{alike}"
+    if not link.moments:
+        old, new = significant(body), significant(body + link.mass)
+        what = f"{which} weighs {new} kg, not the {old} kg of {urdf} ({by}, {100.0 * link.share:+.2g} %)"
+    else:
+        load = f"carries a load that {urdf} lacks" if link.mass > 0.0 else f"is not that of {urdf}"
+        what = f"{which} {load}: {by}, and the centre of mass elsewhere by {_place(link, body + link.mass)}"
     drives = ". Drives that make more or less torque than they are asked for would look alike" if link.drives else ""
     found = result.found
     moved = {n: f for n, f in link.with_it.items() if n in found}
@@ -98,7 +98,11 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
 
 def _place(link: WrongLink, mass: float) -> str:
     """Where first moments move the centre of mass."""
-    return "(" + ", ".join(f"{1e3 * moment / max(mass, 1e-9):.0f}" for moment in link.moments) + ") mm"
+    return (
+        "("
+        + ", ".join(f"{1e3 * moment / max(mass, 1e-9):.0f}" for moment in link.moments)
+        + f") mm in the frame of {link.joint}"
+    )
 
 
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:

@@ -82,7 +82,7 @@ class _Rows(NamedTuple):
         joint: index.
         rows: of the joint alone, of the effects that the robot has, and of the link, shape (w, 5 + e + k).
         blocks: of each window, shape (w,).
-        count: columns of the link, k.
+        width: how many columns the link has, k.
         plain: mean square that is left without the link.
         seconds: of motion that the windows tell of.
     """
@@ -90,7 +90,7 @@ class _Rows(NamedTuple):
     joint: int
     rows: Array
     blocks: NDArray[np.intp]
-    count: int
+    width: int
     plain: float
     seconds: float
 
@@ -139,7 +139,7 @@ def _of_drives(rows: JointRows, best: _Told) -> float:
     """Evidence for drives that make less, or more, than they are asked for, where commands are torques."""
     found = 0.0
     for one in best.some:
-        plain = one.rows[:, : -one.count]
+        plain = one.rows[:, : -one.width]
         freed = fit(rows.robot, one.joint, plain, free_gain=True).left
         found += max(evidence(one.plain, freed, one.seconds, 1), 0.0)
     return found
@@ -160,7 +160,7 @@ def _of(rows: JointRows, link: EffectHypothesis, width: float) -> list[_Told]:
         return []
     told = []
     for sizes in (1, len(link.sizes)):
-        kept = [one._replace(rows=one.rows[:, : one.rows.shape[1] - one.count + sizes], count=sizes) for one in some]
+        kept = [one._replace(rows=one.rows[:, : one.rows.shape[1] - one.width + sizes], width=sizes) for one in some]
         found, left = _solved(rows, link, kept)
         worth = [evidence(one.plain, share, one.seconds, 0) for one, share in zip(kept, left, strict=True)]
         cost = evidence(1.0, 1.0, max(one.seconds for one in kept), sizes)
@@ -170,11 +170,12 @@ def _of(rows: JointRows, link: EffectHypothesis, width: float) -> list[_Told]:
 
 def _solved(rows: JointRows, link: EffectHypothesis, some: Sequence[_Rows]) -> tuple[Array, list[float]]:
     """Sizes that all joints agree on, shape (k,), and the mean square that each joint leaves with them."""
-    robot, count = rows.robot, some[0].count
+    robot, count = rows.robot, some[0].width
     gains = [fit(robot, one.joint, one.rows[:, :-count]).gain for one in some]
     free = [fit(robot, one.joint, one.rows).left for one in some]
     prior = np.array([size.prior_sigma for size in link.sizes[:count]])
-    sizes, left = np.zeros(count), list[float]()
+    sizes: Array = np.zeros(count)
+    left = list[float]()
     for _ in range(ROUNDS):
         H, h = np.diag(1.0 / prior**2), np.zeros(count)
         for one, gain, square in zip(some, gains, free, strict=True):
@@ -183,7 +184,7 @@ def _solved(rows: JointRows, link: EffectHypothesis, some: Sequence[_Rows]) -> t
             columns, target = columns - own @ (own.T @ columns), target - own @ (own.T @ target)
             H += columns.T @ columns / max(square, 1e-300)
             h += columns.T @ target / max(square, 1e-300)
-        sizes, left, gains = np.linalg.solve(H, h), [], list(gains)
+        sizes, left, gains = np.asarray(np.linalg.solve(H, h)), [], list(gains)
         for i, one in enumerate(some):
             with_it = fit(robot, one.joint, _with(one, sizes))
             left.append(with_it.left)
@@ -200,8 +201,8 @@ def _unit(columns: Array) -> Array:
 
 def _with(one: _Rows, sizes: Array) -> Array:
     """Rows of a joint whose link weighs what is found: its torque is a part of the load."""
-    rows = one.rows[:, : -one.count].copy()
-    rows[:, 1] += one.rows[:, -one.count :] @ sizes
+    rows = one.rows[:, : -one.width].copy()
+    rows[:, 1] += one.rows[:, -one.width :] @ sizes
     return rows
 
 
@@ -218,15 +219,15 @@ def _sure(rows: JointRows, best: _Told, as_good: Sequence[_Told], drives: bool) 
     if shares[first] > LEFT or len(names) < FEWEST_BLOCKS:
         return None
     others = [_solved(rows, best.here, [one.without(name) for one in best.some])[0] for name in names]
-    C = (len(names) - 1.0) * np.atleast_2d(np.cov(np.array(others).T, bias=True))
-    sigmas = np.sqrt(np.diag(C))
+
+    sigmas = np.sqrt((len(names) - 1.0) * np.var(others, axis=0))
     body = robot.tree.model.inertias[robot.tree.model.getJointId(best.here.here.owner)]
     possible = body.mass + best.found[0] > -SURE * sigmas[0]
     if not possible or np.max(np.abs(best.found) / np.maximum(sigmas, 1e-300)) < SURE:
         return None
     with_it: Changes = {}
     for one in best.some:
-        plain, found = fit(robot, one.joint, one.rows[:, : -one.count]), fit(robot, one.joint, _with(one, best.found))
+        plain, found = fit(robot, one.joint, one.rows[:, : -one.width]), fit(robot, one.joint, _with(one, best.found))
         with_it |= changes_between(robot, robot.joints[one.joint], plain, found)
     if size < LARGE and max((abs(factor - 1.0) for factor in with_it.values()), default=0.0) < MOVED:
         return None
