@@ -32,7 +32,9 @@ BETWEEN = 9  # times around each of them
 EDGE = 0.1  # share of a recording at either end within which nothing is told
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left ...
 THAN_ALWAYS = 0.5  # ... and of what is left where the same acts all the time
-FEWEST = 6  # windows in the stretch and beside it: fewer may be what reversals or steps of a counter leave
+FEWEST = (
+    6  # windows in the stretch and beside it for each size: fewer may be what reversals or steps of a counter leave
+)
 LARGE = 0.01  # of the drive's rms torque
 ENDS = 2  # of a stretch, which are looked for
 BY_CHANCE = 1e-4  # probability that a stretch need not be more plausible than
@@ -196,15 +198,15 @@ class _Search:
             found = fit(self._rows.robot, joint, self._acting(joint, parts, 0, 1))
             seconds[joint] = self._rows.seconds(width, len(parts))
             noise = self._rows.noise(joint, width, found)
-            left, opens[joint] = beyond(found.left, noise), beyond(plain, noise)
+            left, opens[joint] = beyond(found.left, plain, noise)
             shares[joint], torques[joint] = left / max(opens[joint], 1e-300), float(found.more[-1] * found.gain)
             # each joint has sizes of its own, and one at which nothing acts needs none
             worth += max(evidence(plain, found.left, seconds[joint], len(self._columns[joint][0])), 0.0)
-            if left < THAN_ALWAYS * beyond(self._always[joint], noise):
+            if left < THAN_ALWAYS * beyond(found.left, self._always[joint], noise)[1]:
                 told.append(joint)
         worth += evidence(1.0, 1.0, max(seconds.values()), ENDS)
         # a drive that gives nothing, as in a damaged recording, says how large nothing is
-        told = [j for j in told if self._driving[j] > 0.0 and min(self._inside_and_beside(j, stretch)) >= FEWEST]
+        told = [j for j in told if self._driving[j] > 0.0 and self._has_enough(j, stretch)]
         joint = min(told, key=lambda j: shares[j], default=-1)
         if joint < 0:
             return None
@@ -217,8 +219,8 @@ class _Search:
             path, stretch.start, stretch.stop, end, name, size, shares[joint], acted, worth, nearly(seconds[joint])
         )
 
-    def _inside_and_beside(self, joint: int, stretch: _Stretch) -> tuple[int, int]:
-        """Windows of a joint that are for the most part in a stretch, and those that are not."""
+    def _has_enough(self, joint: int, stretch: _Stretch) -> bool:
+        """Whether there are windows enough for the sizes that are told, in a stretch and beside it."""
         flags = list[list[Array]]()
         for i in range(len(self._columns[joint])):
             times = self._rows.times(i)
@@ -227,4 +229,4 @@ class _Search:
         found = self._rows.beside(joint, self._width[joint], flags)
         assert found is not None
         count = int(np.count_nonzero(found[0][:, -1] > 0.5))
-        return count, len(found[0]) - count
+        return min(count, len(found[0]) - count) >= FEWEST * len(self._columns[joint][0])

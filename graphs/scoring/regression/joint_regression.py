@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import INDEPENDENT
 from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
-from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, PLACES, VISCOUS, load_of
+from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, MOST_NOISE, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
 from jointscope.graphs.starts.motion_cells import motion_cells
 from jointscope.graphs.starts.windowed_sums import PER_WINDOW, joint_signals, noise_gains, window_cells, windowed_rows
@@ -253,9 +253,10 @@ def nearly(seconds: float) -> float:
     return evidence(AS_GOOD, 1.0, seconds, 0)
 
 
-def beyond(left: float, noise: float) -> float:
-    """What a mean square has beyond that of noise."""
-    return max(left - noise, 0.0)
+def beyond(left: float, plain: float, noise: float) -> tuple[float, float]:
+    """What is left with a cause and without it beyond the noise of the encoders, as far as that can be believed."""
+    taken_off = min(noise, MOST_NOISE * left)
+    return left - taken_off, plain - taken_off
 
 
 def sigma_of(

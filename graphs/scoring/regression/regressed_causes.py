@@ -28,6 +28,7 @@ from jointscope.graphs.scoring.regression.joint_regression import (
     fit,
 )
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.drive_regression import MOST_NOISE
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
@@ -165,7 +166,8 @@ def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypo
     plain, driving = fit(rows.robot, joint, here), float(np.mean(here[:, 0] ** 2))
     with_columns = [(hypothesis, rows.of(joint, width, hypothesis)) for hypothesis in asked]
     fits = [fit(rows.robot, joint, more, h) for h, more in with_columns if more is not None]
-    fits = [one for one in fits if _is_possible(one)]
+    least = MOST_NOISE * rows.noise(joint, width, plain)
+    fits = [one for one in fits if _is_possible(one) and (one.left > least or not _is_of_command(one))]
     return (
         _Told(plain, fits, driving, len(here), rows.seconds(width, len(here)))
         if fits and plain.left > 0.0 < driving
@@ -183,6 +185,11 @@ def _is_possible(fit: Fit) -> bool:
     scale = 1.0 if isinstance(fit.hypothesis.here.effect, CommandEffect) else fit.gain
     found = zip(fit.hypothesis.sizes, (scale * fit.more[len(fit.more) - fit.sizes :]).tolist(), strict=True)
     return all(value > 0.0 for size, value in found if size.sign == "+")
+
+
+def _is_of_command(fit: Fit) -> bool:
+    """Whether its column is made of the command that is regressed on it, and may hold its noise as well."""
+    return fit.hypothesis is not None and isinstance(fit.hypothesis.here.effect, CommandEffect)
 
 
 def _is_own(fit: Fit) -> bool:

@@ -35,6 +35,7 @@ SPEED, SPEEDS, COMMAND, COMMANDS, TIME = "speed", "speeds", "command", "commands
 FORMS = (SPEED, COMMAND, TIME, SPEEDS, COMMANDS)  # simplest first
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left where it is most clear ...
 ALSO = 0.5  # ... and at the other drives; friction or loads that change leave 0.33 or more
+BY_CHANCE = 1e-4  # probability that it need not be more plausible than
 SURE = 4.5  # [sigma], over some 20 blocks: one joint in ten thousand by chance
 SMALL = 0.01  # share of the gain that is lost at the most, below which it matters to nobody
 MOST = 0.5  # share of the gain, beyond which it is something else: drives that lose more saturate
@@ -72,7 +73,7 @@ def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
         rows: of the regression.
     """
     found = {form: [one for j in range(rows.robot.n) if (one := _of(rows, j, form)) is not None] for form in FORMS}
-    some = {form: gains for form, gains in found.items() if any(one.explained >= 1.0 - LEFT for one in gains)}
+    some = {form: gains for form, gains in found.items() if any(map(_is_clear, gains))}
     if not some:
         return ()
     worth = {form: sum(one.evidence for one in gains) for form, gains in some.items()}
@@ -81,6 +82,10 @@ def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
     as_good = [form for form in some if worth[form] >= least]
     form = max(as_good, key=lambda name: (len(found[name]), -FORMS.index(name)))
     return tuple(found[form])
+
+
+def _is_clear(one: UnsteadyGain) -> bool:
+    return one.explained >= 1.0 - LEFT and one.evidence > -np.log(BY_CHANCE)
 
 
 def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
@@ -97,7 +102,8 @@ def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
         return None
     clearest = min(told, key=lambda one: one.best.left / max(one.plain.left, 1e-300))
     plain, best, sigma = clearest.plain, clearest.best, clearest.sigma
-    factor, left = float(best.more[-1]), beyond(best.left, clearest.noise) / max(plain.left - clearest.noise, 1e-300)
+    open_with, open_without = beyond(best.left, plain.left, clearest.noise)
+    factor, left = float(best.more[-1]), open_with / max(open_without, 1e-300)
     lost = factor * most
     if left > ALSO or factor < SURE * sigma or not SMALL < lost < MOST:
         return None
