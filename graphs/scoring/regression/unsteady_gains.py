@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-r"""Drives whose constant is none: it falls with speed, with what they give, or as time goes by.
+r"""Drives whose constant is none: it falls with speed, with what they give, or as time goes by; or their friction does.
 
     k (1 - c s) u = M a + c + g + b a + d v + mu sign(v),      s >= 0
+    k u = M a + c + g + b a + (1 - c t) (d v + mu sign(v))
 
 with s the speed of the joint, the speed of all (a supply that sags), |u| of the drive (magnetic saturation), |u| of
-all, or time (a motor that warms). The mean of such a gain is what a calibration takes for the constant, and it leaves
-so little open that residuals hardly tell. Beside the motion, s u is a column of the regression; its factor is c.
-No effect of the catalogue is like this.
+all, or time (a motor that warms); lubricants that warm take friction with them. The mean of such a gain is what a
+calibration takes for the constant, and it leaves so little open that residuals hardly tell. Beside the motion, s u or
+t (d v + mu sign(v)) is a column of the regression; its factor is c. No effect of the catalogue is like this.
 """
 
 from __future__ import annotations
@@ -27,12 +28,14 @@ from jointscope.graphs.scoring.regression.joint_regression import (
     nearly,
     sigma_of,
 )
+from jointscope.graphs.starts.drive_regression import DRY, PLACES, VISCOUS
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 
 Array = NDArray[np.float64]
 
 SPEED, SPEEDS, COMMAND, COMMANDS, TIME = "speed", "speeds", "command", "commands", "time"
-FORMS = (SPEED, COMMAND, TIME, SPEEDS, COMMANDS)  # simplest first
+FRICTION = "friction"  # that falls with time
+FORMS = (SPEED, COMMAND, TIME, FRICTION, SPEEDS, COMMANDS)  # simplest first
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left where it is most clear ...
 ALSO = 0.5  # ... and at the other drives; friction or loads that change leave 0.33 or more
 BY_CHANCE = 1e-4  # probability that it need not be more plausible than
@@ -40,16 +43,17 @@ SURE = 4.5  # [sigma], over some 20 blocks: one joint in ten thousand by chance
 SMALL = 0.01  # share of the gain that is lost at the most, below which it matters to nobody
 MOST = 0.5  # share of the gain, beyond which it is something else: drives that lose more saturate
 FEWEST_BLOCKS = 8
+ROUNDS = 3  # in which friction is found with its fall
 
 
 @dataclass(frozen=True)
 class UnsteadyGain:
-    """A drive whose gain falls.
+    """A drive whose gain, or friction, falls.
 
     Attributes:
         joint: whose drive.
         form: one of FORMS: with what it falls.
-        lost, sigma: share of the gain that is lost where that is largest.
+        lost, sigma: share of the gain, or friction, that is lost where that is largest.
         explained: share of the mean square that the plain regression leaves beyond the noise of the encoders.
         with_it: parameters of the joint with it over those without, by name; the constant is that without loss.
         evidence: for it, at its joint.
@@ -90,14 +94,11 @@ def _is_clear(one: UnsteadyGain) -> bool:
 
 def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
     """What the windows in which it is clearest say of one drive; None where they say nothing."""
-    motions = rows.motions(joint)
     if form in (SPEEDS, COMMANDS) and rows.robot.n == 1:  # the same as those of one
         return None
-    scales = [_scale(rows, i, joint, form) for i in range(len(motions))]
+    scales = [_scale(rows, i, joint, form) for i in range(len(rows.motions(joint)))]
     most = max(float(np.max(scale)) for scale in scales)
-    driving = [signals[:, SIGNALS.index("command")] for signals, _ in motions]
-    columns = [[scale * u] for scale, u in zip(scales, driving, strict=True)]
-    told = [one for width in WIDTHS if (one := _under(rows, joint, width, columns)) is not None]
+    told = [one for width in WIDTHS if (one := _under(rows, joint, width, form, scales)) is not None]
     if not told or most <= 0.0:
         return None
     clearest = min(told, key=lambda one: one.best.left / max(one.plain.left, 1e-300))
@@ -119,7 +120,7 @@ def _scale(rows: JointRows, recording: int, joint: int, form: str) -> Array:
     """What a gain may fall with, shape (m,)."""
     signals = [rows.motions(j)[recording][0] for j in range(rows.robot.n)]
     of = SIGNALS.index("viscous" if form in (SPEED, SPEEDS) else "command")
-    if form == TIME:
+    if form in (TIME, FRICTION):
         return np.linspace(0.0, 1.0, len(signals[joint]))
     if form in (SPEED, COMMAND):
         return np.abs(signals[joint][:, of])
@@ -139,14 +140,27 @@ class _Told(NamedTuple):
     seconds: float
 
 
-def _under(rows: JointRows, joint: int, width: float, columns: list[list[Array]]) -> _Told | None:
+def _under(rows: JointRows, joint: int, width: float, form: str, scales: list[Array]) -> _Told | None:
     """What windows of one width [s] say; None where there are too few."""
-    without = rows.beside(joint, width, rows.with_own(joint, [[] for _ in columns]))
-    beside = rows.beside(joint, width, rows.with_own(joint, columns))
-    if without is None or beside is None:
+    without = rows.beside(joint, width, rows.with_own(joint, [[] for _ in scales]))
+    if without is None:
         return None
+    plain = best = fit(rows.robot, joint, without[0])
+    for _ in range(ROUNDS if form == FRICTION else 1):
+        falling = [_falling(signals, best, form) for signals, _ in rows.motions(joint)]
+        columns = [[scale * what] for scale, what in zip(scales, falling, strict=True)]
+        beside = rows.beside(joint, width, rows.with_own(joint, columns))
+        assert beside is not None
+        best = fit(rows.robot, joint, beside[0])
     sigma = sigma_of(lambda found: float(found.more[-1]), rows.robot, joint, *beside, FEWEST_BLOCKS)
     if sigma is None:
         return None
-    plain, best = fit(rows.robot, joint, without[0]), fit(rows.robot, joint, beside[0])
     return _Told(plain, best, sigma, rows.noise(joint, width, best), rows.seconds(width, len(beside[0])))
+
+
+def _falling(signals: Array, found: Fit, form: str) -> Array:
+    """What is lost where all of it is, in units of the command, shape (m,)."""
+    if form != FRICTION:
+        return np.asarray(signals[:, SIGNALS.index("command")])
+    laws = found.laws()
+    return np.asarray(-sum(laws.get(law, 0.0) * signals[:, PLACES[law]] for law in (VISCOUS, DRY)) / found.gain)

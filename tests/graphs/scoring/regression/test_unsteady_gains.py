@@ -12,6 +12,7 @@ from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.scoring.regression.unsteady_gains import (
     COMMAND,
+    FRICTION,
     SPEED,
     SPEEDS,
     TIME,
@@ -93,6 +94,21 @@ def dead_band(_, u, __, ___):
     return np.sign(u) * np.maximum(np.abs(u) - np.array([0.0, 0.25, 0.0]), 0.0)
 
 
+def warming(t, u, _, data):
+    friction = np.array(ARM.dry) * np.tanh(SHARP * data.qvel) + np.array(ARM.viscous) * data.qvel
+    return u + 0.2 * t / SECONDS * friction
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+@pytest.mark.parametrize("drive", [warming, friction_that_falls])
+def test_friction_that_falls_with_time_is_no_gain_that_does(robots, unit, drive):
+    found = most_plausible(rows := rows_of(robots, unit, drive=drive), ["here"], regressed_causes(rows))
+    assert {one.form for one in found.gains} == {FRICTION} and found.causes == () and found.changed is None
+    assert {one.joint for one in found.gains} == {"j0", "j1", "j2"}
+    if drive is warming:
+        assert [one.lost for one in found.gains] == pytest.approx([0.2] * 3, abs=0.02)
+
+
 @pytest.mark.parametrize(
     "how",
     [
@@ -106,7 +122,6 @@ def dead_band(_, u, __, ___):
         {"cable": 3.0},
         {"push": (4.0, 4.6, 1, 8.0)},
         {"drive": growing_friction},
-        {"drive": friction_that_falls},
         {"drive": dead_band},
     ],
     ids=lambda how: " ".join(f"{key} {getattr(value, '__name__', value)}" for key, value in how.items()),
