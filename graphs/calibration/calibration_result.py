@@ -220,8 +220,7 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        named = self.asked != Asked()
-        return late or heavy or named or any(bag.isolated for bag in self.bags)
+        return late or heavy or self.asked.names or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

@@ -9,7 +9,7 @@ thing are one too many, and at one joint alone a heavier link is like a gain tha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from jointscope.graphs.scoring.regression.changed_load import ChangedLoad, changed_load
 from jointscope.graphs.scoring.regression.joint_regression import JointRows, joint_rows
@@ -18,6 +18,7 @@ from jointscope.graphs.scoring.regression.regressed_causes import (
     RegressedCause,
     asked_for,
     confirmed,
+    late_commands,
     regressed_causes,
 )
 from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, unsteady_gains
@@ -27,10 +28,12 @@ from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
+COMPARABLE = 0.5  # of the evidence for a reason, from which late commands may be another one beside it
+
 
 @dataclass(frozen=True)
 class Asked:
-    """What regression says; of these at most one.
+    """What regression says; of the reasons at most one.
 
     Attributes:
         causes: effects that regression names, joint by joint, and the calibration asks for, too.
@@ -38,6 +41,7 @@ class Asked:
         changed: when the robot takes up or sets down a load, or is pushed; None where nothing tells of it.
         gains: drives whose constant falls with speed, command or time, which no effect of the catalogue knows.
         load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
+        late: whether commands that act later, or earlier, than stamped would explain as much, if roughly.
     """
 
     causes: tuple[RegressedCause, ...] = ()
@@ -45,6 +49,12 @@ class Asked:
     changed: ChangedLoad | None = None
     gains: tuple[UnsteadyGain, ...] = ()
     load_frictions: tuple[LoadFriction, ...] = ()
+    late: bool = True
+
+    @property
+    def names(self) -> bool:
+        """Whether there is a reason."""
+        return replace(self, late=True) != Asked()
 
 
 def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: ScoreTest) -> Asked:
@@ -61,8 +71,8 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
     paths = [recording.path for recording in recordings]
     found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
     if found.link and not asked_for({f"{EFFECT}@{found.link.joint}"}, test):
-        return Asked()
-    return found if found != Asked() else Asked(load_frictions=load_frictions(rows))
+        return Asked(late=found.late)
+    return found if found.names else replace(found, load_frictions=load_frictions(rows))
 
 
 def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[RegressedCause, ...]) -> Asked:
@@ -79,5 +89,7 @@ def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[Regresse
         (sum(gain.evidence for gain in gains), Asked(gains=gains)),
         (link.evidence if link else 0.0, Asked(link=link)),
         (changed.evidence if changed else 0.0, Asked(changed=changed)),
+        (late := late_commands(rows), Asked()),
     ]
-    return max(options, key=lambda option: option[0])[1]
+    worth, best = max(options, key=lambda option: option[0])
+    return replace(best, late=late > COMPARABLE * worth)

@@ -37,6 +37,7 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 MOST_SHAPES = 10  # of an effect: with more, some fit what they are not
+DELAY = "command_delay"
 WEIGHTS = ("gravity_imbalance",)  # torques of a joint that are a wrong weight as well: masses are asked for elsewhere
 CONSTANTS = ("torque_constant_error",)  # what the regression has anyhow
 LEFT = 0.5  # of the mean square, that an effect may leave of what the plain regression leaves
@@ -74,6 +75,24 @@ class RegressedCause:
         return f"{self.effect}@{self.joint}"
 
 
+class _Told(NamedTuple):
+    """Regressions in windows of one width.
+
+    Attributes:
+        plain: without any effect.
+        fits: with one each.
+        driving: mean square of the commands.
+        windows: how many.
+        seconds: that they tell of.
+    """
+
+    plain: Fit
+    fits: list[Fit]
+    driving: float
+    windows: int
+    seconds: float
+
+
 def regressed_causes(rows: JointRows) -> tuple[RegressedCause, ...]:
     """What the joints lack, in the order of the joints; nothing where regression tells nothing.
 
@@ -96,6 +115,23 @@ def confirmed(causes: Sequence[RegressedCause], test: ScoreTest) -> tuple[Regres
     return tuple(cause for cause in causes if cause.effect in effects)
 
 
+def late_commands(rows: JointRows) -> float:
+    """Evidence that commands act later, or earlier, than stamped, over all joints; zero where nothing tells of it.
+
+    Args:
+        rows: of the regression.
+    """
+    delays, worth = [h for h in hypotheses_of(rows.robot) if h.here.effect.id == DELAY], 0.0
+    for joint in range(rows.robot.n):
+        tried = [_under(rows, joint, width, delays) for width in WIDTHS]
+        worth += max((_of_first(one) for one in tried if one is not None), default=0.0)
+    return worth
+
+
+def _of_first(told: _Told) -> float:
+    return max(evidence(told.plain.left, min(fit.left for fit in told.fits), told.seconds, 1), 0.0)
+
+
 def asked_for(labels: Collection[str], test: ScoreTest) -> set[str]:
     """Which effects a calibration asks for, by id, if only at one joint: what one's noise hides another's shows.
 
@@ -113,24 +149,6 @@ def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
     asked = [h for h in hypotheses_of(robot) if h.here.effect.id not in CONSTANTS]
     shapes = Counter(h.label for h in asked)
     return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
-
-
-class _Told(NamedTuple):
-    """Regressions in windows of one width.
-
-    Attributes:
-        plain: without any effect.
-        fits: with one each.
-        driving: mean square of the commands.
-        windows: how many.
-        seconds: that they tell of.
-    """
-
-    plain: Fit
-    fits: list[Fit]
-    driving: float
-    windows: int
-    seconds: float
 
 
 def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) -> RegressedCause | None:

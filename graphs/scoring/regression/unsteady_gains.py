@@ -151,11 +151,12 @@ def _under(rows: JointRows, joint: int, width: float, form: str, scales: list[Ar
         columns = [[scale * what] for scale, what in zip(scales, falling, strict=True)]
         beside = rows.beside(joint, width, rows.with_own(joint, columns))
         assert beside is not None
-        best = fit(rows.robot, joint, beside[0])
-    sigma = sigma_of(lambda found: float(found.more[-1]), rows.robot, joint, *beside, FEWEST_BLOCKS)
+        here, blocks = beside
+        best = fit(rows.robot, joint, here)
+    sigma = sigma_of(lambda found: float(found.more[-1]), rows.robot, joint, here, blocks, FEWEST_BLOCKS)
     if sigma is None:
         return None
-    return _Told(plain, best, sigma, rows.noise(joint, width, best), rows.seconds(width, len(beside[0])))
+    return _Told(plain, best, sigma, rows.noise(joint, width, best), rows.seconds(width, len(here)))
 
 
 def _falling(signals: Array, found: Fit, form: str) -> Array:
