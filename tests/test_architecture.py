@@ -17,7 +17,7 @@ robots.dynamics robots.recordings robots.rests robots.files robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.workers graphs.spread graphs.gtsam_solvers graphs.noise
 graphs.starts graphs.scoring.columns
-graphs.scoring graphs.calibration.stages graphs.calibration
+graphs.scoring graphs.scoring.regression graphs.calibration.stages graphs.calibration
 graphs.responses graphs.frequency graphs.rests graphs.rest_search graphs.poses graphs.joint_kinds
 graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.transmission graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay

@@ -40,9 +40,9 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
-from jointscope.graphs.scoring.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve

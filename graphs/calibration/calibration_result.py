@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
-from jointscope.graphs.scoring.asked_by_regression import Asked
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
+from jointscope.graphs.scoring.regression.asked_by_regression import Asked
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
@@ -220,8 +220,7 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        named = self.asked != Asked()
-        return late or heavy or named or any(bag.isolated for bag in self.bags)
+        return late or heavy or self.asked.names or any(bag.isolated for bag in self.bags)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

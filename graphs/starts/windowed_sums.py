@@ -85,7 +85,7 @@ def windowed_sums(cells: MotionCells, signals: Array, noise: Array, width: float
     for j, (rows, block, count) in enumerate(rows_of_joints):
         counts = np.bincount(block, minlength=count).astype(float)
         products = np.stack([part.T @ part for part in np.split(rows, np.cumsum(counts[:-1]).astype(int))])
-        velocity, acceleration = _noise_gains(float(cells.periods[j]), length)
+        velocity, acceleration = noise_gains(float(cells.periods[j]), length)
         of_noise = np.zeros((5, 5))
         of_noise[1, 1], of_noise[1, 4], of_noise[4, 4] = acceleration * noise[j]
         of_noise[4, 1], of_noise[2, 2] = of_noise[1, 4], velocity * noise[j, 2]
@@ -111,9 +111,9 @@ def windowed_rows(
         For each joint the rows, shape (w, k), the block of each, shape (w,), and how many blocks there are; nothing
         where the recording is shorter than a window. Then the length of a window [s].
     """
-    signals, known, h = _coarser(signals, cells, max(round(width / cells.h) // CELLS, 1))
+    together, length = window_cells(cells, width)
+    signals, known, h = _coarser(signals, cells, together)
     m, n = signals.shape[:2]
-    length = max(round(width / h), FEWEST_CELLS)
     if length > m:
         return [], length * h
     window = smooth_window(length)
@@ -129,6 +129,12 @@ def windowed_rows(
     return found, length * h
 
 
+def window_cells(cells: MotionCells, width: float) -> tuple[int, int]:
+    """How many cells are taken together, and how many of these make a window of some width [s]."""
+    together = max(round(width / cells.h) // CELLS, 1)
+    return together, max(round(width / (together * cells.h)), FEWEST_CELLS)
+
+
 def _coarser(signals: Array, cells: MotionCells, count: int) -> tuple[Array, NDArray[np.bool_], float]:
     """Signals of so many cells in one, which of them are known, and their length [s]; means of means are means."""
     m = len(signals) // count * count
@@ -137,7 +143,7 @@ def _coarser(signals: Array, cells: MotionCells, count: int) -> tuple[Array, NDA
     return means, np.asarray(known, dtype=np.bool_), count * cells.h
 
 
-def _noise_gains(period: float, width: float) -> tuple[float, float]:
+def noise_gains(period: float, width: float) -> tuple[float, float]:
     """Variance of a windowed velocity and acceleration per variance of a position that is sampled at every period."""
     omega = 2.0 * np.pi / width
     return period * omega**2 / (2.0 * width), period * omega**4 / (2.0 * width)

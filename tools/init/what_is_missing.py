@@ -10,10 +10,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from jointscope.graphs.scoring.changed_load import LEFT, changed_load
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
-from jointscope.graphs.scoring.joint_regression import JointRows, fit, joint_rows
-from jointscope.graphs.scoring.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.changed_load import LEFT, changed_load
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, fit, joint_rows
+from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument

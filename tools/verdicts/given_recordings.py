@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.scoring.changed_load import ChangedLoad
+from jointscope.graphs.scoring.regression.changed_load import ChangedLoad
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant

@@ -7,9 +7,17 @@ from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
-from jointscope.graphs.scoring.load_friction import LoadFriction
-from jointscope.graphs.scoring.regressed_causes import RegressedCause
-from jointscope.graphs.scoring.unsteady_gains import COMMAND, COMMANDS, SPEED, SPEEDS, TIME, UnsteadyGain
+from jointscope.graphs.scoring.regression.load_friction import LoadFriction
+from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.regression.unsteady_gains import (
+    COMMAND,
+    COMMANDS,
+    FRICTION,
+    SPEED,
+    SPEEDS,
+    TIME,
+    UnsteadyGain,
+)
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
@@ -28,6 +36,7 @@ FALLS_WITH = {  # how a gain falls, with what reason, and what helps
         "a motor that warms, or a battery that runs down",
         "Record when it is warm, or calibrate shorter recordings one by one",
     ),
+    FRICTION: ("as time goes by", "a lubricant that warms", "Record when it is warm, or shorter recordings one by one"),
 }
 MOST_ALIKE = 2
 MOST_CHANGES = 3
@@ -40,6 +49,8 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
         return "info", "Without masses this cannot be checked."
     if given(result):
         return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
+    if result.asked.link:
+        return "info", "That cannot be told as long as a link weighs something else than the URDF says."
     if result.asked.causes:
         return _named(result)
     if result.asked.gains:
@@ -89,8 +100,9 @@ def _falling_gains(result: CalibrationResult) -> str:
         for one in told
     )
     what, reason, cure = FALLS_WITH[told[0].form]
+    loses = "friction falls" if told[0].form == FRICTION else "a unit of the command makes less torque"
     return (
-        f"By regression a unit of the command makes less torque {what}, at {listed}: {reason}. With it "
+        f"By regression {loses} {what}, at {listed}: {reason}. With it "
         f"{_factors(result, told)}. No effect of the catalogue knows this. {cure}, then calibrate again."
     )
 

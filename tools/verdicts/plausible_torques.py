@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.scoring.regression.wrong_links import WrongLink
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
 from jointscope.robots.model.command_words import edited_argument, init_command, robot_argument
@@ -45,6 +46,8 @@ def plausible_torques(result: CalibrationResult) -> tuple[str, str]:
             f"{strong.name} is {significant(strong.value)} N m/A, more than any drive makes: masses of "
             f"{robot.tree.urdf.name} in grams, or commands in another unit? Correct it, then {_again(result)}."
         )
+    if (link := result.asked.link) is not None:
+        return "bad", _wrong_link(result, link)
     return _torques(result) or _load(result, constants) or _scale(result, constants) or ("good", _nothing(constants))
 
 
@@ -66,9 +69,46 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
     )
 
 
+def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
+    """A link that weighs something else by regression: by how much, what that changes, and what to do."""
+    robot, urdf = result.robot, result.robot.tree.urdf.name
+    body = robot.tree.model.inertias[robot.tree.model.getJointId(link.joint)].mass
+    alike = f" (or one that {' or '.join(link.alike)} moves, which looks alike here)" if link.alike else ""
+    by = f"{link.mass:+.3g} ± {significant(link.sigma, 1)} kg"
+    which = f"the link that {link.joint} moves{alike}"
+    if not link.moments:
+        old, new = significant(body), significant(body + link.mass)
+        what = f"{which} weighs {new} kg, not the {old} kg of {urdf} ({by}, {100.0 * link.share:+.2g} %)"
+    else:
+        load = f"carries a load that {urdf} lacks" if link.mass > 0.0 else f"is not that of {urdf}"
+        what = f"{which} {load}: {by}, and the centre of mass elsewhere by {_place(link, body + link.mass)}"
+    drives = ". Drives that make more or less torque than they are asked for would look alike" if link.drives else ""
+    found = result.found
+    moved = {n: f for n, f in link.with_it.items() if n in found}
+    worst = max(moved, key=lambda name: abs(moved[name] - 1.0), default="")
+    then = f"; with it {worst} would be {100.0 * (moved[worst] - 1.0):+.2g} %" if worst else ""
+    output = edited_argument(result.start, "link_mass")
+    return (
+        f"By regression of all joints {what}: that is the shape of {100.0 * link.explained:.0f} % of what is missing "
+        f"at {link.seen_at}, {significant(100.0 * link.size, 2)} % of its drive's torque{then}{drives}. Correct the "
+        f"URDF, then {_again(result)}; or let it be found: `jointscope add {robot_argument(result.start)} "
+        f"link_mass@{link.joint} -o {output}`, then calibrate again."
+    )
+
+
+def _place(link: WrongLink, mass: float) -> str:
+    """Where first moments move the centre of mass."""
+    return (
+        "("
+        + ", ".join(f"{1e3 * moment / max(mass, 1e-9):.0f}" for moment in link.moments)
+        + f") mm in the frame of {link.joint}"
+    )
+
+
 def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """One link that weighs something else: what that would change is wrong by as much."""
-    named = result.asked.causes or given(result)  # to one linear step these look like masses
+    # to one linear step these look like masses
+    named = result.asked.causes or result.asked.gains or given(result)
     for mass in () if named else result.masses:
         shares = mass.moved(result.found)
         if not shares:
@@ -102,7 +142,7 @@ def _another_place(result: CalibrationResult, joint: str) -> str:
 def _torques(result: CalibrationResult) -> tuple[str, str] | None:
     """Commands in N m: by regression one of them makes one, or masses and torques do not go together."""
     robot = result.robot
-    if robot.command.unit != "N m":
+    if robot.command.unit != "N m" or result.asked.gains or given(result):
         return None
     found = {joint: result.regressed.get(f"{joint}.{CONSTANT}") for joint in robot.joints}
     off = {j: v for j, v in found.items() if v is not None and abs(v.value - 1.0) > max(MASSES[0], SURE * v.sigma)}

@@ -11,7 +11,7 @@ import pytest
 from simulated_arm import Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
-from jointscope.graphs.scoring.asked_by_regression import Asked
+from jointscope.graphs.scoring.regression.asked_by_regression import Asked
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording

@@ -23,6 +23,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.command_line import main
 from jointscope.tools.verdicts.judgement import judge
+from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
 
 JOINTS = ("shoulder", "elbow")
@@ -137,7 +138,15 @@ def test_a_load_that_the_urdf_lacks_is_no_good_result(three_joints):
     assert max(channel.chi2 for channel in lacking.channels.values()) < 1.2  # no residual shows it
     level, text = plausible_torques(lacking)
     assert level == "bad"
-    assert "a load " in text and "that lacking.urdf lacks" in text
+    told = re.search(r"the link that wrist moves weighs (\S+) kg, not the 1.70 kg of lacking.urdf", text)
+    assert told is not None and float(told[1]) == pytest.approx(2.0, rel=0.02), text
+
+
+@pytest.mark.slow
+def test_a_link_that_is_named_is_added_and_nothing_else_is_said(three_joints):
+    lacking = three_joints["lacking"]
+    assert "link_mass@wrist" in plausible_torques(lacking)[1]
+    assert missing_effects(lacking)[0] == "info"
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.joint_regression import JointRows, fit
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, beyond, evidence, fit, nearly
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue
@@ -32,9 +32,12 @@ BETWEEN = 9  # times around each of them
 EDGE = 0.1  # share of a recording at either end within which nothing is told
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left ...
 THAN_ALWAYS = 0.5  # ... and of what is left where the same acts all the time
-SIMPLER = 2.0  # times the square that a load leaves, which a push may leave: loads have four sizes where it has one
-FEWEST = 6  # windows in the stretch and beside it: fewer may be what reversals or steps of a counter leave
+FEWEST = (
+    6  # windows in the stretch and beside it for each size: fewer may be what reversals or steps of a counter leave
+)
 LARGE = 0.01  # of the drive's rms torque
+ENDS = 2  # of a stretch, which are looked for
+BY_CHANCE = 1e-4  # probability that a stretch need not be more plausible than
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,10 @@ class ChangedLoad:
         end: of the recording [s].
         joint: whose torque shows it most clearly.
         size: rms of the torque that comes with it there, over that of its drive.
-        left: share of the mean square there that the plain regression leaves.
+        left: share of the mean square there that the plain regression leaves beyond the noise of the encoders.
         push: torque on that joint, where it stays the same while the joint moves [N m]; zero for a load.
+        evidence: for it, over all joints.
+        nearly: how much less of it another cause may have that is as good.
     """
 
     path: str
@@ -59,6 +64,8 @@ class ChangedLoad:
     size: float
     left: float
     push: float = 0.0
+    evidence: float = 0.0
+    nearly: float = 0.0
 
 
 class _Stretch(NamedTuple):
@@ -86,7 +93,7 @@ def changed_load(rows: JointRows, paths: Sequence[str]) -> ChangedLoad | None:
     loaded = load.change(load.best(), paths, push=False) if load.joints else None
     if pushed is None or loaded is None:
         return pushed or loaded
-    return pushed if pushed.left < SIMPLER * loaded.left else loaded
+    return pushed if pushed.evidence >= loaded.evidence - loaded.nearly else loaded  # a push is simpler
 
 
 def _width(rows: JointRows, joint: int) -> float | None:
@@ -184,26 +191,36 @@ class _Search:
 
     def change(self, stretch: _Stretch, paths: Sequence[str], push: bool) -> ChangedLoad | None:
         """What is told of a stretch; None where it does not explain nearly all, or something that always acts does."""
-        edges, shares, torques = np.array([stretch.start, stretch.stop]), {}, {}
+        edges, shares, told, torques = np.array([stretch.start, stretch.stop]), dict[int, float](), [], {}
+        worth, opens, seconds = 0.0, dict[int, float](), dict[int, float]()
         for joint in self.joints:
-            parts = self._parts(joint, stretch.recording, edges)
+            parts, plain, width = self._parts(joint, stretch.recording, edges), self._plain[joint], self._width[joint]
             found = fit(self._rows.robot, joint, self._acting(joint, parts, 0, 1))
-            shares[joint], torques[joint] = found.left / self._plain[joint], float(found.more[-1] * found.gain)
-        told = [j for j in self.joints if shares[j] * self._plain[j] < THAN_ALWAYS * self._always[j]]
+            seconds[joint] = self._rows.seconds(width, len(parts))
+            noise = self._rows.noise(joint, width, found)
+            left, opens[joint] = beyond(found.left, plain, noise)
+            shares[joint], torques[joint] = left / max(opens[joint], 1e-300), float(found.more[-1] * found.gain)
+            # each joint has sizes of its own, and one at which nothing acts needs none
+            worth += max(evidence(plain, found.left, seconds[joint], len(self._columns[joint][0])), 0.0)
+            if left < THAN_ALWAYS * beyond(found.left, self._always[joint], noise)[1]:
+                told.append(joint)
+        worth += evidence(1.0, 1.0, max(seconds.values()), ENDS)
         # a drive that gives nothing, as in a damaged recording, says how large nothing is
-        told = [j for j in told if self._driving[j] > 0.0 and min(self._inside_and_beside(j, stretch)) >= FEWEST]
+        told = [j for j in told if self._driving[j] > 0.0 and self._has_enough(j, stretch)]
         joint = min(told, key=lambda j: shares[j], default=-1)
         if joint < 0:
             return None
-        size = float(np.sqrt(max(1.0 - shares[joint], 0.0) * self._plain[joint] / self._driving[joint]))
-        if shares[joint] > LEFT or size < LARGE:
+        size = float(np.sqrt(max(1.0 - shares[joint], 0.0) * opens[joint] / self._driving[joint]))
+        if shares[joint] > LEFT or size < LARGE or worth < -np.log(BY_CHANCE):
             return None
         end, name = self._rows.spans()[stretch.recording][1], self._rows.robot.joints[joint]
         acted, path = -torques[joint] if push else 0.0, paths[stretch.recording]
-        return ChangedLoad(path, stretch.start, stretch.stop, end, name, size, shares[joint], acted)
+        return ChangedLoad(
+            path, stretch.start, stretch.stop, end, name, size, shares[joint], acted, worth, nearly(seconds[joint])
+        )
 
-    def _inside_and_beside(self, joint: int, stretch: _Stretch) -> tuple[int, int]:
-        """Windows of a joint that are for the most part in a stretch, and those that are not."""
+    def _has_enough(self, joint: int, stretch: _Stretch) -> bool:
+        """Whether there are windows enough for the sizes that are told, in a stretch and beside it."""
         flags = list[list[Array]]()
         for i in range(len(self._columns[joint])):
             times = self._rows.times(i)
@@ -212,4 +229,4 @@ class _Search:
         found = self._rows.beside(joint, self._width[joint], flags)
         assert found is not None
         count = int(np.count_nonzero(found[0][:, -1] > 0.5))
-        return count, len(found[0]) - count
+        return min(count, len(found[0]) - count) >= FEWEST * len(self._columns[joint][0])

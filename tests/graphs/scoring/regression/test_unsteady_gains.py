@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, divided, moved, robot_file
 
-from jointscope.graphs.scoring.joint_regression import joint_rows
-from jointscope.graphs.scoring.regressed_causes import regressed_causes
-from jointscope.graphs.scoring.unsteady_gains import COMMAND, SPEED, SPEEDS, TIME, explain_more, unsteady_gains
+from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
+from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.unsteady_gains import (
+    COMMAND,
+    FRICTION,
+    SPEED,
+    SPEEDS,
+    TIME,
+    unsteady_gains,
+)
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -66,7 +74,7 @@ def test_what_a_gain_falls_with_is_told_and_the_constant_without_loss(robots, un
     rows = rows_of(robots, unit, drive=drive)
     found = unsteady_gains(rows)
     assert {one.form for one in found} == {form} and tuple(one.joint for one in found) == joints
-    assert explain_more(found, regressed_causes(rows))
+    assert most_plausible(rows, ["here"], regressed_causes(rows)).gains == found
     if unit == "A" and form != TIME:
         for one in found:
             assert one.with_it[f"{one.joint}.torque_constant"] > 1.005, "the plain one has a mean loss"
@@ -86,6 +94,21 @@ def dead_band(_, u, __, ___):
     return np.sign(u) * np.maximum(np.abs(u) - np.array([0.0, 0.25, 0.0]), 0.0)
 
 
+def warming(t, u, _, data):
+    friction = np.array(ARM.dry) * np.tanh(SHARP * data.qvel) + np.array(ARM.viscous) * data.qvel
+    return u + 0.2 * t / SECONDS * friction
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+@pytest.mark.parametrize("drive", [warming, friction_that_falls])
+def test_friction_that_falls_with_time_is_no_gain_that_does(robots, unit, drive):
+    found = most_plausible(rows := rows_of(robots, unit, drive=drive), ["here"], regressed_causes(rows))
+    assert {one.form for one in found.gains} == {FRICTION} and found.causes == () and found.changed is None
+    assert {one.joint for one in found.gains} == {"j0", "j1", "j2"}
+    if drive is warming:
+        assert [one.lost for one in found.gains] == pytest.approx([0.2] * 3, abs=0.02)
+
+
 @pytest.mark.parametrize(
     "how",
     [
@@ -99,11 +122,10 @@ def dead_band(_, u, __, ___):
         {"cable": 3.0},
         {"push": (4.0, 4.6, 1, 8.0)},
         {"drive": growing_friction},
-        {"drive": friction_that_falls},
         {"drive": dead_band},
     ],
     ids=lambda how: " ".join(f"{key} {getattr(value, '__name__', value)}" for key, value in how.items()),
 )
 def test_gains_that_stay_are_not_said_to_fall(robots, how):
     rows = rows_of(robots, "A", **how)
-    assert not explain_more(unsteady_gains(rows), regressed_causes(rows))
+    assert most_plausible(rows, ["here"], regressed_causes(rows)).gains == ()

@@ -9,8 +9,8 @@ regression leaves, and where no cause of another kind (a delay, a mass, gravity 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +19,16 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.joint_regression import Fit, JointRows, changes_between, fit
+from jointscope.graphs.scoring.regression.joint_regression import (
+    AS_GOOD,
+    Fit,
+    JointRows,
+    changes_between,
+    evidence,
+    fit,
+)
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.drive_regression import MOST_NOISE
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
@@ -29,12 +37,12 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 MOST_SHAPES = 10  # of an effect: with more, some fit what they are not
+DELAY = "command_delay"
 WEIGHTS = ("gravity_imbalance",)  # torques of a joint that are a wrong weight as well: masses are asked for elsewhere
 CONSTANTS = ("torque_constant_error",)  # what the regression has anyhow
 LEFT = 0.5  # of the mean square, that an effect may leave of what the plain regression leaves
-AS_GOOD = 1.2  # times the mean square that the best leaves, up to which a simpler effect, or another, is as good
-LARGE = 0.005  # of the drive's rms torque, from which what an effect explains matters to anybody
 SHARED = 2.5  # windows that overlap so much that they count as one
+LARGE = 0.005  # of the drive's rms torque, from which what an effect explains matters to anybody
 BY_CHANCE = 1e-4  # probability, over all causes that are confirmed together, from which one may be chance
 SURE = 30.0  # ratio of variances, explained over left, from which it is no chance
 
@@ -50,6 +58,7 @@ class RegressedCause:
         explained: share of the mean square that the plain regression leaves.
         size: rms of what it explains, over that of the drive.
         with_it: parameters of the joint with the effect over those without, by name.
+        evidence: for it, at its joint.
     """
 
     effect: str
@@ -58,11 +67,30 @@ class RegressedCause:
     explained: float
     size: float
     with_it: dict[str, float]
+    evidence: float
 
     @property
     def label(self) -> str:
         """ID@JOINT."""
         return f"{self.effect}@{self.joint}"
+
+
+class _Told(NamedTuple):
+    """Regressions in windows of one width.
+
+    Attributes:
+        plain: without any effect.
+        fits: with one each.
+        driving: mean square of the commands.
+        windows: how many.
+        seconds: that they tell of.
+    """
+
+    plain: Fit
+    fits: list[Fit]
+    driving: float
+    windows: int
+    seconds: float
 
 
 def regressed_causes(rows: JointRows) -> tuple[RegressedCause, ...]:
@@ -83,34 +111,44 @@ def confirmed(causes: Sequence[RegressedCause], test: ScoreTest) -> tuple[Regres
         causes: what regression says.
         test: of the whole recordings, linearised at their solution with the noise used.
     """
-    labels = {cause.label for cause in causes}
+    effects = asked_for({cause.label for cause in causes}, test)
+    return tuple(cause for cause in causes if cause.effect in effects)
+
+
+def late_commands(rows: JointRows) -> float:
+    """Evidence that commands act later, or earlier, than stamped, over all joints; zero where nothing tells of it.
+
+    Args:
+        rows: of the regression.
+    """
+    delays, worth = [h for h in hypotheses_of(rows.robot) if h.here.effect.id == DELAY], 0.0
+    for joint in range(rows.robot.n):
+        tried = [_under(rows, joint, width, delays) for width in WIDTHS]
+        worth += max((_of_first(one) for one in tried if one is not None), default=0.0)
+    return worth
+
+
+def _of_first(told: _Told) -> float:
+    return max(evidence(told.plain.left, min(fit.left for fit in told.fits), told.seconds, 1), 0.0)
+
+
+def asked_for(labels: Collection[str], test: ScoreTest) -> set[str]:
+    """Which effects a calibration asks for, by id, if only at one joint: what one's noise hides another's shows.
+
+    Args:
+        labels: ID@OWNER of each that may be.
+        test: of the whole recordings, linearised at their solution with the noise used.
+    """
     asked = [h for h in hypotheses_of(test.robot) if h.label in labels]
     best = best_shapes(test.each(asked)) if asked else {}
     sure = [s.hypothesis for s in best.values() if len(asked) * chdtrc(s.dof, s.plausible[0]) < BY_CHANCE]
-    effects = {hypothesis.here.effect.id for hypothesis in sure}  # what one joint's noise hides another's shows
-    return tuple(cause for cause in causes if cause.effect in effects)
+    return {hypothesis.here.effect.id for hypothesis in sure}
 
 
 def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
     asked = [h for h in hypotheses_of(robot) if h.here.effect.id not in CONSTANTS]
     shapes = Counter(h.label for h in asked)
     return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
-
-
-class _Told(NamedTuple):
-    """Regressions in windows of one width.
-
-    Attributes:
-        plain: without any effect.
-        fits: with one each.
-        driving: mean square of the commands.
-        windows: that do not overlap.
-    """
-
-    plain: Fit
-    fits: list[Fit]
-    driving: float
-    windows: float
 
 
 def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) -> RegressedCause | None:
@@ -120,20 +158,22 @@ def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) ->
     if not told:
         return None
     # narrow windows pass noise, wide ones lose motion
-    plain, fits, driving, count = min(told, key=lambda one: min(fit.left for fit in one.fits) / one.plain.left)
+    told_of = min(told, key=lambda one: min(fit.left for fit in one.fits) / one.plain.left)
+    plain, fits, driving = told_of.plain, told_of.fits, told_of.driving
     least = min(fit.left for fit in fits)
     # what is as good as the best, simplest first, of those causes that belong to the joint first
     good = sorted((f for f in fits if f.left <= AS_GOOD * least), key=lambda f: (f.sizes, not _is_own(f), f.left))
     best = good[0]
     explained = 1.0 - best.left / plain.left
     size = float(np.sqrt(explained * plain.left / driving))
-    ratio = explained * count / max((1.0 - explained) * best.sizes, 1e-9)
+    ratio = explained * told_of.windows / SHARED / max((1.0 - explained) * best.sizes, 1e-9)
     if best.left > LEFT * plain.left or size < LARGE or ratio < SURE or not _is_own(best):
         return None
     alike = dict.fromkeys(_id(f) for f in good[1:] if f.sizes == best.sizes)
     alike.pop(_id(best), None)
     changes = changes_between(rows.robot, rows.robot.joints[joint], plain, best)
-    return RegressedCause(_id(best), rows.robot.joints[joint], tuple(alike), explained, size, changes)
+    told_by = evidence(plain.left, best.left, told_of.seconds, best.sizes)
+    return RegressedCause(_id(best), rows.robot.joints[joint], tuple(alike), explained, size, changes, told_by)
 
 
 def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypothesis]) -> _Told | None:
@@ -144,8 +184,13 @@ def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypo
     plain, driving = fit(rows.robot, joint, here), float(np.mean(here[:, 0] ** 2))
     with_columns = [(hypothesis, rows.of(joint, width, hypothesis)) for hypothesis in asked]
     fits = [fit(rows.robot, joint, more, h) for h, more in with_columns if more is not None]
-    fits = [one for one in fits if _is_possible(one)]
-    return _Told(plain, fits, driving, len(here) / SHARED) if fits and plain.left > 0.0 < driving else None
+    least = MOST_NOISE * rows.noise(joint, width, plain)
+    fits = [one for one in fits if _is_possible(one) and (one.left > least or not _is_of_command(one))]
+    return (
+        _Told(plain, fits, driving, len(here), rows.seconds(width, len(here)))
+        if fits and plain.left > 0.0 < driving
+        else None
+    )
 
 
 def _id(fit: Fit) -> str:
@@ -158,6 +203,11 @@ def _is_possible(fit: Fit) -> bool:
     scale = 1.0 if isinstance(fit.hypothesis.here.effect, CommandEffect) else fit.gain
     found = zip(fit.hypothesis.sizes, (scale * fit.more[len(fit.more) - fit.sizes :]).tolist(), strict=True)
     return all(value > 0.0 for size, value in found if size.sign == "+")
+
+
+def _is_of_command(fit: Fit) -> bool:
+    """Whether its column is made of the command that is regressed on it, and may hold its noise as well."""
+    return fit.hypothesis is not None and isinstance(fit.hypothesis.here.effect, CommandEffect)
 
 
 def _is_own(fit: Fit) -> bool:
@@ -178,5 +228,5 @@ def _agreed(found: list[RegressedCause]) -> tuple[RegressedCause, ...]:
         among = (cause.effect, *cause.alike)
         first = max(among, key=lambda effect: (votes[effect], -places[effect], effect))
         others = tuple(effect for effect in among if effect != first)
-        agreed.append(RegressedCause(first, cause.joint, others, cause.explained, cause.size, cause.with_it))
+        agreed.append(replace(cause, effect=first, alike=others))
     return tuple(agreed)

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.torque_columns import TorqueColumns, has_columns
-from jointscope.graphs.starts.drive_regression import GAIN, PLACES, VISCOUS, load_of
+from jointscope.graphs.scoring.hypothesis_score import INDEPENDENT
+from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
+from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, MOST_NOISE, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
 from jointscope.graphs.starts.motion_cells import motion_cells
-from jointscope.graphs.starts.windowed_sums import joint_signals, windowed_rows
+from jointscope.graphs.starts.windowed_sums import PER_WINDOW, joint_signals, noise_gains, window_cells, windowed_rows
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -30,6 +31,7 @@ Array = NDArray[np.float64]
 
 DELAY, DELAY_NAME = "command_delay@robot", "robot.command_delay.delay"  # commands are moved by it
 FEWEST_ROWS = 60  # windows
+AS_GOOD = 1.2  # times the mean square that the best cause leaves, up to which another one is as good
 
 
 def joint_rows(robot: Robot, recordings: Sequence[Recording]) -> JointRows | None:
@@ -142,6 +144,28 @@ class JointRows:
         pairs = zip(self._plain, self._columns, strict=True)
         return [(plain[:, joint], columns.weight[:, joint]) for plain, columns in pairs]
 
+    def seconds(self, width: float, windows: int) -> float:
+        """How much motion so many windows of some width [s] tell of [s]."""
+        cells = self._columns[0].cells
+        together, length = window_cells(cells, width)
+        return windows * max(length // PER_WINDOW, 1) * together * cells.h
+
+    def noise(self, joint: int, width: float, found: Fit) -> float:
+        """Mean square that the noise of the encoders leaves of a regression, in squares of the command.
+
+        Args:
+            joint: index.
+            width: of the windows [s].
+            found: the regression.
+        """
+        cells, sigmas = self._columns[0].cells, self.robot.motor_encoder.sigmas
+        M = self.robot.tree.mass_matrix(cells.q[:1])[0, joint].copy()
+        inertias = parts_of(self.robot, self.robot.joints[joint])[INERTIA]
+        M[joint] += found.laws().get(INERTIA, sum(f * p.value for p, f in inertias))
+        together, length = window_cells(cells, width)
+        gain = noise_gains(float(cells.periods[joint]), together * length * cells.h)[1]
+        return float(gain * (M**2 @ sigmas**2) / found.gain**2)
+
     def spans(self) -> list[tuple[float, float]]:
         """First and last time of each recording [s]."""
         return [(float(c.cells.times[0]), float(c.cells.times[-1])) for c in self._columns]
@@ -176,27 +200,63 @@ class Fit:
         return {**laws, GAIN: self.gain} if GAIN in self.values else laws
 
 
-def fit(robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | None = None) -> Fit:
-    """The regression of commands on motion and on the columns of an effect."""
-    parts = parts_of(robot, robot.joints[joint])
-    held = {law: sum(f * p.value for p, f in some) for law, some in parts.items() if all(p.fixed for p, _ in some)}
-    held = {VISCOUS: 0.0, **held} if VISCOUS not in parts else held
-    if GAIN not in parts:
-        held[GAIN] = 1.0
-    load = rows[:, 1] + sum((held[law] * rows[:, place] for law, place in PLACES.items() if law in held), np.zeros(1))
-    free = [law for law in PLACES if law not in held]
-    columns, more = [rows[:, PLACES[law]] for law in free], rows[:, 5:]
-    target = rows[:, 0]
-    if GAIN in held:
-        target = target - load / held[GAIN]
-    else:
-        free, columns = [GAIN, *free], [load, *columns]
-    X = np.column_stack([*columns, more])
+def fit(
+    robot: Robot, joint: int, rows: Array, hypothesis: EffectHypothesis | None = None, free_gain: bool = False
+) -> Fit:
+    """The regression of commands on motion and on the columns of an effect; with a gain that is free, or as it is."""
+    free, X, target = design_of(robot, joint, rows, free_gain)
     size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
     found = np.linalg.lstsq(X / size, target, rcond=1e-10)[0] / size
     values = dict(zip(free, found.tolist(), strict=False))
     sizes = 0 if hypothesis is None else len(hypothesis.sizes)
     return Fit(float(np.mean((target - X @ found) ** 2)), values, found[len(free) :], hypothesis, sizes)
+
+
+def design_of(robot: Robot, joint: int, rows: Array, free_gain: bool = False) -> tuple[list[str], Array, Array]:
+    """What is free, its columns before those of effects, shape (w, p + e + k), and what is regressed on them."""
+    parts = parts_of(robot, robot.joints[joint])
+    held = {law: sum(f * p.value for p, f in some) for law, some in parts.items() if all(p.fixed for p, _ in some)}
+    held = {VISCOUS: 0.0, **held} if VISCOUS not in parts else held
+    if GAIN not in parts:
+        held[GAIN] = 1.0
+    if free_gain:
+        held.pop(GAIN, None)
+    load = rows[:, 1] + sum((held[law] * rows[:, place] for law, place in PLACES.items() if law in held), np.zeros(1))
+    free = [law for law in PLACES if law not in held]
+    columns, more = [rows[:, PLACES[law]] for law in free], rows[:, 5:]
+    if GAIN in held:
+        return free, np.column_stack([*columns, more]), rows[:, 0] - load / held[GAIN]
+    return [GAIN, *free], np.column_stack([load, *columns, more]), rows[:, 0]
+
+
+def evidence(plain: float, left: float, seconds: float, sizes: int) -> float:
+    """By how much a cause is more plausible than none, as a logarithm: what it explains less what its sizes cost.
+
+    The Bayesian information criterion with a noise that is not known. Of causes that are asked of the same joints, the
+    most plausible one has the most of it; that counts all joints, and a joint that has little to tell counts little.
+
+    Args:
+        plain: mean square that the plain regression leaves.
+        left: mean square that is left with it.
+        seconds: of motion that are told of.
+        sizes: that it has.
+
+    Reference:
+        Schwarz (1978), Estimating the dimension of a model, Annals of Statistics 6(2).
+    """
+    count = max(seconds / INDEPENDENT, 1.0)
+    return float(0.5 * count * np.log(max(plain, 1e-300) / max(left, 1e-300)) - 0.5 * sizes * np.log(count))
+
+
+def nearly(seconds: float) -> float:
+    """How much less evidence another cause may have that leaves AS_GOOD times as much, and so is as good."""
+    return evidence(AS_GOOD, 1.0, seconds, 0)
+
+
+def beyond(left: float, plain: float, noise: float) -> tuple[float, float]:
+    """What is left with a cause and without it beyond the noise of the encoders, as far as that can be believed."""
+    taken_off = min(noise, MOST_NOISE * left)
+    return left - taken_off, plain - taken_off
 
 
 def sigma_of(

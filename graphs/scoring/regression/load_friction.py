@@ -15,7 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.joint_regression import DELAY, Fit, JointRows, changes_between, fit, of_drives, sigma_of
+from jointscope.graphs.scoring.regression.joint_regression import (
+    DELAY,
+    Fit,
+    JointRows,
+    changes_between,
+    fit,
+    of_drives,
+    sigma_of,
+)
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 

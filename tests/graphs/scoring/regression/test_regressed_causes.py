@@ -10,10 +10,10 @@ import pytest
 from simulated_arm import SHARP, Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.calibrate import calibrate
-from jointscope.graphs.scoring.changed_load import changed_load
-from jointscope.graphs.scoring.joint_regression import joint_rows
-from jointscope.graphs.scoring.load_friction import load_frictions
-from jointscope.graphs.scoring.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.changed_load import changed_load
+from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.load_friction import load_frictions
+from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.position_target import PositionTarget

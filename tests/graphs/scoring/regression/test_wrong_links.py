@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A link that weighs something else than its URDF says is told with its mass; what looks like it is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from simulated_arm import SHARP, Arm, divided, moved, robot_file
+
+from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
+from jointscope.graphs.scoring.regression.joint_regression import joint_rows
+from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
+from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.recording import Recording
+
+ARM, SECONDS = Arm(), 10.0
+CONSTANTS = (8.0, 5.0, 2.0)  # [N m/A]
+HOW = {"seconds": SECONDS, "encoder_rate": 250.0, "command_rate": 250.0}
+MASSES = (3.0, 1.8, 1.08)  # [kg]
+
+
+@pytest.fixture(scope="module")
+def robots(tmp_path_factory):
+    """The robot with commands in N m, and in A."""
+    path = robot_file(ARM, tmp_path_factory.mktemp("arm"))
+    constants = "".join(f"\n  {joint}.torque_constant: {{value: 4.0, unit: N m/A}}" for joint in ARM.joints)
+    amperes = path.with_name("amperes.yaml")
+    text = path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
+    amperes.write_text(text + constants.lstrip("\n") + "\n", encoding="utf-8")
+    return {"N m": load_robot(path), "A": load_robot(amperes)}
+
+
+def asked(robots, unit="N m", **how):
+    encoder, command = moved(ARM, **{**HOW, **how})
+    if unit == "A":
+        command = divided(command, CONSTANTS)
+    rows = joint_rows(robots[unit], [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
+    return most_plausible(rows, ["arm.mcap"], regressed_causes(rows))
+
+
+def heavier(link, factor):
+    """What makes one link heavier from the start."""
+
+    def drive(t, u, model, _):
+        if t == 0.0:
+            model.body_mass[link + 1] *= factor
+            model.body_inertia[link + 1] *= factor
+        return u
+
+    return drive
+
+
+def tool(kilograms, place):
+    """What fixes a point mass to the last link from the start."""
+
+    def drive(t, u, model, _):
+        if t == 0.0:
+            mass, centre = model.body_mass[-1], model.body_ipos[-1].copy()
+            at, total = np.array(place), mass + kilograms
+            new = (mass * centre + kilograms * at) / total
+            for m, p in ((mass, centre), (kilograms, at)):
+                arm = p - new
+                model.body_inertia[-1] += m * (arm @ arm - arm**2)  # products of the offsets are small here
+            model.body_mass[-1], model.body_ipos[-1] = total, new
+        return u
+
+    return drive
+
+
+@pytest.mark.parametrize(
+    ("link", "factor", "how"),
+    [
+        (0, 1.1, {"seed": 4}),
+        (1, 1.05, {}),
+        (1, 0.93, {"seed": 2}),
+        (2, 1.08, {"seed": 5}),
+        (2, 0.9, {"seed": 3, "noise": 1e-4}),
+        (1, 1.1, {"seed": 6, "counts": 65536, "encoder_rate": 100.0, "command_rate": 100.0}),
+        (1, 1.07, {"seed": 7, "sticks": True, "pause": 0.3}),
+    ],
+)
+def test_a_link_that_is_heavier_or_lighter_has_its_mass_told(robots, link, factor, how):
+    found = asked(robots, drive=heavier(link, factor), **how)
+    assert found.link is not None and found.causes == () and found.gains == () and found.changed is None
+    assert found.link.joint == f"j{link}" and found.link.moments == ()
+    assert found.link.mass == pytest.approx((factor - 1.0) * MASSES[link], abs=max(4.0 * found.link.sigma, 0.01))
+    assert found.link.share == pytest.approx(factor - 1.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("link", "factor"), [(1, 1.1), (2, 0.9)])
+def test_masses_are_told_beside_constants_of_drives(robots, link, factor):
+    found = asked(robots, "A", drive=heavier(link, factor), seed=2)
+    assert found.link is not None and found.link.joint == f"j{link}"
+    assert found.link.share == pytest.approx(factor - 1.0, rel=0.15)
+
+
+def test_a_tool_that_the_urdf_lacks_is_mass_at_another_place(robots):
+    found = asked(robots, drive=tool(0.2, (0.02, 0.01, -0.4)))
+    assert found.link is not None and found.link.joint == "j2" and len(found.link.moments) == 3
+    assert found.link.explained > 0.9
+
+
+def weaker(_, u, __, ___):
+    return u * np.array([1.0, 0.94, 1.0])
+
+
+def saturating(_, u, __, ___):
+    return np.sign(u) * np.where(np.abs(u) > 6.0, 6.0 + 0.6 * (np.abs(u) - 6.0), np.abs(u))
+
+
+def offset(_, u, __, ___):
+    return u + np.array([0.0, 0.4, 0.0])
+
+
+def slower(_, u, __, data):
+    return u * (1.0 - 0.04 * np.abs(data.qvel))
+
+
+def by_direction(_, u, __, data):
+    return u - np.array([0.0, 0.4, 0.0]) * np.tanh(SHARP * data.qvel) ** 2
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"seed": 2},
+        {"seed": 3, "noise": 3e-4},
+        {"sticks": True, "pause": 0.3},
+        {"counts": 4096, "encoder_rate": 100.0, "command_rate": 100.0},
+        {"cable": 3.0},
+        {"push": (4.0, 4.6, 1, 8.0)},
+        {"drive": weaker},
+        {"drive": saturating},
+        {"drive": offset},
+        {"drive": slower},
+        {"drive": by_direction},
+    ],
+    ids=lambda how: " ".join(f"{key} {getattr(value, '__name__', value)}" for key, value in how.items()),
+)
+def test_links_that_weigh_what_they_should_are_not_blamed(robots, how):
+    assert asked(robots, **how).link is None
