@@ -92,7 +92,9 @@ def test_the_name_stays_in_the_robot_file(tmp_path):
 
 
 def test_names_that_cannot_be_are_told(woven, tmp_path):
-    with pytest.raises(RecordingError, match=r"no message has the child_frame_id 'ellbow' of sensors.marker.names; did"):
+    with pytest.raises(
+        RecordingError, match=r"no message has the child_frame_id 'ellbow' of sensors.marker.names; did"
+    ):
         read_recording(woven, written(tmp_path, "\n    names: [ellbow]"))
     with pytest.raises(RobotError, match="expected one name, the child_frame_id of this target, got 2"):
         written(tmp_path, "\n    names: [elbow, shoulder]")
