@@ -36,6 +36,7 @@ EFFECT = ReadingEffect(
         look_alikes={
             "gravity_direction": "at a joint with a level axis a turned base and a turned zero are the same",
             "gravity_imbalance": "weight in another posture differs by a sine of the angle",
+            "axis_misalignment": "where axes are nearly parallel, a zero of one is a turn about the other",
         },
     ),
 )

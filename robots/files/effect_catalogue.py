@@ -75,12 +75,13 @@ def add_user_effects(path: str | Path) -> tuple[Effect, ...]:
 
 
 def find_effect(effect_id: str) -> Effect:
-    """The effect of that id.
+    """The effect of that id, or with that alias.
 
     Raises:
         EffectError: there is none; the message offers the nearest.
     """
     known = catalogue()
+    effect_id = next((e.id for e in known.values() if effect_id in e.aliases), effect_id)
     if effect_id not in known:
         hint = did_you_mean(effect_id, list(known))
         if "did you mean" not in hint:
@@ -110,7 +111,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
     reason = effect.may_act_on(robot, owner)
     if reason:
         hint = did_you_mean(owner, effect.owners_of(robot))
-        raise EffectError(f"effect {text!r}: {effect_id} {reason}{hint if 'did you mean' in hint else ''}")
+        raise EffectError(f"effect {text!r}: {effect.id} {reason}{hint if 'did you mean' in hint else ''}")
     return effect, owner
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The messages about one target: some trackers tell of all targets on one topic, and only `child_frame_id` says which."""
+"""The messages about one target: a tracker may tell of all targets on one topic, and `child_frame_id` says which."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def target_messages(
         )
     if not names and len(children) > 1:
         raise RecordingError(
-            f"topic {topic.name} tells of several targets ({CHILD} {_listed(children)}); name the one of sensors.{sensor} "
-            f"in the robot file, for example `names: [{next(filter(None, children))}]`"
+            f"topic {topic.name} tells of several targets ({CHILD} {_listed(children)}); name the one of "
+            f"sensors.{sensor} in the robot file, for example `names: [{next(filter(None, children))}]`"
         )
     own = [k for k, frame in enumerate(frames) if not names or (frame is not None and frame.target == names[0])]
     trackers = Counter(frame.tracker for k in own if (frame := frames[k]) is not None)
