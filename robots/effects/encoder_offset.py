@@ -19,6 +19,7 @@ def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:
 
 EFFECT = ReadingEffect(
     id="encoder_offset",
+    aliases=("joint_offset",),
     turning=True,
     owners=("joint", "joint_link"),
     law=law,

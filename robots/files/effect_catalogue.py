@@ -80,14 +80,19 @@ def find_effect(effect_id: str) -> Effect:
     Raises:
         EffectError: there is none; the message offers the nearest.
     """
-    known = catalogue()
-    effect_id = next((e.id for e in known.values() if effect_id in e.aliases), effect_id)
+    known, effect_id = catalogue(), without_alias(effect_id)
     if effect_id not in known:
         hint = did_you_mean(effect_id, list(known))
         if "did you mean" not in hint:
             hint = "; `jointscope effects` lists all, --effects FILE.py adds your own"
         raise EffectError(f"no effect {effect_id!r}{hint}")
     return known[effect_id]
+
+
+def without_alias(label: str) -> str:
+    """An id, or ID@OWNER, with the effect's own id where another name of it was typed."""
+    effect_id, at, owner = label.partition("@")
+    return next((e.id for e in catalogue().values() if effect_id in e.aliases), effect_id) + at + owner
 
 
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:

@@ -26,7 +26,9 @@ def changed_bodies(robot):
 
 
 @pytest.mark.parametrize("scale", [-0.2, 0.0, 0.37, 1.0, 1.3])
-@pytest.mark.parametrize("base", [READY, mimicking(READY, READY.joints), BLIND], ids=["doggy", "mimic joints", "no gyros"])
+@pytest.mark.parametrize(
+    "base", [READY, mimicking(READY, READY.joints), BLIND], ids=["doggy", "mimic joints", "no gyros"]
+)
 def test_slopes_by_parameters_of_the_bodies_are_those_of_differences(base, scale):
     robot = changed_bodies(base).with_values({"robot.coriolis.scale": scale})
     joints, x = ElasticJoints(robot), states(robot, COUNT)
