@@ -22,7 +22,7 @@ def coverage() -> Section:
     """Share of the true values within two sigmas, over all values of all arms."""
     rows, z, cpu = [], [], []
     for seed in range(ARMS):
-        values, effects = _drawn(seed)
+        values, effects = drawn_arm(seed)
         simulated = js.simulate("biorob", seconds=SECONDS, seed=seed, parameters=values, effects=effects)
         start = time.process_time()
         result = js.calibrate("biorob", simulated.recording)
@@ -50,7 +50,7 @@ def coverage() -> Section:
     return Section(f"BioRob, {ARMS} arms", text, tables=[summary, each])
 
 
-def _drawn(seed: int) -> tuple[dict[str, float], list[str]]:
+def drawn_arm(seed: int) -> tuple[dict[str, float], list[str]]:
     """True values of an arm, and its effects."""
     rng = np.random.default_rng(seed)
     values, effects = {}, []

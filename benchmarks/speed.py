@@ -15,6 +15,7 @@ from typing import Any
 
 import elimination
 from callback_graph import Cost, batch_iteration, near_solution, optimizer_iteration, python_loop_iteration
+from graph_overhead import graph_overhead
 from patience import say
 from simulated_bags import largest_error, simulated_bag
 from single_shooting import SingleShooting
@@ -28,6 +29,7 @@ from jointscope.tools.bags.read_recording import read_recording
 SHARE = 0.5  # of the recording's own duration
 MEMORY = 6.0  # [GiB]
 GROWTH = 2.3  # time of the double length over that of the single
+OVERHEAD = 1.1  # of GTSAM's graph over the band alone
 GIB = 1024.0**3
 STARTS = {"regression of calibrate": True, "values of the robot file": False}
 SOLVERS = {"MINPACK": "lm", "trust region": "trf"}  # the first is faster, the second gets home from farther away
@@ -55,6 +57,7 @@ def run(quick: bool) -> Section:
     start = robot.with_values({name: truth[name] for name in robot.parameters})
     section.tables += _callback_graph(section, start, recording, quick)
     section.tables.append(_elimination(section, start, recording, 2.0 if quick else 5.0))
+    _graph_overhead(section, start, recording)
     return section
 
 
@@ -181,6 +184,20 @@ def _elimination(section: Section, robot: Robot, recording: Recording, seconds: 
     )
     head = ("solver", "time", "per tick", "ratio")
     return Table(f"Linear system of {times.ticks} states, from linearised factors to the step", head, rows)
+
+
+def _graph_overhead(section: Section, robot: Robot, recording: Recording) -> None:
+    """One iteration by GTSAM over condensed factors against one by a single band."""
+    say("speed: GTSAM's graph against the band alone")
+    found = graph_overhead(*near_solution(robot, recording))
+    ratio = found.graph / found.band
+    section.promise(
+        f"one iteration of the GTSAM graph ({found.factors} factors, {found.ticks:,} states) against the band alone",
+        f"at most {OVERHEAD:g} times",
+        f"{ratio:.2f} times (CPU {found.graph:.2f} s)",
+        ratio <= OVERHEAD,
+    )
+    section.numbers["graph overhead"] = asdict(found)
 
 
 def _elimination_row(name: str, seconds: float, ticks: int, reference: float) -> tuple[str, ...]:

@@ -49,13 +49,13 @@ class FilteredStates:
     covariance: Array
 
 
-def filter_states(problem: BagProblem, x: Array, calibration: Calibration) -> FilteredStates:
+def filter_states(problem: BagProblem, calibration: Calibration, x: Array) -> FilteredStates:
     """Extended Kalman filter over a recording with known shared values.
 
     Args:
-        problem: the factors, with the noise to use.
-        x: smoothed states, shape (m, d); only the starts of the pieces come from a filter linearised around them.
+        problem: the factors, with the noise to use; fastest of a robot whose parameters are held.
         calibration: shared values; biases are those of the recording.
+        x: smoothed states, shape (m, d); only the starts of the pieces come from a filter linearised around them.
 
     Raises:
         SolveError: the filter ran away, as it may under a model that contradicts the recording.

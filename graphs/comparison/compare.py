@@ -33,6 +33,7 @@ from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.predictions_ahead import HORIZON, HORIZONS, Ahead, predict_ahead, predict_open_loop
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.joint_states import JointStates
+from jointscope.graphs.problem.known_values import carried, with_known_values
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
@@ -101,7 +102,7 @@ def compare_model(label: str, robot: Robot, recording: Recording) -> ModelCompar
     problem, states, calibration = smooth(robot, recording)
     robot = problem.robot
     predictor = Predictor(robot, problem.timeline)
-    causal = filter_states(problem, states, calibration)
+    causal = filter_states(*with_known_values(problem, calibration), states)
     ahead = {h: predict_ahead(problem, calibration, predictor, causal, h) for h in HORIZONS}
     open_loop = OpenLoop(lambda: predict_open_loop(problem, calibration, predictor, states[0]))
     sensors = {
@@ -157,10 +158,11 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
         problem = BagProblem.of(replace(robot, noise=result.noise), recording)
         return problem, result.bags[0].states, result.bags[0].calibration
     problem = BagProblem.of(robot, recording)
+    known, start = with_known_values(problem, Calibration.of(robot))
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
-    first = approach([problem], robot.noise, [initial_biases(problem, Calibration.of(robot))], hold)
-    estimate = solve([problem], first, hold=hold).estimate
-    return problem, estimate.states[0], estimate.calibrations[0]
+    first = approach([known], robot.noise, [initial_biases(known, start)], hold)
+    estimate = solve([known], first, hold=hold).estimate
+    return problem, estimate.states[0], carried(estimate.calibrations[0], Calibration.of(robot))
 
 
 def _sensor_prediction(

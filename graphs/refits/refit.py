@@ -17,6 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.known_values import carried, with_known_values
 from jointscope.graphs.refits.gap_start import with_hidden_gap
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import solve
@@ -78,7 +79,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
     problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
     if robot is not base.robot:
         # the states still are those of a model without the effect: they follow before all parameters move
-        estimate = solve(problems, estimate, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
+        estimate = _followed(problems, estimate)
     solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
     estimate = solution.estimate
     if noise.estimate:
@@ -99,6 +100,15 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
     }
     robot = replace(_with(robot, found), noise=noise)
     return Refit(robot, name, _biases(base, spans, solution.estimate.calibrations), own, solution.converged)
+
+
+def _followed(problems: Sequence[BagProblem], start: Estimate) -> Estimate:
+    """States that follow parameters as they are."""
+    pairs = [with_known_values(*pair) for pair in zip(problems, start.calibrations, strict=True)]
+    known = Estimate(start.states, tuple(calibration for _, calibration in pairs))
+    found = solve([problem for problem, _ in pairs], known, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
+    back = [carried(*pair) for pair in zip(found.calibrations, start.calibrations, strict=True)]
+    return Estimate(found.states, tuple(back))
 
 
 def start_of(score: HypothesisScore, robot: Robot) -> dict[str, float]:

@@ -22,6 +22,7 @@ from jointscope.graphs.comparison.free_run import free_run, loop_error
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.predictions_ahead import HORIZON, Ahead, predict_ahead
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.known_values import knowing, with_known_values
 from jointscope.graphs.refits.loop_validation import judged_by_loop, loop_squares
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
@@ -64,10 +65,10 @@ def validation_error(
     channels = robot.channels
     for bag in sorted({span.bag for span in spans}):
         recording = base.recordings[bag]
-        problem = BagProblem.of(robot, recording)
-        calibration = Calibration.of(robot).with_points(biases[bag].own)
+        problem = BagProblem.of(knowing(robot), recording)
+        calibration = Calibration.of(problem.robot).with_points(biases[bag].own)
         x = base.states_at(bag, problem.timeline.ticks, robot.layout)
-        causal = filter_states(problem, x, calibration)
+        causal = filter_states(problem, calibration, x)
         predictor = Predictor(problem.robot, problem.timeline)
         for horizon, target in squares.items():
             ahead = predict_ahead(problem, calibration, predictor, causal, horizon)
@@ -139,7 +140,7 @@ def heldout_error(robot: Robot, recording: Recording) -> float:
     if judged_by_loop(robot, [recording]):
         return loop_error(free_run(robot, recording), robot)
     problem, x, calibration = smooth(robot, recording)
-    causal = filter_states(problem, x, calibration)
+    causal = filter_states(*with_known_values(problem, calibration), x)
     ahead = predict_ahead(problem, calibration, Predictor(problem.robot, problem.timeline), causal, HORIZON)
     everything = Span(0, -np.inf, np.inf)
     return _root_mean(_mean_by_channel([[_squares(problem, ahead, everything, 0.0)]], len(robot.channels)))

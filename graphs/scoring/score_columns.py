@@ -17,7 +17,7 @@ from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.command import command_columns
 from jointscope.graphs.scoring.columns.elasticity import elasticity_column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.columns.inertia import coriolis_columns, gravity_columns, inertia_columns
+from jointscope.graphs.scoring.columns.inertia import axis_columns, coriolis_columns, gravity_columns, inertia_columns
 from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
 from jointscope.graphs.scoring.columns.reading import late_column, reading_column, smooth_column
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
@@ -72,4 +72,6 @@ def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
         return coriolis_columns(s)
     if effect.form == "gravity":
         return gravity_columns(s)
+    if effect.form == "axis":
+        return axis_columns(hypothesis, s)
     return [Column(reading=elasticity_column(hypothesis.here, s))] if effect.form == "elasticity" else []

@@ -184,7 +184,6 @@ class _LocalLaw:
     ):
         assert isinstance(here.effect, JointTorque)
         self.here, self.effect, self._gap = here, here.effect, gap
-        self._gap_index = names.index(gap) if gap in names else None
         j = self.joint = joints.index(here.owner)
         some = {p.name: p.start for p in here.effect.parameters}
         self.on_weight = weight.on(here.owner, here.effect, some) is not None
@@ -204,8 +203,9 @@ class _LocalLaw:
             index = layout.memories.index(here.label)
             self._columns["memory"] = layout.memory.start + index
             self._memory_row = layout.n_link + layout.n_motor + index
-        own = f"{here.owner}.{SHARPNESS}"
-        self._sharpness = names.index(own) if own in names else None
+        shared = {"sharpness": f"{here.owner}.{SHARPNESS}", "gap": gap}  # signals that may be free parameters
+        self._shared = [(signal, names.index(name)) for signal, name in shared.items() if name in names]
+        self._own: dict[str, str] = {}  # names are the same whenever values come
         self._names = {name.rsplit(".", 1)[1]: k for k, name in enumerate(names) if name.startswith(here.parameter(""))}
 
     def add(
@@ -219,12 +219,13 @@ class _LocalLaw:
     ) -> None:
         """Adds the torque, and the rate of the memory."""
         j = self.joint
-        motion: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
+        signals: dict[str, Any] = {name: x[:, column] for name, column in self._columns.items()}
         carried = carried if self.on_weight else None
         load = springs.torque[:, j] if carried is None else carried.torque[:, j]
-        motion |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
-        signals = JointSignals(**motion, sharpness=sharpness, gap=values[self._gap] if self._gap else None)
-        p = self.here.own(values)
+        signals |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
+        signals |= {"sharpness": sharpness, "gap": values[self._gap] if self._gap else None}
+        self._own = self._own or self.here.own_names(values)
+        p = {name: values[full] for name, full in self._own.items()}
         self._add_law(terms, self.effect.law, self._rows, signals, p, springs, carried)
         if self.effect.memory is not None:
             self._add_law(terms, self.effect.memory.rate, ((self._memory_row, 1.0),), signals, p, springs, carried)
@@ -234,12 +235,13 @@ class _LocalLaw:
         terms: TorqueTerms,
         law: Law,
         rows: tuple[tuple[int, float], ...],
-        signals: JointSignals,
+        signals: dict[str, Any],
         p: dict[str, float],
         springs: Springs,
         carried: Carried | None,
     ) -> None:
-        value = np.real(law(signals, p))
+        here = JointSignals(**signals)
+        value = np.real(law(here, p))
         for row, sign in rows:
             terms.value[:, row] += sign * value
         if terms.by_state is None or terms.by_parameter is None:
@@ -248,7 +250,7 @@ class _LocalLaw:
         for name in self._used[law]:
             if name == "memory" and self._memory_row < 0:
                 continue
-            slope = np.imag(law(replace(signals, **{name: getattr(signals, name) + 1j * STEP}), p)) / STEP
+            slope = self._slope(law, signals, name, p)
             if not np.any(slope):
                 continue
             if name == "tau_spring" and carried is not None and carried.by_q is not None:
@@ -259,18 +261,19 @@ class _LocalLaw:
                 continue
             for row, sign in rows:
                 self._chain(terms, row, name, sign * slope, springs, j)
-        if self._sharpness is not None:
-            slope = np.imag(law(replace(signals, sharpness=signals.sharpness + 1j * STEP), p)) / STEP
-            for row, sign in rows:
-                terms.by_parameter[:, row, self._sharpness] += sign * slope
-        if self._gap_index is not None:
-            slope = np.imag(law(replace(signals, gap=signals.gap + 1j * STEP), p)) / STEP
-            for row, sign in rows:
-                terms.by_parameter[:, row, self._gap_index] += sign * slope
+        slopes = [(index, self._slope(law, signals, name, p)) for name, index in self._shared]
         for name, index in self._names.items():
-            slope = np.imag(law(signals, {**p, name: p[name] + 1j * STEP})) / STEP
+            slopes.append((index, np.imag(law(here, {**p, name: p[name] + 1j * STEP})) / STEP))
+        for index, slope in slopes:
             for row, sign in rows:
                 terms.by_parameter[:, row, index] += sign * slope
+
+    @staticmethod
+    def _slope(law: Law, signals: dict[str, Any], name: str, p: dict[str, float]) -> Array:
+        """Derivative of a law by one signal, shape (m,)."""
+        # made anew: `replace` takes longer than many a law
+        moved = JointSignals(**{**signals, name: signals[name] + 1j * STEP})
+        return np.asarray(np.imag(law(moved, p)) / STEP)
 
     def _chain(self, terms: TorqueTerms, row: int, name: str, slope: Array, springs: Springs, j: int) -> None:
         """Passes a derivative by one signal on to the state and to the parameters of the spring."""

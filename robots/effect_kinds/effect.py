@@ -92,6 +92,7 @@ class Effect(ABC):
             "link_encoder" (all of those together), "target" (of a tracker), "robot".
         turning: whether it can act only on joints that turn, not on prismatic ones.
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
+        aliases: other names that users may type.
     """
 
     id: str
@@ -100,6 +101,7 @@ class Effect(ABC):
     owners: tuple[str, ...] = ("joint",)
     turning: bool = False
     example: Mapping[str, float] = field(default_factory=dict)
+    aliases: tuple[str, ...] = ()
 
     def may_act_on(self, robot: RobotView, owner: str) -> str:
         """Why the effect cannot act on an owner of this robot; empty if it can."""

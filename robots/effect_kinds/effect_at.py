@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from jointscope.robots.effect_kinds.effect import Effect
@@ -32,5 +32,9 @@ class EffectAt:
 
     def own(self, values: Mapping[str, float]) -> dict[str, float]:
         """The effect's own parameters by the last part of their name, from values by full name."""
+        return {name: values[full] for name, full in self.own_names(values).items()}
+
+    def own_names(self, names: Iterable[str]) -> dict[str, str]:
+        """Full names of the effect's own parameters among some names, by their last part."""
         start = self.parameter("")
-        return {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
+        return {name[len(start) :]: name for name in names if name.startswith(start)}

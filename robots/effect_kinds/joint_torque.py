@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,7 +50,7 @@ class JointSignals:
     memory: Any = 0.0
     gap: Any = None
 
-    @property
+    @cached_property
     def deflection(self) -> Any:
         """q_link - q_motor, what the spring feels of it [rad]."""
         whole = self.q_link - self.q_motor

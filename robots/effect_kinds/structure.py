@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from jointscope.robots.effect_kinds.effect import Effect
 
-FORMS = ("bearing", "elasticity", "coriolis", "integration", "gravity", "loads")
+FORMS = ("bearing", "elasticity", "coriolis", "integration", "gravity", "axis", "loads")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class Structure(Effect):
     Attributes:
         form: "bearing" (two sprung hinges before the owner), "elasticity" (a spring between motor and link of a joint
             declared rigid), "coriolis" (scaled c(q, v)), "integration" (the defect of the integrator), "gravity"
-            (turned), "loads" (known ones at rest, scaled).
+            (turned), "axis" (of the owner, turned), "loads" (known ones at rest, scaled).
     """
 
     form: str

@@ -10,7 +10,8 @@ import numpy as np
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
 from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.model.structured_tree import across_axes, hidden_inertias, inertia_about_joint
+from jointscope.robots.model.structured_tree import hidden_inertias, inertia_about_joint
+from jointscope.robots.model.turned_axes import across_axes
 
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView

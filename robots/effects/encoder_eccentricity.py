@@ -41,6 +41,7 @@ class EncoderEccentricity(ReadingEffect):
 
 EFFECT = EncoderEccentricity(
     id="encoder_eccentricity",
+    aliases=("link_encoder_nonlinearity",),
     law=law,
     owners=("joint", "joint_link"),
     parameters=(

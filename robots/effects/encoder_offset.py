@@ -19,6 +19,7 @@ def law(reading: Any, time: Any, p: Mapping[str, Any]) -> Any:
 
 EFFECT = ReadingEffect(
     id="encoder_offset",
+    aliases=("joint_offset",),
     turning=True,
     owners=("joint", "joint_link"),
     law=law,
@@ -36,6 +37,7 @@ EFFECT = ReadingEffect(
         look_alikes={
             "gravity_direction": "at a joint with a level axis a turned base and a turned zero are the same",
             "gravity_imbalance": "weight in another posture differs by a sine of the angle",
+            "axis_misalignment": "where axes are nearly parallel, a zero of one is a turn about the other",
         },
     ),
 )

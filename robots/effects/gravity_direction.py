@@ -45,6 +45,7 @@ EFFECT = GravityDirection(
             "parallel_spring": "near one posture a turned weight changes with the angle, too",
             "gravity_imbalance": "at one joint a turned weight is a sine of the angle",
             "torque_offset": "near one posture the weight is a constant torque",
+            "axis_misalignment": "a base that is not level is a turned axis of the first joint",
         },
     ),
 )

@@ -48,6 +48,7 @@ EFFECT = InertiaEffect(
             "kinematic_coupling": "a wrong product of inertia couples the joints, too, but with the acceleration",
             "coriolis": "a wrong inertia matters most in the same fast motion",
             "link_mass": "where little gravity acts, a heavier link is one with more inertia",
+            "axis_misalignment": "a body that stands askew has other moments about the axes before it",
         },
     ),
 )

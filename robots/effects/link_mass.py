@@ -72,6 +72,7 @@ EFFECT = LinkMass(
             "torque_constant_error": "a drive that makes less torque is as one that moves heavier links",
             "inertia_error": "where little gravity acts, a heavier link is one with more inertia",
             "gravity_imbalance": "at one joint a wrong first moment is a weight that turns with the angle",
+            "axis_misalignment": "a first moment of a link is one whose centre of mass stands askew",
         },
     ),
 )

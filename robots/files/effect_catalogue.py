@@ -75,18 +75,24 @@ def add_user_effects(path: str | Path) -> tuple[Effect, ...]:
 
 
 def find_effect(effect_id: str) -> Effect:
-    """The effect of that id.
+    """The effect of that id, or with that alias.
 
     Raises:
         EffectError: there is none; the message offers the nearest.
     """
-    known = catalogue()
+    known, effect_id = catalogue(), without_alias(effect_id)
     if effect_id not in known:
         hint = did_you_mean(effect_id, list(known))
         if "did you mean" not in hint:
             hint = "; `jointscope effects` lists all, --effects FILE.py adds your own"
         raise EffectError(f"no effect {effect_id!r}{hint}")
     return known[effect_id]
+
+
+def without_alias(label: str) -> str:
+    """An id, or ID@OWNER, with the effect's own id where another name of it was typed."""
+    effect_id, at, owner = label.partition("@")
+    return next((e.id for e in catalogue().values() if effect_id in e.aliases), effect_id) + at + owner
 
 
 def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
@@ -110,7 +116,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
     reason = effect.may_act_on(robot, owner)
     if reason:
         hint = did_you_mean(owner, effect.owners_of(robot))
-        raise EffectError(f"effect {text!r}: {effect_id} {reason}{hint if 'did you mean' in hint else ''}")
+        raise EffectError(f"effect {text!r}: {effect.id} {reason}{hint if 'did you mean' in hint else ''}")
     return effect, owner
 
 

@@ -13,7 +13,7 @@ from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
-from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
+from jointscope.robots.files.effect_catalogue import catalogue, parse_effect, without_alias
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
 from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities, unseen_links
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
@@ -49,7 +49,7 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
         return _better_integrated(robot)
     parameters = dict(robot.parameters)
     document = copy.deepcopy(robot.document)
-    document.setdefault("effects", CommentedSeq()).append(label)
+    document.setdefault("effects", CommentedSeq()).append(here.label)
     document.setdefault("parameters", CommentedMap())
     for p in effect.parameters_at(robot, owner):
         parameter = parameter_of(here, p, (start or {}).get(p.name, p.start))
@@ -72,6 +72,7 @@ def remove_effect(robot: Robot, label: str) -> Robot:
     Raises:
         EffectError: the robot does not have it, another effect needs it, or it is a choice of the model and no entry.
     """
+    label = without_alias(label)
     gone = [here for here in robot.effects if here.label == label]
     if not gone:
         raise EffectError(_why_not_removed(robot, label))
@@ -83,7 +84,7 @@ def remove_effect(robot: Robot, label: str) -> Robot:
             f"-o {edited_argument(robot, 'without')}"
         )
     document = copy.deepcopy(robot.document)
-    remove_at(document, "effects", document["effects"].index(label))
+    remove_at(document, "effects", [without_alias(str(text)) for text in document["effects"]].index(label))
     start = gone[0].parameter("")
     parameters = {name: p for name, p in robot.parameters.items() if not name.startswith(start)}
     for name in robot.parameters:

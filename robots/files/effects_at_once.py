@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EffectError
-from jointscope.robots.files.effect_catalogue import find_effect, parse_effect
+from jointscope.robots.files.effect_catalogue import find_effect, parse_effect, without_alias
 from jointscope.robots.files.effect_editing import add_effect, cannot_be_added, remove_effect
 from jointscope.robots.files.needed_spring import SPRING, effects_of_spring, is_spring, needed_spring
 from jointscope.robots.model.robot import Robot
@@ -112,6 +112,7 @@ def without_effects(robot: Robot) -> Robot:
 
 def _expanded(wanted: Sequence[str], owners: Callable[[str], Sequence[str]]) -> tuple[list[str], dict[str, list[str]]]:
     """Labels with an owner, and for each ID@* the labels that it stands for and that are not named beside it."""
+    wanted = [without_alias(text) for text in wanted]
     for text in wanted:
         if list(wanted).count(text) > 1:
             raise EffectError(f"{text} is named twice; name each effect once")

@@ -200,6 +200,10 @@ def _position_target(name: str, section: Section) -> PositionTarget:
     source = topic(section)
     if si_unit(source.unit) != "m":
         raise RobotError(f"{section.place}.unit: a position is in m or mm, got {source.unit!r}")
+    if len(source.names) > 1:
+        raise RobotError(
+            f"{section.place}.names: expected one name, the child_frame_id of this target, got {len(source.names)}"
+        )
     if section.flag("left_handed", False):
         source = replace(source, scale=RIGHT_FROM_LEFT)
     tracker, pose = section.text("tracker", None), section.array("tracker_pose", (4, 4), None)

@@ -20,7 +20,7 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.turned_gravity import turned_gravity
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.urdf.motion_axis import motion_axis
+from jointscope.robots.model.turned_axes import TurnedAxis, across_axes, turn_torques
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
@@ -73,12 +73,19 @@ class StructuredTree:
         self.coriolis_scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
         tilted = [e for e in robot.effects if _form(e.effect) == "gravity"]
         self._tilt = tuple(e.parameter(p.name) for e in tilted for p in e.effect.parameters)
+        self._turned = [
+            TurnedAxis(
+                tuple(e.parameter(p.name) for p in e.effect.parameters), self.kinematics.model.getJointId(e.owner)
+            )
+            for e in robot.effects
+            if _form(e.effect) == "axis"
+        ]
         self._cache: tuple[tuple[float, ...], RigidTree] | None = None
 
     @property
     def varies(self) -> bool:
         """Whether any parameter changes the tree."""
-        return bool(self._changes or self._armature or self.coriolis_scale or self._tilt)
+        return bool(self._changes or self._armature or self.coriolis_scale or self._tilt or self._turned)
 
     def acceleration(self, q: Array, v: Array, tau: Array, values: Mapping[str, float]) -> Array:
         """Accelerations, shape (m, n_link) [rad/s^2]; arguments as those of `RigidTree.acceleration`."""
@@ -117,6 +124,8 @@ class StructuredTree:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             for name, torque in zip(self._tilt, torques, strict=True):
                 found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
+        for name, torque in self._turns(tree, (q, v, a), values, scale):
+            found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         if self.coriolis_scale is not None:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
         return found
@@ -129,7 +138,14 @@ class StructuredTree:
         if self._tilt:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             found |= dict(zip(self._tilt, torques, strict=True))
-        return found
+        return found | dict(self._turns(tree, (q, still, still), values, 0.0))
+
+    def _turns(
+        self, tree: RigidTree, motion: tuple[Array, Array, Array], values: Mapping[str, float], coriolis: float
+    ) -> Iterator[tuple[str, Array]]:
+        """Names and torques of all turned axes."""
+        for axis in self._turned:
+            yield from zip(axis.names, turn_torques(self.kinematics, tree, axis, values, motion, coriolis), strict=True)
 
     @staticmethod
     def _torques_of(
@@ -140,9 +156,10 @@ class StructuredTree:
 
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
-        if not (self._changes or self._armature or self._tilt):
+        if not (self._changes or self._armature or self._tilt or self._turned):
             return self.kinematics
         names = [*(c.name for c in self._changes), *(name for name, *_ in self._armature), *self._tilt]
+        names += [name for axis in self._turned for name in axis.names]
         key = tuple(values[name] for name in names)
         if self._cache is None or self._cache[0] != key:
             model = self.kinematics.model.copy()
@@ -155,6 +172,8 @@ class StructuredTree:
             if self._tilt:
                 tilt = np.array([values[name] for name in self._tilt])
                 model.gravity = pin.Motion(turned_gravity(self.kinematics.gravity, tilt)[0], np.zeros(3))
+            for axis in self._turned:
+                axis.turned(model, np.array([values[name] for name in axis.names]))
             self._cache = (key, self.kinematics.with_model(model))
         return self._cache[1]
 
@@ -232,17 +251,6 @@ def hidden_inertias(model: pin.Model, joint: int) -> dict[str, tuple[int, int]]:
 def inertia_about_joint(model: pin.Model, joint: int) -> Array:
     """Inertia of the body that a joint moves, about the origin of its joint frame, shape (3, 3) [kg m2]."""
     return about_origin(model.inertias[joint].toDynamicParameters())
-
-
-def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:
-    """The two coordinate axes of a joint's frame that lie across its axis, in order."""
-    first, second = np.sort(np.argsort(np.abs(joint_axis(model, joint)))[:2])
-    return int(first), int(second)
-
-
-def joint_axis(model: pin.Model, joint: int) -> Array:
-    """Axis of a revolute joint in its own frame, shape (3,); zero for a prismatic one."""
-    return motion_axis(model.joints[joint])[3:]
 
 
 def bearing_names(joint: str) -> tuple[str, str]:

@@ -90,6 +90,7 @@ def _robots_with_effects():
     base["torque_constant_error"] = replace(ROBOT, parameters={**ROBOT.parameters, known.name: known})
     heavy = RigidTree(MIMICKING, ROBOT.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7})
     base["gravity_direction"] = base["weight_dependent_friction"] = replace(ROBOT, tree=heavy)
+    base["axis_misalignment"] = replace(ROBOT, tree=heavy, sensors={ROBOT.motor_encoder.name: ROBOT.motor_encoder})
     for effect in catalogue().values():
         if effect.id == "integration_error":
             continue

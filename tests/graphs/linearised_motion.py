@@ -72,6 +72,10 @@ def with_a_weight():
     return replace(DOGGY, tree=RigidTree(urdf, DOGGY.joints, np.array([1.0, -2.0, -9.0]), locked={"ear": 0.7}))
 
 
+def with_a_weight_and_encoders_alone():
+    return replace(with_a_weight(), sensors={DOGGY.motor_encoder.name: DOGGY.motor_encoder})
+
+
 def with_known_drives():
     known = replace(DOGGY.parameters["motor.k_pwm"], fixed=True)
     return replace(DOGGY, parameters={**DOGGY.parameters, known.name: known})
@@ -86,6 +90,7 @@ ROBOTS = {
     "accelerometer": with_an_accelerometer(),
     "target": with_a_target(),
     "heavy": with_a_weight(),
+    "heavy, without gyros": with_a_weight_and_encoders_alone(),
     "Euler": replace(DOGGY, choices=replace(DOGGY.choices, integrator="euler")),
 }
 

@@ -37,6 +37,11 @@ def mimicking(robot, joints):
     return replace(robot, tree=tree, joints=tuple(joints))
 
 
+def without_gyros(robot):
+    """The robot with its encoders alone."""
+    return replace(robot, sensors={robot.motor_encoder.name: robot.motor_encoder})
+
+
 def coupled(robot):
     """The robot behind a full matrix, half of whose elements are parameters, with laws on all sides of it."""
     T = np.array([[1.1, 0.0, 0.0], [0.2, 0.9, 0.0], [-0.1, 0.3, 1.0]])
@@ -75,6 +80,7 @@ def _every():
         "coriolis": _without_coriolis(READY),
         "joint_elasticity": _rigid(READY, "joint3"),
         "gravity_direction": mimicking(READY, READY.joints),
+        "axis_misalignment": without_gyros(mimicking(READY, READY.joints)),
         "torque_constant_error": _known_drives(READY),
         "weight_dependent_friction": mimicking(READY, READY.joints),  # its own bodies weigh nothing about its joints
     }

@@ -20,7 +20,8 @@ from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.field_path import field_path
 from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.message_type import MessageType
-from jointscope.tools.bags.messages.open_bag import Bag
+from jointscope.tools.bags.messages.open_bag import Bag, RawTopic
+from jointscope.tools.bags.messages.target_messages import target_messages
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,19 @@ def full_type_name(name: str) -> str:
     return name if "/" in rest else f"{package}/msg/{rest}"
 
 
+def own_messages(
+    need: StreamSource, topic: RawTopic, message_type: MessageType, some: bool = False
+) -> NDArray[np.intp] | None:
+    """Which messages of a topic, or of a block of it, are about a stream; None for all.
+
+    Raises:
+        RecordingError: a tracker tells of several targets and nothing says which, or there are several trackers.
+    """
+    if not need.of_target:
+        return None
+    return target_messages(need.name, need.source.names, topic, message_type, need.source.field, some)
+
+
 def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
     """Samples in SI units, counters continued, each joint with its own factor.
 
@@ -123,7 +137,7 @@ def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64
 
 def wanted_of(need: StreamSource) -> tuple[tuple[str, ...], int | None]:
     """Names that a message must have, and number of values of one without names."""
-    names = need.source.names
+    names = () if need.of_target else need.source.names  # the names of a target chose the messages
     by_place = bool(names) and all(name.isdecimal() for name in names)
     return ((), None) if by_place else (names, len(need.channels))
 
@@ -133,7 +147,7 @@ def column_order(
 ) -> tuple[NDArray[np.intp], list[Notice]]:
     """Which column of the message belongs to which channel; joints that are `known` otherwise are not ignored."""
     place = f"topic {need.source.topic}, field {need.source.field!r}"
-    width, wanted = columns.values.shape[1], need.source.names
+    width, wanted = columns.values.shape[1], () if need.of_target else need.source.names
     names = columns.names or ()
     if wanted and not names and all(name.isdecimal() for name in wanted):
         return _by_place(need, width), []

@@ -36,6 +36,7 @@ from jointscope.tools.bags.needed_streams import (
     column_order,
     in_si,
     needed_streams,
+    own_messages,
     wanted_of,
 )
 from jointscope.tools.bags.tidying.late_copies import late_copies
@@ -189,14 +190,13 @@ class ArrivalReader:
     ) -> Columns | None:
         """The messages of a block that fit, what does not is counted; None where a later block has none that do."""
         wanted, width = wanted_of(need)
-        columns = read_columns(
-            topic,
-            types[need.name],
-            need.source.field,
-            first=counts[topic.name],
-            wanted=wanted,
-            width=width,
-        )
+        kind, field, first = types[need.name], need.source.field, counts[topic.name]
+        own = own_messages(need, topic, kind, some=True)
+        if own is not None and not len(own):
+            return None
+        columns = read_columns(topic.take(own), kind, field, first=first, wanted=wanted, width=width)
+        if own is not None:
+            columns = replace(columns, rows=columns.of(own))
         later = need.name in self._last
         if later and wanted and columns.names and not set(wanted) <= set(columns.names):
             self._left_out[need.name, "of other joints"] += len(topic.data)

@@ -34,6 +34,7 @@ from jointscope.tools.bags.needed_streams import (
     column_order,
     in_si,
     needed_streams,
+    own_messages,
     wanted_of,
 )
 from jointscope.tools.bags.silences import with_silences_left_out
@@ -77,11 +78,12 @@ def read_recording(
         wanted = {need.source.topic for need in needed}
         if robot.controller is not None and robot.controller.source.topic in bag.topics:
             wanted.add(robot.controller.source.topic)
-        raw = bag.read(sorted(wanted), progress)
-        notices = [notice for need in needed for notice in _surplus(need.name, raw[need.source.topic], bag)]
-        goal, found = _goal(bag, robot, raw, decode_all)
+        topics = bag.read(sorted(wanted), progress)
+        notices = [notice for need in needed for notice in _surplus(need.name, topics[need.source.topic], bag)]
+        goal, found = _goal(bag, robot, topics, decode_all)
         notices += found
-    parts = {n.name: message_parts(raw[n.source.topic], types[n.name], n.source.field, decode_all) for n in needed}
+    raw = {need.name: _own(need, topics[need.source.topic], types[need.name]) for need in needed}
+    parts = {n.name: message_parts(raw[n.name], types[n.name], n.source.field, decode_all) for n in needed}
     posture, found = held_posture([parts[name] for name in _encoders(robot)], robot, str(path))
     notices += found + mimic_notices([parts[name] for name in _encoders(robot)], robot)
     columns = {n.name: fitting_messages(parts[n.name], *wanted_of(n)) for n in needed}
@@ -130,6 +132,10 @@ def _encoders(robot: Robot) -> list[str]:
     return [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder | LinkEncoder)]
 
 
+def _own(need: StreamSource, topic: RawTopic, message_type: MessageType) -> RawTopic:
+    return topic.take(own_messages(need, topic, message_type))
+
+
 def _in_bag_order(
     needed: Sequence[StreamSource],
     raw: Mapping[str, RawTopic],
@@ -141,7 +147,7 @@ def _in_bag_order(
     samples, notices = dict[str, TimedSamples](), list[Notice]()
     stamps = {name: found.stamps for name, found in columns.items()}
     for need in needed:
-        topic, message_type = raw[need.source.topic], types[need.name]
+        topic, message_type = raw[need.name], types[need.name]
         samples[need.name], found = _samples(need, topic, message_type, columns[need.name], stamps, known=known)
         notices += found
     return samples, notices

@@ -39,6 +39,7 @@ from jointscope.tools.notebook.given import (
     AnyRobot,
     labelled,
     limits_of,
+    recording_of,
     recordings_of,
     robot_of,
     to_learn_from,
@@ -230,8 +231,8 @@ def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replay
         RecordingError: the recording cannot be a measurement of this robot.
     """
     model = robot_of(robot)
-    if isinstance(recording, Recording):
-        return Replayed.of(replay_messages(model, recording, lag))
+    if not isinstance(recording, str | Path):
+        return Replayed.of(replay_messages(model, recording_of(recording, model), lag))
     model, _ = robot_as_recorded(model, Path(recording))
     arrivals = ArrivalReader(Path(recording), model)
     found = replay_messages(model, arrivals, lag)
@@ -246,10 +247,15 @@ def graph(result: CalibrationResult | ArmCalibration, per_sample: bool = False) 
         per_sample: one factor for every sample, instead of one for every thousand; of motion alone.
 
     Raises:
-        SolveError: a factor for every sample, and recordings of other kinds than motion.
+        SolveError: no result of a calibration; a factor for every sample, and other recordings than motion.
     """
     if isinstance(result, CalibrationResult):
         return CalibrationGraph.of(result, per_sample)
+    if not isinstance(result, ArmCalibration):
+        raise SolveError(
+            f"a graph belongs to a calibration: expected the result of calibrate, got {type(result).__name__}; "
+            'for example graph(calibrate("doggy", "train.mcap"))'
+        )
     if per_sample:
         raise SolveError("a factor for every sample (per_sample) takes recordings of motion only; leave it out")
     return arm_graph(result)
@@ -262,7 +268,7 @@ def simulate(
     motion: str = "calibration",
     seconds: float | None = None,
     seed: int = 0,
-    effects: Iterable[str] = (),
+    effects: str | Iterable[str] = (),
     **conditions: Any,
 ) -> Simulated:
     """A recording from an engine that is independent of the estimator's own model.
@@ -273,14 +279,15 @@ def simulate(
         motion: "calibration", or "moves" to judge by.
         seconds: duration [s]; 65 for the motion "calibration" and 30 for "moves" if not given.
         seed: of robot, motion and noise; the same seed is the same robot.
-        effects: ID@OWNER[:param=value,...] that the robot has.
+        effects: ID@OWNER[:param=value,...] that the robot has; one, or several.
         conditions: everything else that `jointscope.tools.simulator.simulation.simulate` takes, as friction="smooth".
 
     Raises:
         SimulationError: MuJoCo is missing, or an option is impossible.
     """
     model = robot_of(robot)
-    found = simulate_motion(model, motion, seconds, seed, effects=effects, **conditions)
+    hidden = [effects] if isinstance(effects, str) else effects
+    found = simulate_motion(model, motion, seconds, seed, effects=hidden, **conditions)
     if bag is not None:
         write_bag(Path(bag), found.recording, model)
     return Simulated.of(found)

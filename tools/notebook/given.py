@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a caller may give: robots by name, path or object, recordings by path or object, limits by path or as read."""
+"""What a caller may give: robots and recordings by name, path, object, or with the result that holds them; limits."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.limits import Limit, read_limits
 from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.simulator.simulation import Simulation
 
-AnyRobot = Robot | str | Path
-AnyRecording = Recording | str | Path
+AnyRobot = Robot | CalibrationResult | Discovery | str | Path
+AnyRecording = Recording | Simulation | str | Path
 AnyLimits = str | Path | Sequence[Limit]
 
 
@@ -24,7 +27,24 @@ def robot_of(robot: AnyRobot) -> Robot:
     Raises:
         RobotError: there is none of that name, or its file has a mistake.
     """
+    if isinstance(robot, CalibrationResult | Discovery):
+        return robot.robot
+    if not isinstance(robot, Robot | str | Path):
+        raise RobotError(f"expected a robot, a result that has one, a name or a path, got {_told(robot)}")
     return robot if isinstance(robot, Robot) else load_robot(robot)
+
+
+def recording_of(recording: AnyRecording, robot: Robot) -> Recording:
+    """One recording.
+
+    Raises:
+        RecordingError: a bag cannot be read, or something is no recording.
+    """
+    if isinstance(recording, Simulation):
+        return recording.recording
+    if not isinstance(recording, Recording | str | Path):
+        raise RecordingError(f"expected a recording, the result of simulate, or a path, got {_told(recording)}")
+    return recording if isinstance(recording, Recording) else read_recording(recording, robot)
 
 
 def recordings_of(recordings: AnyRecording | Sequence[AnyRecording], robot: Robot) -> list[Recording]:
@@ -33,10 +53,10 @@ def recordings_of(recordings: AnyRecording | Sequence[AnyRecording], robot: Robo
     Raises:
         RecordingError: none is given, or a bag cannot be read.
     """
-    several = [recordings] if isinstance(recordings, Recording | str | Path) else recordings
+    several = recordings if isinstance(recordings, Sequence) and not isinstance(recordings, str) else [recordings]
     if not several:
         raise RecordingError("no recording is given; expected a path, a recording, or a list of them")
-    return [each if isinstance(each, Recording) else read_recording(each, robot) for each in several]
+    return [recording_of(each, robot) for each in several]
 
 
 def to_learn_from(
@@ -49,7 +69,7 @@ def to_learn_from(
     """
     model = robot_of(robot)
     learnt = recordings_of(recordings, model)
-    held = None if holdout is None else recordings_of(holdout, model)[0]
+    held = None if holdout is None else recording_of(holdout, model)
     if held is not None and any(held.shares_samples_with(recording) for recording in learnt):
         raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
     return model, learnt, held
@@ -61,15 +81,19 @@ def labelled(robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot]) -> 
     Raises:
         RobotError: none is given, or two have one name.
     """
-    several = [robots] if isinstance(robots, Robot | str | Path) else robots
+    several = robots if isinstance(robots, Mapping | Sequence) and not isinstance(robots, str) else [robots]
     if not several:
         raise RobotError("no robot is given; expected one, a list of them, or a dict of labels and robots")
     if isinstance(several, Mapping):
         return {label: robot_of(robot) for label, robot in several.items()}
-    labels = [robot.name if isinstance(robot, Robot) else Path(robot).stem for robot in several]
+    labels = [Path(robot).stem if isinstance(robot, str | Path) else robot_of(robot).name for robot in several]
     if len(set(labels)) < len(labels):
         raise RobotError(f"{', '.join(labels)}: two models have one name; give labels: {{'before': ..., 'after': ...}}")
     return dict(zip(labels, map(robot_of, several), strict=True))
+
+
+def _told(thing: object) -> str:
+    return f"{type(thing).__name__} {thing!r}" if isinstance(thing, int | float | str) else type(thing).__name__
 
 
 def limits_of(limits: AnyLimits) -> tuple[Limit, ...]:

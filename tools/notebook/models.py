@@ -5,16 +5,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.files.effects_at_once import add_effects, remove_effects
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.bag_description import BagDescription
 from jointscope.tools.bags.describe_bag import describe_bag
 from jointscope.tools.export.exported_files import ExportedFiles, export_files
 from jointscope.tools.notebook.given import AnyRobot, robot_of
-
-WithRobot = CalibrationResult | Discovery
 
 
 def add(robot: AnyRobot, *effects: str) -> Robot:
@@ -43,9 +39,7 @@ def remove(robot: AnyRobot, *effects: str) -> Robot:
     return remove_effects(robot_of(robot), effects).robot
 
 
-def export(
-    robot: AnyRobot | WithRobot, *, urdf: str | Path | None = None, mjcf: str | Path | None = None
-) -> ExportedFiles:
+def export(robot: AnyRobot, *, urdf: str | Path | None = None, mjcf: str | Path | None = None) -> ExportedFiles:
     """Writes a calibrated robot for other programs: as URDF, as MuJoCo model, or both (docs/export.md).
 
     Args:
@@ -61,8 +55,7 @@ def export(
         SimulationError: MuJoCo is missing, cannot build the model, or refuses it.
         JointscopeError: a file cannot be written.
     """
-    model = robot.robot if isinstance(robot, WithRobot) else robot_of(robot)
-    return export_files(model, *(None if path is None else Path(path) for path in (urdf, mjcf)))
+    return export_files(robot_of(robot), *(None if path is None else Path(path) for path in (urdf, mjcf)))
 
 
 def info(bag: str | Path, robot: AnyRobot | None = None) -> BagDescription:

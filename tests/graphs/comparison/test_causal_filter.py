@@ -28,7 +28,7 @@ def test_rounds_of_linear_steps_end_where_the_filter_tick_by_tick_does(solved, m
     monkeypatch.setattr(causal_filter, "CHUNK", 500)  # several stretches
     monkeypatch.setattr(causal_filter, "BURN_IN", 10.0)  # all runs tick by tick begin where the recording does
     slow = causal_filter._tick_by_tick(problem, filter_around(problem, x, calibration), calibration)
-    fast = filter_states(problem, x, calibration)
+    fast = filter_states(problem, calibration, x)
     sigma = np.sqrt(np.einsum("kii->ki", slow.covariance))
     assert np.max(np.abs(fast.mean - slow.mean) / sigma) < DIFFERENT
     np.testing.assert_allclose(np.sqrt(np.einsum("kii->ki", fast.covariance)), sigma, rtol=DIFFERENT)
@@ -39,5 +39,5 @@ def test_where_rounds_do_not_settle_the_filter_runs_tick_by_tick(solved, monkeyp
     asked, found = [], FilteredStates(x, np.zeros((0, 0, 0)))
     monkeypatch.setattr(causal_filter, "ROUNDS", 1)
     monkeypatch.setattr(causal_filter, "_tick_by_tick", lambda *args: asked.append(args) or found)
-    assert filter_states(problem, x, calibration) is found
+    assert filter_states(problem, calibration, x) is found
     assert len(asked) == 1

@@ -32,6 +32,7 @@ CASES += one_hypothesis_each(
     "soft bearing", (*OTHERS, "spring_cubic", "payload", "load_dependent_friction", "hysteresis")
 )
 CASES += one_hypothesis_each("heavy", ("weight_dependent_friction", "gravity_direction"))
+CASES += one_hypothesis_each("heavy, without gyros", ("axis_misalignment",))
 CASES += one_hypothesis_each("known drives", ("torque_constant_error",))
 
 

@@ -189,7 +189,7 @@ def test_filter_at_the_last_tick_equals_the_smoother(moving):
     filtered = filter_around(problems[0], x, calibration)
     sigma = np.sqrt(np.einsum("kii->ki", filtered.covariance))
     assert np.max(np.abs(filtered.mean[-1] - x[-1]) / sigma[-1]) < 0.05
-    own = filter_states(problems[0], x, calibration)
+    own = filter_states(problems[0], calibration, x)
     # linearised around its own past the filter ends near the smoother: one motor turns slowly, where friction bends
     # within a sigma and a quantized encoder tells little
     assert np.max(np.abs(own.mean[-1] - x[-1]) / sigma[-1]) < 2.0
@@ -214,7 +214,7 @@ def test_filter_does_not_look_ahead(moving):
     results = []
     for problem in (problems[0], other):
         smoothed = solve([problem], Estimate((x,), (calibration,)), max_iterations=60, hold=held).estimate
-        results.append(filter_states(problem, smoothed.states[0], calibration))
+        results.append(filter_states(problem, calibration, smoothed.states[0]))
     a, b = results
     sigma = np.sqrt(np.einsum("kii->ki", a.covariance))
     difference = np.abs(a.mean - b.mean) / sigma

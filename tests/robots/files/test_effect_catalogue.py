@@ -10,9 +10,9 @@ import pytest
 
 from jointscope.robots.effect_kinds.groups import GROUPS, group_of
 from jointscope.robots.errors import EffectError
-from jointscope.robots.files.effect_catalogue import catalogue, parse_effect
+from jointscope.robots.files.effect_catalogue import catalogue, find_effect, parse_effect
 from jointscope.robots.files.effect_check import check_effect
-from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.structured_tree import StructuredTree
 
@@ -21,7 +21,7 @@ command_delay pwm_deadband spring_cubic backlash hysteresis kinematic_coupling l
 gravity_imbalance coriolis payload inertia_error joint_elasticity bearing_flexibility encoder_eccentricity encoder_scale
 spring_curve weight_dependent_friction encoder_delay gyro_delay gyro_scale gyro_bias_drift clock_offset clock_drift
 truncated_command parallel_spring integration_error torque_constant_error link_mass gravity_direction encoder_offset
-friction_by_direction encoder_filter command_limit""".split()
+friction_by_direction encoder_filter command_limit axis_misalignment""".split()
 UNITS = {
     *("kg", "kg m", "1", "s", "s^2", "s/s", "rad", "rad/s", "rad/s^2", "rad/rad", "V", "kg m2"),
     *("N m", "N m/rad", "N m/rad^2", "N m/rad^3", "N m s/rad", "N m s^2/rad^2", "rad/(N m)", "1/(N m)"),
@@ -174,3 +174,15 @@ def test_a_wrong_name_is_answered_with_the_right_one(text, message):
 def test_an_effect_and_its_owner_are_found():
     assert parse_effect("cogging@joint2", DOGGY) == (catalogue()["cogging"], "joint2")
     assert parse_effect("clock_offset@robot", DOGGY)[1] == "robot"
+
+
+def test_another_name_of_an_effect_is_accepted_and_written_as_its_id():
+    arm = load_robot("biorob")
+    twisted = add_effect(arm, "link_twist@joint3")
+    assert (
+        "joint3.axis_misalignment.x" in twisted.parameters and "axis_misalignment@joint3" in twisted.document["effects"]
+    )
+    assert not remove_effect(twisted, "link_twist@joint3").has_effect("axis_misalignment", "joint3")
+    assert find_effect("link_encoder_nonlinearity").id == "encoder_eccentricity"
+    for effect in EFFECTS:
+        assert not set(effect.aliases) & set(catalogue()), effect.id

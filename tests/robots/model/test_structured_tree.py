@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from robots_to_compare import READY, _rigid, _with, _without_coriolis, mimicking, states
+from robots_to_compare import READY, _rigid, _with, _without_coriolis, mimicking, states, without_gyros
 
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.files.effect_catalogue import catalogue
 
 COUNT = 6
+BLIND = without_gyros(mimicking(READY, READY.joints))
 EFFECTS = ("inertia_error", "payload", "link_mass", "bearing_flexibility", "coriolis", "gravity_direction")
+EFFECTS += ("axis_misalignment",)
 
 
 def changed_bodies(robot):
@@ -24,7 +26,9 @@ def changed_bodies(robot):
 
 
 @pytest.mark.parametrize("scale", [-0.2, 0.0, 0.37, 1.0, 1.3])
-@pytest.mark.parametrize("base", [READY, mimicking(READY, READY.joints)], ids=["doggy", "mimic joints"])
+@pytest.mark.parametrize(
+    "base", [READY, mimicking(READY, READY.joints), BLIND], ids=["doggy", "mimic joints", "no gyros"]
+)
 def test_slopes_by_parameters_of_the_bodies_are_those_of_differences(base, scale):
     robot = changed_bodies(base).with_values({"robot.coriolis.scale": scale})
     joints, x = ElasticJoints(robot), states(robot, COUNT)

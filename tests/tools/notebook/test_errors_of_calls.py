@@ -78,6 +78,40 @@ def test_nothing_given_is_told():
         js.compare([], "good.mcap")
 
 
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: js.graph("doggy"), "a graph belongs to a calibration: expected the result of calibrate, got str; "),
+        (lambda: js.load_robot(5), "no robot '5': "),
+        (lambda: js.add(3, "cogging@joint1"), "expected a robot, a result that has one, a name or a path, got int 3"),
+        (lambda: js.calibrate("doggy", 7), "expected a recording, the result of simulate, or a path, got int 7"),
+        (lambda: js.replay("doggy", None), "expected a recording, the result of simulate, or a path, got NoneType"),
+    ],
+)
+def test_what_cannot_be_a_robot_or_a_recording_is_told(call, message):
+    with pytest.raises(js.JointscopeError) as raised:
+        call()
+    assert str(raised.value).startswith(message)
+
+
+def test_results_stand_for_their_robots_and_recordings(monkeypatch):
+    pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
+    simulated, seen = js.simulate("doggy", seconds=1.0, effects="cogging@joint1", friction="smooth"), []
+    assert simulated.answer().endswith("effects: cogging@joint1")
+
+    class Reached(js.errors.SolveError):
+        pass
+
+    def begin(robots, recording, *args, **kwargs):
+        seen.append((robots, recording))
+        raise Reached("here it begins")
+
+    monkeypatch.setattr(calls, "compare_motion", begin)
+    with pytest.raises(Reached):
+        js.compare("doggy", simulated)
+    assert seen[0][1] is simulated.recording
+
+
 @pytest.mark.parametrize("verb", ["calibrate", "compare", "diagnose", "discover"])
 def test_verb_and_function_do_the_same_computation(verb, folder, monkeypatch, capsys):
     """With one stand-in for the computation, which both must reach."""

@@ -94,11 +94,13 @@ def test_a_payload_sits_on_the_long_axis_and_has_weight(arm):
         ("gravity_direction@robot", {"x": 0.2, "y": -0.1}),
         ("link_mass@shoulder", {"mass": 1.2, "x": 0.01, "y": -0.02, "z": 0.02}),
         ("link_mass@elbow", {"mass": -0.5, "x": 0.005, "y": 0.01, "z": 0.01}),
+        ("axis_misalignment@shoulder", {"x": 0.1, "y": -0.2}),
+        ("axis_misalignment@elbow", {"x": -0.3, "y": 0.15}),
     ],
 )
 def test_settings_of_the_simulator_are_those_of_the_catalogue(arm, label, values):
     effect = make_effect(f"{label}:{','.join(f'{name}={value}' for name, value in values.items())}", arm)
-    robot = add_effect(arm, label, values)
+    robot = add_effect(replace(arm, sensors={arm.motor_encoder.name: arm.motor_encoder}), label, values)
     bodies = StructuredTree(robot).bodies({name: p.value for name, p in robot.parameters.items()})
     rng = np.random.default_rng(3)
     for _ in range(5):

@@ -56,6 +56,12 @@ class RawTopic:
         """Time of writing, shape (n,) [ns]."""
         return np.array(self.received, dtype=np.int64)
 
+    def take(self, rows: NDArray[np.intp] | None) -> RawTopic:
+        """The messages at some places; all where these are None."""
+        if rows is None:
+            return self
+        return RawTopic(self.name, [self.received[k] for k in rows], [self.data[k] for k in rows])
+
 
 class Bag:
     """An open bag.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from jointscope.robots.errors import EffectError
+from jointscope.robots.files.effect_catalogue import without_alias
 from jointscope.tools.simulator.effects import parameters_in
 
 DEFAULTS: Mapping[str, Mapping[str, float]] = {
@@ -51,7 +52,7 @@ def pose_effects(texts: Iterable[str], joints: Sequence[str]) -> list[PoseEffect
     found = []
     for text in texts:
         head, _, tail = text.partition(":")
-        effect, _, owner = head.partition("@")
+        effect, _, owner = without_alias(head).partition("@")
         if effect not in DEFAULTS:
             raise EffectError(f"effect {effect!r} cannot be simulated in poses; known are {', '.join(DEFAULTS)}")
         owners = ("robot",) if effect in OF_ROBOT else tuple(joints)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from functools import cache
 
 from jointscope.robots.errors import EffectError
+from jointscope.robots.files.effect_catalogue import without_alias
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.world.effect import SimulatedEffect, owners_of
 from jointscope.tools.simulator.world.not_simulated import NOT_SIMULATED
@@ -41,7 +42,7 @@ def make_effect(text: str, robot: Robot) -> SimulatedEffect:
         EffectError: unknown id, owner or parameter, or text of another form.
     """
     head, _, tail = text.partition(":")
-    effect_id, at, owner = head.partition("@")
+    effect_id, at, owner = without_alias(head).partition("@")
     known = simulated_effects()
     if effect_id in NOT_SIMULATED:
         raise EffectError(f"effect {effect_id} cannot be switched on: {NOT_SIMULATED[effect_id]}")
