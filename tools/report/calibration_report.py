@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
+from jointscope.tools.report.kinds_beside_motion import kinds_beside_motion
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.notices import notices
 from jointscope.tools.report.page.page import page
@@ -41,6 +42,7 @@ def calibration_report(result: CalibrationResult, checked: AcceptedBy = NO_LIMIT
         *acceptance(checked),
         parameters(result),
         *rest_pictures(*rests_of(result)),
+        *kinds_beside_motion(result),
         *([mounting(result)] if result.robot.gyros else []),
         *([fits(result), commands(result)] if motion else []),
         residuals(result),

@@ -8,8 +8,11 @@ from html import escape
 
 import numpy as np
 
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
+from jointscope.graphs.frequency.explained import PoseFit, pose_fit
 from jointscope.graphs.frequency.frequency_set import FrequencySet
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
 from jointscope.tools.presentation.numbers import percent
@@ -40,7 +43,7 @@ def frequency_report(
 
 def frequency_sections(result: FrequencyCalibration) -> list[Section]:
     """What a page says of frequency responses; the verdict comes first."""
-    return [_verdict(result), _values(result), *response_sections(result)]
+    return [_verdict(result), _values(result), *response_sections(result.robot, result.start, result.problems)]
 
 
 def _verdict(result: FrequencyCalibration) -> Section:
@@ -50,11 +53,19 @@ def _verdict(result: FrequencyCalibration) -> Section:
     return Section("verdict", "Is it good?", f"<ul>{items}{matrix}</ul>", judgement.headline)
 
 
-def response_sections(result: FrequencyCalibration) -> list[Section]:
-    """Measured and model, and what torques are left, pose by pose."""
-    responses = [_pose(result, problem, k) for k, problem in enumerate(result.problems)]
-    balances = [_balance(problem, k) for k, problem in enumerate(result.problems)]
-    return [*responses, *balances, _answered(result)]
+def response_sections(robot: Robot, start: Robot, problems: Sequence[FrequencySet]) -> list[Section]:
+    """Measured and model, and what torques are left, pose by pose.
+
+    Args:
+        robot: with the values that were found.
+        start: before.
+        problems: the poses.
+    """
+    at = Calibration.of(robot).only([DYNAMICS])
+    own = [problem.of_robot(robot) for problem in problems]
+    responses = [_pose(robot, start, problem, k) for k, problem in enumerate(own)]
+    balances = [_balance(problem, k) for k, problem in enumerate(own)]
+    return [*responses, *balances, _answered([pose_fit(problem, at) for problem in own])]
 
 
 def _values(result: FrequencyCalibration) -> Section:
@@ -64,21 +75,19 @@ def _values(result: FrequencyCalibration) -> Section:
     return Section("values", "Values", table(head, rows, (1, 2, 3)), lead)
 
 
-def _pose(result: FrequencyCalibration, problem: FrequencySet, k: int) -> Section:
+def _pose(robot: Robot, start: Robot, problem: FrequencySet, k: int) -> Section:
     """Bode grid from torques to accelerations, as in Fig. 11 of Neubauer et al. (2015)."""
     pose, m, panels = problem.pose, problem.pose.matrix, []
     own = pose.used
     f, square, sigmas = m.frequencies[own], pose.w**2, m.sigmas(m.total)[own]
-    values = {name: p.value for name, p in result.robot.parameters.items()}
-    before = {name: p.value for name, p in result.start.parameters.items()}
-    model, start = problem.response(values), problem.response(before)
+    model, before = (problem.response({n: p.value for n, p in one.parameters.items()}) for one in (robot, start))
     for i, joint in enumerate(m.outputs):
         for j, motor in enumerate(m.inputs):
             size, half = square * np.abs(m.G[own, i, j]), SIGMAS * square * sigmas[:, i, j]
             marks: list[Mark] = [
                 Band("two sigmas", f, np.maximum(size - half, SMALLEST * size), size + half, "k0"),
                 Curve("measured", f, size, "k0"),
-                Curve("start", f, square * np.abs(start[:, i, j]), "k2", "dashed"),
+                Curve("start", f, square * np.abs(before[:, i, j]), "k2", "dashed"),
                 Curve("model", f, square * np.abs(model[:, i, j]), "k1"),
             ]
             axes = Axes(f"{motor} to {joint} [rad/s^2/(N m)]", "frequency [Hz]", 510, 220, log_x=True, log_y=True)
@@ -105,12 +114,12 @@ def _balance(problem: FrequencySet, k: int) -> Section:
     )
 
 
-def _answered(result: FrequencyCalibration) -> Section:
+def _answered(fits: Sequence[PoseFit]) -> Section:
     """How much of what is left answers the excitation, band by band."""
     head = ["pose", "from [Hz]", "to [Hz]", "answers the excitation", "± sigma"]
     rows = [
         [escape(pose.path), f"{band.low:g}", f"{band.high:g}", percent(band.share), percent(band.sigma)]
-        for pose in result.explained.poses
+        for pose in fits
         for band in pose.answered
     ]
     lead = (

@@ -41,7 +41,7 @@ def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS, more
         verdict,
         *acceptance(checked),
         *others,
-        *response_sections(responses),
+        *response_sections(responses.robot, responses.start, responses.problems),
         *more,
     ]
     return page(f"{result.robot.name}: poses and frequency responses", ", ".join(paths), sections)

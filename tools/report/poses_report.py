@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
-from jointscope.graphs.poses.tip_errors import parts_of, summary
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.report.page.acceptance import acceptance
@@ -94,9 +95,18 @@ def _histogram(result: PoseCalibration) -> Section:
 
 
 def _against(result: PoseCalibration) -> Section:
-    """What is left against the order of the poses and each joint: a trend is something that the model lacks."""
+    return left_of_poses(result.problems, result.errors)
+
+
+def left_of_poses(problems: Sequence[PoseSet], left: Sequence[TipErrors]) -> Section:
+    """What is left against the order of the poses and each joint: a trend is something that the model lacks.
+
+    Args:
+        problems: sessions of poses.
+        left: how far targets are from where the model has them, for each session.
+    """
     panels = []
-    for problem, errors in zip(result.problems, result.errors, strict=True):
+    for problem, errors in zip(problems, left, strict=True):
         number = np.arange(len(problem.poses), dtype=float)
         panels.append(_dots("pose, in the order of the session", number, errors.vectors))
         for j, joint in enumerate(problem.arm.chain.joints):

@@ -23,8 +23,9 @@ def arm_search_report(found: ArmDiscovery, more: Sequence[Section] = ()) -> str:
         sections += pose_sections(last.poses)
         paths += [problem.poses.path for problem in last.poses.problems]
     if last.frequency is not None:
-        sections += response_sections(last.frequency) if sections else frequency_sections(last.frequency)
-        paths += [problem.pose.path for problem in last.frequency.problems]
+        own, problems = last.frequency, last.frequency.problems
+        sections += response_sections(own.robot, own.start, problems) if sections else frequency_sections(own)
+        paths += [problem.pose.path for problem in problems]
     sections.insert(1, steps_section(found))
     title = f"{found.robot.name}: what is missing, from {' and '.join(found.kinds)}"
     return page(title, ", ".join(paths), [*sections, *more])
