@@ -67,7 +67,11 @@ def doubts(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -
     linear = LinearRests.of(
         replace(problem.of_robot(wide), per_command=True), x, at, weight, weight * (at.dynamics - prior)
     )
+    if not len(linear.motor):
+        return ()
     base = np.arange(len(calibration.names))
+    # a gain and all masses may grow together for ever: beside other values gains stay what they are
+    beside = np.array([k for k in base if calibration.names[k].rpartition(".")[2] != robot.drive_gain], dtype=np.intp)
     groups = {h.label: _columns(h, at.names) for h in tried}
     linear, places = _by_angle(linear, problem, robot)
     groups |= places
@@ -75,9 +79,9 @@ def doubts(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -
     for label, columns in groups.items():
         n, k = _told(linear, columns)
         if 0 < k < n:
-            d, cost = linear.minimum(np.concatenate([base, columns]))
+            d, cost = linear.minimum(np.concatenate([beside, columns]))
             fall = max(2.0 * (least - cost), 0.0)
-            found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), float(d[len(base)])))
+            found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), float(d[len(beside)])))
     counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
     return tuple(sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, -d.fall)))
 
