@@ -20,10 +20,11 @@ class AxisMisalignment(Structure):
     """Acts only where nothing but the torques of the links shows it: what gyros and targets see is not turned."""
 
     def owners_of(self, robot: RobotView) -> tuple[str, ...]:
-        """Joints that turn, of robots without gyros, accelerometers and targets whose links push or weigh."""
-        if robot.gyros or robot.accelerometers or robot.targets or not (np.any(robot.tree.gravity) or robot.n > 1):
+        """Joints that turn, of robots without gyros, accelerometers and targets; the first one under gravity only."""
+        if robot.gyros or robot.accelerometers or robot.targets:
             return ()
-        return tuple(joint for joint in super().owners_of(robot) if joint not in robot.tree.massless)
+        shown = robot.joints if np.any(robot.tree.gravity) else robot.joints[1:]
+        return tuple(j for j in super().owners_of(robot) if j in shown and j not in robot.tree.massless)
 
 
 EFFECT = AxisMisalignment(

@@ -20,6 +20,7 @@ EXAMPLES = {
     "imu": "imu1",
     "robot": "robot",
     "target": "target",
+    "link encoders": "link_encoder",
     "upright robot": "robot (upright)",
     "weighed elastic joint": "joint1 (elastic, under gravity)",
 }

@@ -51,7 +51,8 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     ),
     "encoder_scale": ("joint", "scale"),
     "encoder_eccentricity": ("joint, joint seen on the link", "cos sin order"),
-    "encoder_delay": ("joint, robot, target", "delay"),
+    "axis_misalignment": ("joint", "x y"),
+    "encoder_delay": ("joint, robot, target, link encoders", "delay"),
     "encoder_filter": ("joint, robot", "variance"),
     "encoder_offset": ("joint", "offset"),
     "torque_constant_error": ("joint", "share"),
@@ -79,7 +80,8 @@ def plain():
 
 
 def effect_of(effect_id: str, kind: str, robot: Robot = DOGGY) -> SimulatedEffect:
-    return make_effect(f"{effect_id}@{owners_of(kind, robot)[0]}", robot)
+    owners = owners_of(kind, robot)  # how the first axis of a robot without weight stands makes no difference
+    return make_effect(f"{effect_id}@{owners[-1 if effect_id == 'axis_misalignment' else 0]}", robot)
 
 
 def null_text(effect: SimulatedEffect) -> str:
@@ -224,3 +226,21 @@ def test_help_lists_every_effect_once(capsys):
     for effect_id in simulated_effects():
         assert words.count(effect_id) == 1
     assert max(map(len, effect_list().splitlines())) <= 100
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("backlash@joint1:half_gap=50", r"a gap of 100 rad, twice half_gap, is as wide as all that the motor turns"),
+        ("axis_misalignment@joint3:x=9", r"x: expected below 0.785 rad, got 9"),
+    ],
+)
+def test_sizes_that_no_law_covers_are_told(text, message):
+    with pytest.raises(EffectError, match=message):
+        simulate(load_robot("biorob"), "calibration", 1.0, effects=[text])
+
+
+def test_all_encoders_on_the_links_may_be_late_together():
+    robot = load_robot("biorob")
+    late = make_effect("encoder_delay@link_encoder:delay=0.004", robot)
+    assert late.age(robot.link_encoder).tolist() == [0.004] * 4 and not late.age(robot.motor_encoder).any()

@@ -8,9 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from jointscope.robots.errors import EffectError
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.specification import link_body
+
+MOST = np.pi / 4  # [rad] beyond, a joint turns about another axis
 
 
 class AxisMisalignment(SimulatedEffect):
@@ -20,6 +23,11 @@ class AxisMisalignment(SimulatedEffect):
     acts_on = ("joint",)
     built_in = True
     defaults: ClassVar[Mapping[str, float]] = {"x": 0.089, "y": 0.0}  # 5.1 degrees
+
+    def _check(self, name: str, value: float) -> None:
+        super()._check(name, value)
+        if abs(value) >= MOST:
+            raise EffectError(f"effect {self.id}@{self.owner}: {name}: expected below {MOST:.3g} rad, got {value:g}")
 
     def edit(self, spec: Any) -> None:
         """Turns the frame of the body, with the joint's axis in it."""

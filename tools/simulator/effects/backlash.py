@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from jointscope.robots.errors import EffectError
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.world.effect import Address, SimulatedEffect
 from jointscope.tools.simulator.world.specification import set_linear, spring_tendon
 
@@ -27,6 +29,12 @@ class Backlash(SimulatedEffect):
     def edit(self, spec: Any) -> None:
         """Widens the range in which the spring is slack, and takes the damper away."""
         half_gap, tendon = self.parameters["half_gap"], spec.tendon(spring_tendon(self.owner))
+        travel = _travel(self.robot, self.owner)
+        if 2.0 * half_gap >= travel:
+            raise EffectError(
+                f"effect {self.id}@{self.owner}: a gap of {2.0 * half_gap:g} rad, twice half_gap, is as wide as all "
+                f"that the motor turns its joint ({travel:.3g} rad): its spring would never be stretched"
+            )
         tendon.springlength = [-half_gap, half_gap]
         self._damping = float(np.ravel(tendon.damping)[0])
         set_linear(tendon, "damping", 0.0)
@@ -48,3 +56,12 @@ class Backlash(SimulatedEffect):
         for dof, share in self._terms:
             for receiver in self._receivers:
                 receiver[dof] -= share * pull
+
+
+def _travel(robot: Robot, joint: str) -> float:
+    """How far the motor turns for the whole range of its joint, a full turn where it has no limits [rad]."""
+    i = robot.joints.index(joint)
+    limits = np.asarray(robot.tree.limits)[i]
+    travel = float(np.ptp(limits)) if np.all(np.isfinite(limits)) else 2.0 * np.pi
+    own = 1.0 if robot.transmission is None else abs(float(robot.transmission[i, i]))
+    return travel / own if own > 0.0 else np.inf

@@ -51,8 +51,8 @@ class SimulatedEffect:
     Attributes:
         parameters: all values by name.
         id: name of the effect, that of its file.
-        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "target", "robot", "upright robot"
-            and "weighed elastic joint".
+        acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "target", "robot", "upright robot",
+            "link encoders" and "weighed elastic joint".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
         never_negative: parameters that must not be negative.
@@ -181,7 +181,7 @@ class SimulatedEffect:
             return [sensor.joints.index(own)] if isinstance(sensor, LinkEncoder) else []
         if not isinstance(sensor, MotorEncoder):
             return []
-        return [sensor.joints.index(joint) for joint in self.joints]
+        return [sensor.joints.index(joint) for joint in self.joints if joint in sensor.joints]
 
     def _check(self, name: str, value: float) -> None:
         if not np.isfinite(value):
@@ -196,6 +196,8 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
     """Names of the owners of a kind; an upright robot feels gravity along -z of its base, a weighed joint any."""
     if kind == "imu":
         return tuple(gyro.name for gyro in robot.gyros)
+    if kind == "link encoders":
+        return () if robot.link_encoder is None else (robot.link_encoder.name,)
     if kind == "target":
         return tuple(target.name for target in robot.targets)
     elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
