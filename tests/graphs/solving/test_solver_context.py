@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 
 import numpy as np
@@ -68,3 +69,17 @@ def test_a_process_among_many_works_alone(monkeypatch):
     monkeypatch.setenv(LIMITS[0], "4")
     work_alone()
     assert thread_count() == 1
+
+
+def test_threads_do_not_compute_in_each_others_memory(doggy):
+    """Pinocchio leaves its results in a workspace, where another thread might write before they are copied."""
+    rng = np.random.default_rng(3)
+    positions = [rng.normal(size=(200, 3)) for _ in range(12)]
+    alone = [doggy.tree.mass_matrix(q) for q in positions]
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        found = list(side_by_side(doggy.tree.mass_matrix, positions, 4))
+    finally:
+        sys.setswitchinterval(before)
+    np.testing.assert_array_equal(found, alone)
