@@ -16,7 +16,7 @@ from jointscope.robots.recordings.recording import Recording
 NUMBER = 8  # [bytes]
 GIGABYTE = 1e9  # [bytes]
 PROCESS = 0.25e9  # [bytes] of a worker with what it imports
-PEAK = 2.2  # times what one solution takes; measured on 32 s of Doggy, 3.9 where torques that last are found, too
+PEAK = 1.3  # times what one solution takes; measured on 65 s of Doggy, more where torques that last are found, too
 
 
 def must_fit(crew: Crew, robot: Robot, recordings: Sequence[Recording]) -> None:
@@ -62,10 +62,10 @@ def ticks_of(robot: Robot, recording: Recording) -> int:
 
 
 def kept_bytes(robot: Robot, recording: Recording) -> float:
-    """Of a worker: normal equations where it is and where it was tried, and the band that was eliminated."""
+    """Of a worker: normal equations where it is and where it was tried, each with the band that was eliminated."""
     d, p = robot.layout.size, Calibration.of(robot).size
     system = 2 * d * d + d * p + 2 * d
-    return float(NUMBER * ticks_of(robot, recording) * (2 * system + 2 * d * d))
+    return float(NUMBER * ticks_of(robot, recording) * 2 * (system + 2 * d * d))
 
 
 def solved_bytes(robot: Robot, recording: Recording) -> float:

@@ -13,6 +13,7 @@ pinocchio returns windows into its `data`, which its next call overwrites: every
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -27,6 +28,25 @@ Array = NDArray[np.float64]
 Derivatives = tuple[Array, Array, Array, Array]
 
 
+class OwnData(threading.local):
+    """Where pinocchio computes: of each thread its own, as results stand there until they are copied.
+
+    Args:
+        model: of pinocchio.
+
+    Attributes:
+        data: for its functions.
+        pool: for those of many samples.
+    """
+
+    def __init__(self, model: pin.Model):
+        self.model, self.data, self.pool = model, model.createData(), pin.ModelPool(model, 1)
+
+    def __reduce__(self) -> tuple[type[OwnData], tuple[pin.Model]]:
+        """Pinocchio cannot pickle a pool; a copy makes its own."""
+        return OwnData, (self.model,)
+
+
 class FreeEquations:
     """Equations of a model whose coordinates are all free.
 
@@ -35,11 +55,7 @@ class FreeEquations:
     """
 
     def __init__(self, model: pin.Model):
-        self._model, self._data, self._pool = model, model.createData(), pin.ModelPool(model, 1)
-
-    def __reduce__(self) -> tuple[type[FreeEquations], tuple[pin.Model]]:
-        """Pinocchio cannot pickle a pool; a copy makes its own."""
-        return FreeEquations, (self._model,)
+        self._model, self._own = model, OwnData(model)
 
     @cached_property
     def _table(self) -> JointTable:
@@ -67,18 +83,18 @@ class FreeEquations:
 
     def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
         """Accelerations at one state, shape (n,)."""
-        return np.array(pin.aba(self._model, self._data, q, v, tau))
+        return np.array(pin.aba(self._model, self._own.data, q, v, tau))
 
     def derivatives_at(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """As `derivatives`, at one state."""
-        by_q, by_v, M_inverse = pin.computeABADerivatives(self._model, self._data, q, v, tau)
-        return self._data.ddq.copy(), by_q.copy(), by_v.copy(), M_inverse.copy()
+        by_q, by_v, M_inverse = pin.computeABADerivatives(self._model, self._own.data, q, v, tau)
+        return self._own.data.ddq.copy(), by_q.copy(), by_v.copy(), M_inverse.copy()
 
     def torque(self, q: Array, v: Array, a: Array) -> Array:
         """Torques of given motion; arguments and result of shape (m, n)."""
         tau = np.empty(q.shape[::-1], order="F")
         columns = (np.asfortranarray(part.T) for part in (q, v, a))
-        pin.rneaInParallel(1, self._pool, *columns, tau)
+        pin.rneaInParallel(1, self._own.pool, *columns, tau)
         return np.ascontiguousarray(tau.T)
 
     def body_torques(self, joints: Sequence[int], parameters: Array, q: Array, v: Array, a: Array) -> Array:
@@ -102,14 +118,14 @@ class FreeEquations:
         """Derivatives of the torques of gravity by q, shape (m, n, n)."""
         by_q = np.empty((len(q), self._model.nv, self._model.nv))
         for k in range(len(q)):
-            by_q[k] = pin.computeGeneralizedGravityDerivatives(self._model, self._data, q[k])
+            by_q[k] = pin.computeGeneralizedGravityDerivatives(self._model, self._own.data, q[k])
         return by_q
 
     def mass_matrix(self, q: Array) -> Array:
         """M(q), shape (m, n, n)."""
         M = np.empty((len(q), self._model.nv, self._model.nv))
         for k in range(len(q)):
-            M[k] = pin.crba(self._model, self._data, q[k])
+            M[k] = pin.crba(self._model, self._own.data, q[k])
         return M
 
 
@@ -122,7 +138,7 @@ class CoupledEquations:
     """
 
     def __init__(self, model: pin.Model, coupling: Coupling):
-        self._model, self._data = model, model.createData()
+        self._model, self._own = model, OwnData(model)
         self._coupling, self._G = coupling, coupling.G
         self._free = FreeEquations(model)
 
@@ -138,7 +154,7 @@ class CoupledEquations:
         a = (M_inverse @ (tau - self.torque(q, v, np.zeros_like(q)))[:, :, None])[:, :, 0]
         by_q, by_v = np.empty((2, len(q), len(G), len(G)))
         motion = coupling.positions(q), coupling.rates(v), coupling.rates(a)
-        model, data, derivatives = self._model, self._data, pin.computeRNEADerivatives
+        model, data, derivatives = self._model, self._own.data, pin.computeRNEADerivatives
         for k, (q_model, v_model, a_model) in enumerate(zip(*motion, strict=True)):
             by_q[k], by_v[k], _ = derivatives(model, data, q_model, v_model, a_model)
         return a, -M_inverse @ (G.T @ by_q @ G), -M_inverse @ (G.T @ by_v @ G), M_inverse
@@ -146,16 +162,16 @@ class CoupledEquations:
     def acceleration_at(self, q: Array, v: Array, tau: Array) -> Array:
         """As `FreeEquations.acceleration_at`."""
         q_model, G = self._coupling.positions(q), self._G
-        bias = G.T @ pin.nonLinearEffects(self._model, self._data, q_model, self._coupling.rates(v))
-        return np.asarray(np.linalg.solve(G.T @ pin.crba(self._model, self._data, q_model) @ G, tau - bias), float)
+        bias = G.T @ pin.nonLinearEffects(self._model, self._own.data, q_model, self._coupling.rates(v))
+        return np.asarray(np.linalg.solve(G.T @ pin.crba(self._model, self._own.data, q_model) @ G, tau - bias), float)
 
     def derivatives_at(self, q: Array, v: Array, tau: Array) -> Derivatives:
         """As `FreeEquations.derivatives_at`."""
         q_model, v_model, G = self._coupling.positions(q), self._coupling.rates(v), self._G
-        bias = G.T @ pin.nonLinearEffects(self._model, self._data, q_model, v_model)
-        M_inverse = np.linalg.inv(G.T @ pin.crba(self._model, self._data, q_model) @ G)
+        bias = G.T @ pin.nonLinearEffects(self._model, self._own.data, q_model, v_model)
+        M_inverse = np.linalg.inv(G.T @ pin.crba(self._model, self._own.data, q_model) @ G)
         a = M_inverse @ (tau - bias)
-        by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._data, q_model, v_model, G @ a)
+        by_q, by_v, _ = pin.computeRNEADerivatives(self._model, self._own.data, q_model, v_model, G @ a)
         return a, -M_inverse @ (G.T @ by_q @ G), -M_inverse @ (G.T @ by_v @ G), M_inverse
 
     def torque(self, q: Array, v: Array, a: Array) -> Array:

@@ -47,7 +47,7 @@ def known_loads(tree: RigidTree, links: Sequence[str], forces: Array, q: Array) 
     J = np.zeros((len(q), 6, tree.model.nv))
     for i in (i for i, some in enumerate(pulled) if some):
         # a model of one joint gives a vector
-        J[i] = pin.computeFrameJacobian(tree.model, tree.data, own[i], frames[links[i]], axes).reshape(6, -1)
+        J[i] = pin.computeFrameJacobian(tree.model, tree.own.data, own[i], frames[links[i]], axes).reshape(6, -1)
     linear, angular = J[:, :3], J[:, 3:]
     torque = np.einsum("mck,mc->mk", linear, forces)
     # a column turns with every joint k before its own: dJ_j / dq_k = w_k x J_j, and dJ_k / dq_j is the same

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.body_accelerations import BodyAccelerations
 from jointscope.robots.bodies.body_rates import BodyRates
 from jointscope.robots.bodies.coupling import Coupling, with_new_joints
-from jointscope.robots.bodies.equations_of_motion import Equations, equations_of
+from jointscope.robots.bodies.equations_of_motion import Equations, OwnData, equations_of
 from jointscope.robots.bodies.possible_inertias import check_inertias
 from jointscope.robots.errors import RobotError
 from jointscope.robots.urdf.mimic_joints import Follower
@@ -124,7 +124,7 @@ class RigidTree:
             self.remarks = complaints + odd
 
     def _use(self, model: pin.Model) -> None:
-        self.model, self.data = model, model.createData()
+        self.model, self.own = model, OwnData(model)
         self.coupling = Coupling.of(tuple(model.names)[1:], self.joints, self._bodies.followers)
         self.equations: Equations = equations_of(model, self.coupling)
         self._rates, self.accelerations = BodyRates(model, self.coupling), BodyAccelerations(model)
@@ -272,8 +272,8 @@ class RigidTree:
         q = q if self.coupling is None else self.coupling.positions(q)
         R, p = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
         for k in range(len(q)):
-            pin.forwardKinematics(self.model, self.data, q[k])
-            pose = pin.updateFramePlacement(self.model, self.data, frame)
+            pin.forwardKinematics(self.model, self.own.data, q[k])
+            pose = pin.updateFramePlacement(self.model, self.own.data, frame)
             R[k], p[k] = pose.rotation, pose.translation
         return R, p
 

@@ -45,9 +45,10 @@ class CommandPath:
         """
         own = [[(p.name, values[here.parameter(p.name)]) for p in here.effect.parameters] for here in self._effects]
         key = tuple(value for part in own for _, value in part)
-        if self._cache is None or self._cache[0] != key:
-            self._cache = (key, self._evaluate([dict(part) for part in own]))
-        return self._cache[1]
+        known = self._cache  # another thread may put other commands there
+        if known is None or known[0] != key:
+            known = self._cache = (key, self._evaluate([dict(part) for part in own]))
+        return known[1]
 
     def _evaluate(self, own: list[dict[str, float]]) -> tuple[Array, dict[str, Array]]:
         u, slopes = self._u.copy(), dict[str, Array]()

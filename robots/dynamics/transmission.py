@@ -42,7 +42,7 @@ class Transmission:
         self._layout: StateLayout = robot.layout
         self._fixed = np.eye(robot.n) if robot.transmission is None else robot.transmission
         own, added = self._own, self._added = elements(robot)
-        self._T, self._A = np.eye(robot.n), np.eye(robot.n)
+        self._known = np.eye(robot.n), np.eye(robot.n)
         places = [(name, place) for part in (own, added) for name, place in part.items()]
         self.free = [(names.index(name), place) for name, place in places if name in names]
 
@@ -64,9 +64,10 @@ class Transmission:
     def inverse(self, values: Mapping[str, float]) -> Array:
         """A = T^-1, shape (n, n); laws ask several times at the same values."""
         T = self.matrix(values)
-        if not np.array_equal(T, self._T):
-            self._T, self._A = T, np.asarray(np.linalg.inv(T), dtype=np.float64)
-        return self._A
+        known = self._known  # another thread may put another pair there
+        if not np.array_equal(T, known[0]):
+            known = self._known = (T, np.asarray(np.linalg.inv(T), dtype=np.float64))
+        return known[1]
 
     def seen(self, x: Array, values: Mapping[str, float]) -> Array:
         """States whose link coordinates are those that the motors see, shape (m, d)."""

@@ -161,7 +161,8 @@ class StructuredTree:
         names = [*(c.name for c in self._changes), *(name for name, *_ in self._armature), *self._tilt]
         names += [name for axis in self._turned for name in axis.names]
         key = tuple(values[name] for name in names)
-        if self._cache is None or self._cache[0] != key:
+        known = self._cache  # another thread may put other bodies there
+        if known is None or known[0] != key:
             model = self.kinematics.model.copy()
             for change in self._changes:
                 _change(model, change, values[change.name] - change.offset)
@@ -174,8 +175,8 @@ class StructuredTree:
                 model.gravity = pin.Motion(turned_gravity(self.kinematics.gravity, tilt)[0], np.zeros(3))
             for axis in self._turned:
                 axis.turned(model, np.array([values[name] for name in axis.names]))
-            self._cache = (key, self.kinematics.with_model(model))
-        return self._cache[1]
+            known = self._cache = (key, self.kinematics.with_model(model))
+        return known[1]
 
 
 def inertia_torques(

@@ -10,6 +10,7 @@ import numpy as np
 from jointscope.graphs.scoring.columns.column import Column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
+from jointscope.graphs.solving.normal_equations import CHUNK
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.files.effect_editing import parameter_of
 
@@ -22,6 +23,11 @@ def transmission_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     model = ElasticJoints(robot)
     by_name = dict(zip(s.model.names, s.parameters.tolist(), strict=True))
     parameters = np.array([by_name.get(name, 0.0) for name in model.names])
-    torques = model.torques(s.x, np.vstack([s.u, s.u[-1:]]), parameters).by_parameter
-    assert torques is not None
-    return [Column(at_ticks=s.accelerations(torques[:, :, model.names.index(name)])) for name in sizes]
+    u, tau = np.vstack([s.u, s.u[-1:]]), {name: np.zeros((len(s.ticks), model.layout.n_rates)) for name in sizes}
+    for start in range(0, len(s.ticks), CHUNK):
+        part = slice(start, start + CHUNK)
+        torques = model.torques(s.x[part], u[part], parameters).by_parameter
+        assert torques is not None
+        for name, found in tau.items():
+            found[part] = torques[:, :, model.names.index(name)]
+    return [Column(at_ticks=s.accelerations(found)) for found in tau.values()]

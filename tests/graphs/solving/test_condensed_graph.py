@@ -10,8 +10,8 @@ import pytest
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving import solver_context, stretch
-from jointscope.graphs.solving.banded_solver import eliminate
+from jointscope.graphs.solving import banded_solver, solver_context, stretch
+from jointscope.graphs.solving.banded_solver import eliminate, eliminations_of
 from jointscope.graphs.solving.batch_solver import reduced_system, solve, total_cost
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.damped_step import damped_step
@@ -129,6 +129,17 @@ def test_no_result_depends_on_the_number_of_threads(moving, threads, monkeypatch
         solution = solve(problems, estimate, max_iterations=3, length=50)
         found.append((solution.cost, *solution.estimate.states, solution.estimate.calibrations[0].values))
     assert_alike(*found)
+
+
+def test_states_that_are_eliminated_part_by_part_leave_what_the_whole_leaves(moving, monkeypatch):
+    problems, estimate = moving
+    monkeypatch.setattr(banded_solver, "PART", 60)
+    bags = zip(problems, estimate.states, estimate.calibrations, strict=True)
+    for found, bag in zip(eliminations_of(problems, estimate), bags, strict=True):
+        whole = eliminate(build(*bag))
+        for name in ("columns", "W", "w", "S", "s"):
+            reference = getattr(whole, name)
+            assert getattr(found, name) == pytest.approx(reference, abs=1e-9 * np.abs(reference).max()), name
 
 
 def test_inner_states_follow_a_step_of_the_shared_values(moving):

@@ -42,10 +42,10 @@ def test_the_force_is_that_of_pinocchios_frame_acceleration(tree: RigidTree, bod
     found = specific_force(tree, body, LEVER, q, v, a).value
     frame = tree.frame_id(body)
     for k in range(4):
-        pin.forwardKinematics(tree.model, tree.data, q[k], v[k], a[k])
-        pose = pin.updateFramePlacement(tree.model, tree.data, frame)
-        rate = pin.getFrameVelocity(tree.model, tree.data, frame, pin.LOCAL).angular
-        spatial = pin.getFrameClassicalAcceleration(tree.model, tree.data, frame, pin.LOCAL)
+        pin.forwardKinematics(tree.model, tree.own.data, q[k], v[k], a[k])
+        pose = pin.updateFramePlacement(tree.model, tree.own.data, frame)
+        rate = pin.getFrameVelocity(tree.model, tree.own.data, frame, pin.LOCAL).angular
+        spatial = pin.getFrameClassicalAcceleration(tree.model, tree.own.data, frame, pin.LOCAL)
         here = spatial.linear + np.cross(spatial.angular, LEVER) + np.cross(rate, np.cross(rate, LEVER))
         np.testing.assert_allclose(found[k], here - pose.rotation.T @ tree.gravity, atol=1e-11)
 

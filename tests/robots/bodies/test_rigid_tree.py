@@ -57,7 +57,7 @@ def test_accelerations_in_parallel_equal_those_with_derivatives(slanted, corioli
     np.testing.assert_allclose(tree.acceleration(q, v, tau), a, atol=1e-10)
     np.testing.assert_allclose(tree.acceleration(q[:1], v[:1], tau[:1]), a[:1], atol=1e-10)
     M = tree.mass_matrix(q)
-    bias = pin.rnea(tree.model, tree.data, q[0], v[0] if coriolis else 0 * v[0], np.zeros(3))
+    bias = pin.rnea(tree.model, tree.own.data, q[0], v[0] if coriolis else 0 * v[0], np.zeros(3))
     np.testing.assert_allclose(M[0] @ a[0] + bias, tau[0], atol=1e-9)
 
 
