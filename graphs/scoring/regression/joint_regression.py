@@ -166,6 +166,10 @@ class JointRows:
         gain = noise_gains(float(cells.periods[joint]), together * length * cells.h)[1]
         return float(gain * (M**2 @ sigmas**2) / found.gain**2)
 
+    def positions(self, joint: int) -> list[Array]:
+        """Positions of a joint in the middles of the cells of each recording, shape (m,) [rad]."""
+        return [columns.cells.q[:, joint] for columns in self._columns]
+
     def spans(self) -> list[tuple[float, float]]:
         """First and last time of each recording [s]."""
         return [(float(c.cells.times[0]), float(c.cells.times[-1])) for c in self._columns]

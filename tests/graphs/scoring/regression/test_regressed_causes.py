@@ -61,6 +61,10 @@ def more_at_rest(_, u, __, data):
     return u - np.array([0.0, 0.8, 0.0]) * np.exp(-((data.qvel / 0.3) ** 2)) * np.tanh(SHARP * data.qvel)
 
 
+def ripple(_, u, __, data):
+    return u + np.array([0.3, 0.15, 0.06]) * np.sin(11.0 * data.qpos)
+
+
 def growing(share):
     def drive(_, u, __, data):
         return u - share * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
@@ -122,6 +126,12 @@ def test_a_defect_of_the_regression_is_not_named_where_the_calibration_does_not_
 def test_cables_are_springs_at_all_joints(robot):
     causes = regressed_causes(joint_rows(robot, [recording(cable=3.0)]))
     assert [cause.label for cause in causes] == [f"parallel_spring@{joint}" for joint in ARM.joints]
+
+
+def test_torque_that_repeats_with_the_position_is_a_ripple_with_its_order(robot):
+    causes = regressed_causes(joint_rows(robot, [recording(drive=ripple)]))
+    assert [cause.label for cause in causes] == [f"cogging@{joint}" for joint in ARM.joints]
+    assert [cause.shapes["order"] for cause in causes] == pytest.approx([11.0] * 3, abs=1.0)
 
 
 def test_friction_that_grows_with_torque_is_told_with_its_share(robot):
