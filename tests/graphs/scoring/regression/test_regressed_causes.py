@@ -166,6 +166,12 @@ def test_what_pushes_from_outside_is_no_load_and_is_told_with_its_torque(robot, 
     assert (found.start, found.stop) == pytest.approx(ends, abs=0.05)
 
 
+def test_a_push_is_told_with_coarse_encoders(robot):
+    coarse = {"counts": 4096, "encoder_rate": 100.0, "command_rate": 100.0}
+    found = changed_load(joint_rows(robot, [recording(push=(4.0, 4.8, 1, 4.0), **coarse)]), ["here"])
+    assert found.joint == "j1" and found.push == pytest.approx(4.0, rel=0.1)
+
+
 def test_a_target_that_is_seen_late_does_not_hide_what_drives_carry(robot):
     encoder = robot.motor_encoder
     target = PositionTarget(
