@@ -19,15 +19,8 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.regression.joint_regression import (
-    AS_GOOD,
-    Fit,
-    JointRows,
-    changes_between,
-    evidence,
-    fit,
-    nearly,
-)
+from jointscope.graphs.scoring.regression.evidence import AS_GOOD, evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit
 from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
 from jointscope.graphs.scoring.regression.ripples import ORDER, Ripple, ripple_of
 from jointscope.graphs.scoring.score_test import ScoreTest

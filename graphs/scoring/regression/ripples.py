@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, evidence, fit
+from jointscope.graphs.scoring.regression.evidence import evidence
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, fit
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.files.effect_catalogue import catalogue
 
@@ -68,7 +69,8 @@ def ripple_of(rows: JointRows, joint: int) -> Ripple | None:
 
 def _best(rows: JointRows, joint: int, positions: list[Array], orders: list[float]) -> Ripple | None:
     waves = [[wave(order * q) for order in orders for wave in (np.cos, np.sin)] for q in positions]
-    found = [one for width in WIDTHS if orders and (one := _under(rows, joint, width, orders, waves)) is not None]
+    widths = [width for width in WIDTHS if orders and rows.open_at(joint, width, LEFT)]
+    found = [one for width in widths if (one := _under(rows, joint, width, orders, waves)) is not None]
     return max(found, key=lambda ripple: ripple.evidence, default=None)
 
 

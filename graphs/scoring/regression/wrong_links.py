@@ -18,14 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.regression.joint_regression import (
-    JointRows,
-    changes_between,
-    design_of,
-    evidence,
-    fit,
-    nearly,
-)
+from jointscope.graphs.scoring.regression.evidence import evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, changes_between, design_of, fit
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -123,7 +117,9 @@ def wrong_link(rows: JointRows) -> WrongLink | None:
         return None
     at = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
     links = [EffectHypothesis(a, effect.parameters_at(robot, a.owner)) for a in at if not cannot_be_added(robot, a)]
-    told = [one for link in links for width in WIDTHS for one in _of(rows, link, width, (1, len(link.sizes)))]
+    # nothing is asked of windows in which no joint lacks more than noise
+    widths = [width for width in WIDTHS if any(rows.open_at(joint, width, LEFT) for joint in range(robot.n))]
+    told = [one for link in links for width in widths for one in _of(rows, link, width, (1, len(link.sizes)))]
     if not told or max(one.evidence for one in told) <= 0.0:
         return None
     clearest = max(told, key=lambda one: one.evidence)
