@@ -11,9 +11,11 @@ import shlex
 from collections.abc import Sequence
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
-from jointscope.graphs.scoring.regression.changed_load import LEFT, changed_load
+from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
+from jointscope.graphs.scoring.regression.changed_load import LEFT
 from jointscope.graphs.scoring.regression.joint_regression import JointRows, fit, joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
@@ -35,15 +37,21 @@ def what_is_missing(robot: Robot, recording: Recording, poor: Sequence[str]) -> 
     rows = joint_rows(robot, [recording])
     if rows is None:
         return NOTHING
-    if changed := changed_load(rows, [recording.path]):
+    found = most_plausible(rows, [recording.path], regressed_causes(rows))
+    if (changed := found.changed) is not None:
         what = "something pushes on the arm from outside" if changed.push else "the arm carries something else"
         until = "on" if changed.stop >= changed.end else f"to {changed.stop:.2f} s"
         return (
             f"from {changed.start:.2f} s {until} {what}, {100.0 * changed.size:.2g} % of the drive's torque at "
             f"{changed.joint}; `jointscope calibrate` says how to leave that out"
         )
-    causes = regressed_causes(rows)
+    if (link := found.link) is not None:
+        carries = "weighs" if not link.moments else "has its centre of mass elsewhere and weighs"
+        return f"the link that {link.joint} moves {carries} {link.mass:+.2g} kg more than in the URDF: correct it"
+    causes = found.causes
     named = [cause for cause in causes if cause.joint in poor]
+    if any(cause.effect == RIPPLE for cause in named):
+        return "torque repeats with the position there, as from magnets or teeth: `jointscope discover` finds it"
     if named:
         title = catalogue()[named[0].effect].card.title
         labels = " ".join(shlex.quote(cause.label) for cause in causes)

@@ -9,6 +9,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.graphs.scoring.regression.load_friction import LoadFriction
 from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
+from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
 from jointscope.graphs.scoring.regression.unsteady_gains import (
     COMMAND,
     COMMANDS,
@@ -85,10 +86,14 @@ def _named(result: CalibrationResult) -> tuple[str, str]:
     )
     worst = max(causes, key=lambda cause: cause.size)
     labels, output = " ".join(c.label for c in causes), edited_argument(result.start, next(iter(by_effect)))
+    add = (
+        f"Add it: `jointscope add {robot_argument(result.start)} {labels} -o {output}`, then calibrate again."
+        if RIPPLE not in by_effect  # whose order a search finds
+        else f"Which it is exactly, and whether it predicts better: `{_discover(result)}`."
+    )
     return "bad" if worst.size > MATTERS else "warn", (
         f"The recording asks for {listed}: at {worst.joint} {100.0 * worst.explained:.0f} % of what regression leaves "
-        f"open is of its shape, {significant(100.0 * worst.size, 2)} % of the drive's torque{_moved(causes)}. Add it: "
-        f"`jointscope add {robot_argument(result.start)} {labels} -o {output}`, then calibrate again."
+        f"open is of its shape, {significant(100.0 * worst.size, 2)} % of the drive's torque{_moved(causes)}. {add}"
     )
 
 

@@ -22,7 +22,7 @@ from jointscope.graphs.scoring.regression.regressed_causes import (
     regressed_causes,
 )
 from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, unsteady_gains
-from jointscope.graphs.scoring.regression.wrong_links import WrongLink, wrong_link
+from jointscope.graphs.scoring.regression.wrong_links import WrongLink, tilted_base, wrong_link
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.model.robot import Robot
@@ -70,7 +70,7 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
         return Asked()
     paths = [recording.path for recording in recordings]
     found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
-    if found.link and not asked_for({f"{EFFECT}@{found.link.joint}"}, test):
+    if found.link and not asked_for({f"{EFFECT}@{found.link.joint}": {}}, test):
         return Asked(late=found.late)
     return found if found.names else replace(found, load_frictions=load_frictions(rows))
 
@@ -90,6 +90,7 @@ def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[Regresse
         (link.evidence if link else 0.0, Asked(link=link)),
         (changed.evidence if changed else 0.0, Asked(changed=changed)),
         (late := late_commands(rows), Asked()),
+        (tilted_base(rows), Asked()),
     ]
     worth, best = max(options, key=lambda option: option[0])
     return replace(best, late=late > COMPARABLE * worth)

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.regression.joint_regression import JointRows, beyond, evidence, fit, nearly
+from jointscope.graphs.scoring.regression.evidence import beyond, evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, fit
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue

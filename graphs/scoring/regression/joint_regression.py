@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.hypothesis_score import INDEPENDENT
 from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
 from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, MOST_NOISE, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
@@ -31,7 +30,6 @@ Array = NDArray[np.float64]
 
 DELAY, DELAY_NAME = "command_delay@robot", "robot.command_delay.delay"  # commands are moved by it
 FEWEST_ROWS = 60  # windows
-AS_GOOD = 1.2  # times the mean square that the best cause leaves, up to which another one is as good
 
 
 def joint_rows(robot: Robot, recordings: Sequence[Recording]) -> JointRows | None:
@@ -166,6 +164,24 @@ class JointRows:
         gain = noise_gains(float(cells.periods[joint]), together * length * cells.h)[1]
         return float(gain * (M**2 @ sigmas**2) / found.gain**2)
 
+    def open_at(self, joint: int, width: float, left: float) -> bool:
+        """Whether a joint lacks so much, beyond the noise of its encoder, that some cause could leave a share of it.
+
+        Args:
+            joint: index.
+            width: of the windows [s].
+            left: the share.
+        """
+        here = self.of(joint, width)
+        if here is None:
+            return False
+        plain = fit(self.robot, joint, here)
+        return left * plain.left > MOST_NOISE * self.noise(joint, width, plain)
+
+    def positions(self, joint: int) -> list[Array]:
+        """Positions of a joint in the middles of the cells of each recording, shape (m,) [rad]."""
+        return [columns.cells.q[:, joint] for columns in self._columns]
+
     def spans(self) -> list[tuple[float, float]]:
         """First and last time of each recording [s]."""
         return [(float(c.cells.times[0]), float(c.cells.times[-1])) for c in self._columns]
@@ -227,36 +243,6 @@ def design_of(robot: Robot, joint: int, rows: Array, free_gain: bool = False) ->
     if GAIN in held:
         return free, np.column_stack([*columns, more]), rows[:, 0] - load / held[GAIN]
     return [GAIN, *free], np.column_stack([load, *columns, more]), rows[:, 0]
-
-
-def evidence(plain: float, left: float, seconds: float, sizes: int) -> float:
-    """By how much a cause is more plausible than none, as a logarithm: what it explains less what its sizes cost.
-
-    The Bayesian information criterion with a noise that is not known. Of causes that are asked of the same joints, the
-    most plausible one has the most of it; that counts all joints, and a joint that has little to tell counts little.
-
-    Args:
-        plain: mean square that the plain regression leaves.
-        left: mean square that is left with it.
-        seconds: of motion that are told of.
-        sizes: that it has.
-
-    Reference:
-        Schwarz (1978), Estimating the dimension of a model, Annals of Statistics 6(2).
-    """
-    count = max(seconds / INDEPENDENT, 1.0)
-    return float(0.5 * count * np.log(max(plain, 1e-300) / max(left, 1e-300)) - 0.5 * sizes * np.log(count))
-
-
-def nearly(seconds: float) -> float:
-    """How much less evidence another cause may have that leaves AS_GOOD times as much, and so is as good."""
-    return evidence(AS_GOOD, 1.0, seconds, 0)
-
-
-def beyond(left: float, plain: float, noise: float) -> tuple[float, float]:
-    """What is left with a cause and without it beyond the noise of the encoders, as far as that can be believed."""
-    taken_off = min(noise, MOST_NOISE * left)
-    return left - taken_off, plain - taken_off
 
 
 def sigma_of(

@@ -9,8 +9,8 @@ regression leaves, and where no cause of another kind (a delay, a mass, gravity 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,14 +19,10 @@ from scipy.special import chdtrc
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.hypothesis_score import best_shapes
-from jointscope.graphs.scoring.regression.joint_regression import (
-    AS_GOOD,
-    Fit,
-    JointRows,
-    changes_between,
-    evidence,
-    fit,
-)
+from jointscope.graphs.scoring.regression.evidence import AS_GOOD, evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit
+from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
+from jointscope.graphs.scoring.regression.ripples import ORDER, Ripple, ripple_of
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.starts.drive_regression import MOST_NOISE
 from jointscope.graphs.starts.windowed_sums import WIDTHS
@@ -59,6 +55,7 @@ class RegressedCause:
         size: rms of what it explains, over that of the drive.
         with_it: parameters of the joint with the effect over those without, by name.
         evidence: for it, at its joint.
+        shapes: the order of the ripple that it is, or looks like.
     """
 
     effect: str
@@ -68,6 +65,7 @@ class RegressedCause:
     size: float
     with_it: dict[str, float]
     evidence: float
+    shapes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -111,7 +109,7 @@ def confirmed(causes: Sequence[RegressedCause], test: ScoreTest) -> tuple[Regres
         causes: what regression says.
         test: of the whole recordings, linearised at their solution with the noise used.
     """
-    effects = asked_for({cause.label for cause in causes}, test)
+    effects = asked_for({cause.label: cause.shapes for cause in causes}, test)
     return tuple(cause for cause in causes if cause.effect in effects)
 
 
@@ -132,14 +130,15 @@ def _of_first(told: _Told) -> float:
     return max(evidence(told.plain.left, min(fit.left for fit in told.fits), told.seconds, 1), 0.0)
 
 
-def asked_for(labels: Collection[str], test: ScoreTest) -> set[str]:
+def asked_for(labels: Mapping[str, Mapping[str, float]], test: ScoreTest) -> set[str]:
     """Which effects a calibration asks for, by id, if only at one joint: what one's noise hides another's shows.
 
     Args:
-        labels: ID@OWNER of each that may be.
+        labels: ID@OWNER of each that may be, with its shapes where these are known.
         test: of the whole recordings, linearised at their solution with the noise used.
     """
     asked = [h for h in hypotheses_of(test.robot) if h.label in labels]
+    asked = [h for h in asked if not h.shapes or labels[h.label].items() <= h.shapes.items()]
     best = best_shapes(test.each(asked)) if asked else {}
     sure = [s.hypothesis for s in best.values() if len(asked) * chdtrc(s.dof, s.plausible[0]) < BY_CHANCE]
     return {hypothesis.here.effect.id for hypothesis in sure}
@@ -161,6 +160,9 @@ def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) ->
     told_of = min(told, key=lambda one: min(fit.left for fit in one.fits) / one.plain.left)
     plain, fits, driving = told_of.plain, told_of.fits, told_of.driving
     least = min(fit.left for fit in fits)
+    ripple, worth = ripple_of(rows, joint), evidence(plain.left, least, told_of.seconds, 1)
+    if ripple is not None and ripple.periods >= 1.0 and ripple.evidence > worth + nearly(told_of.seconds):
+        return _as_cause(rows, joint, ripple)
     # what is as good as the best, simplest first, of those causes that belong to the joint first
     good = sorted((f for f in fits if f.left <= AS_GOOD * least), key=lambda f: (f.sizes, not _is_own(f), f.left))
     best = good[0]
@@ -172,8 +174,19 @@ def _of_joint(rows: JointRows, joint: int, asked: Sequence[EffectHypothesis]) ->
     alike = dict.fromkeys(_id(f) for f in good[1:] if f.sizes == best.sizes)
     alike.pop(_id(best), None)
     changes = changes_between(rows.robot, rows.robot.joints[joint], plain, best)
-    told_by = evidence(plain.left, best.left, told_of.seconds, best.sizes)
-    return RegressedCause(_id(best), rows.robot.joints[joint], tuple(alike), explained, size, changes, told_by)
+    told_by, shapes, name = evidence(plain.left, best.left, told_of.seconds, best.sizes), {}, rows.robot.joints[joint]
+    if ripple is not None and ripple.evidence > told_by + nearly(told_of.seconds) and not _shapes(best):
+        alike, shapes = {RIPPLE: None, **alike}, {ORDER: ripple.order}
+    return RegressedCause(_id(best), name, tuple(alike), explained, size, changes, told_by, shapes)
+
+
+def _as_cause(rows: JointRows, joint: int, ripple: Ripple) -> RegressedCause | None:
+    explained = 1.0 - ripple.best.left / ripple.plain.left
+    size = float(np.sqrt(explained * ripple.plain.left / ripple.driving))
+    name = rows.robot.joints[joint]
+    changes, shapes = changes_between(rows.robot, name, ripple.plain, ripple.best), {ORDER: ripple.order}
+    cause = RegressedCause(RIPPLE, name, (), explained, size, changes, ripple.evidence, shapes)
+    return cause if size >= LARGE and ripple.evidence > -np.log(BY_CHANCE) else None
 
 
 def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypothesis]) -> _Told | None:
@@ -195,6 +208,10 @@ def _under(rows: JointRows, joint: int, width: float, asked: Sequence[EffectHypo
 
 def _id(fit: Fit) -> str:
     return "" if fit.hypothesis is None else fit.hypothesis.here.effect.id
+
+
+def _shapes(fit: Fit) -> Mapping[str, float]:
+    return {} if fit.hypothesis is None else fit.hypothesis.shapes
 
 
 def _is_possible(fit: Fit) -> bool:

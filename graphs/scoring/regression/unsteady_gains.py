@@ -18,16 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.scoring.regression.joint_regression import (
-    Fit,
-    JointRows,
-    beyond,
-    changes_between,
-    evidence,
-    fit,
-    nearly,
-    sigma_of,
-)
+from jointscope.graphs.scoring.regression.evidence import beyond, evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import Fit, JointRows, changes_between, fit, sigma_of
 from jointscope.graphs.starts.drive_regression import DRY, PLACES, VISCOUS
 from jointscope.graphs.starts.windowed_sums import SIGNALS, WIDTHS
 

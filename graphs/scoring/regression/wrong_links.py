@@ -18,14 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.regression.joint_regression import (
-    JointRows,
-    changes_between,
-    design_of,
-    evidence,
-    fit,
-    nearly,
-)
+from jointscope.graphs.scoring.regression.evidence import evidence, nearly
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, changes_between, design_of, fit
 from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -35,6 +29,7 @@ from jointscope.robots.files.effect_editing import cannot_be_added
 Array = NDArray[np.float64]
 Changes = dict[str, float]
 
+TILT = "gravity_direction"  # which two sizes tell, where a mass at another place has four
 LEFT = 0.25  # of the mean square that the plain regression leaves at the joint that tells most, which may be left
 LARGE = 0.005  # of that drive's rms torque, from which what a mass explains matters to anybody ...
 MOVED = 0.01  # ... or this share of a value, by which it must change one
@@ -122,7 +117,9 @@ def wrong_link(rows: JointRows) -> WrongLink | None:
         return None
     at = [EffectAt(effect, owner) for owner in effect.owners_of(robot) if not robot.has_effect(EFFECT, owner)]
     links = [EffectHypothesis(a, effect.parameters_at(robot, a.owner)) for a in at if not cannot_be_added(robot, a)]
-    told = [one for link in links for width in WIDTHS for one in _of(rows, link, width)]
+    # nothing is asked of windows in which no joint lacks more than noise
+    widths = [width for width in WIDTHS if any(rows.open_at(joint, width, LEFT) for joint in range(robot.n))]
+    told = [one for link in links for width in widths for one in _of(rows, link, width, (1, len(link.sizes)))]
     if not told or max(one.evidence for one in told) <= 0.0:
         return None
     clearest = max(told, key=lambda one: one.evidence)
@@ -130,9 +127,23 @@ def wrong_link(rows: JointRows) -> WrongLink | None:
     # of those that are as good the simplest, and a mass is simpler than a mass at another place
     best = max((one for one in told if one.evidence >= least), key=lambda one: (-one.sizes, one.evidence))
     drives = _of_drives(rows, best)
-    if drives > best.evidence:
+    if drives > best.evidence or tilted_base(rows) > (best.evidence if best.sizes == 1 else least):
         return None
     return _sure(rows, best, [one for one in told if one.evidence >= least], drives >= least)
+
+
+def tilted_base(rows: JointRows) -> float:
+    """Evidence for weight in another direction, over all joints; zero where nothing tells of it.
+
+    Args:
+        rows: of the regression.
+    """
+    robot, here = rows.robot, EffectAt(catalogue()[TILT], "robot")
+    if robot.has_effect(TILT, "robot") or cannot_be_added(robot, here):
+        return 0.0
+    tilt = EffectHypothesis(here, here.effect.parameters_at(robot, "robot"))
+    told = [one for width in WIDTHS for one in _of(rows, tilt, width, (len(tilt.sizes),))]
+    return max((one.evidence for one in told), default=0.0)
 
 
 def _of_drives(rows: JointRows, best: _Told) -> float:
@@ -145,8 +156,8 @@ def _of_drives(rows: JointRows, best: _Told) -> float:
     return found
 
 
-def _of(rows: JointRows, link: EffectHypothesis, width: float) -> list[_Told]:
-    """What windows of one width [s] say of a link: of its mass, and of its mass and first moments."""
+def _of(rows: JointRows, link: EffectHypothesis, width: float, counts: tuple[int, ...]) -> list[_Told]:
+    """What windows of one width [s] say of a link, by so many of its sizes: of its mass, and of its first moments."""
     all_columns = {joint: rows.columns(joint, link) for joint in range(rows.robot.n)}
     some = []
     for joint, columns in all_columns.items():
@@ -159,7 +170,7 @@ def _of(rows: JointRows, link: EffectHypothesis, width: float) -> list[_Told]:
     if not some:
         return []
     told = []
-    for sizes in (1, len(link.sizes)):
+    for sizes in counts:
         kept = [one._replace(rows=one.rows[:, : one.rows.shape[1] - one.width + sizes], width=sizes) for one in some]
         found, left = _solved(rows, link, kept)
         worth = [evidence(one.plain, share, one.seconds, 0) for one, share in zip(kept, left, strict=True)]

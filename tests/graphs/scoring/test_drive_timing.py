@@ -12,6 +12,8 @@ from simulated_arm import Arm, assert_right, moved, robot_file
 from slow_pendulum import TRUTH, pendulum, recorded, swing
 
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.scoring.regression.asked_by_regression import Asked
+from jointscope.graphs.scoring.regression.unsteady_gains import SPEED, UnsteadyGain
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
@@ -85,6 +87,10 @@ def test_a_current_of_another_time_than_the_positions_is_not_called_good(tmp_pat
     assert ("before" if late > 0.0 else "after") in check.text
     file = tmp_path / "pendulum"
     assert f"`jointscope add {file}.yaml command_delay@robot -o {file}_command_delay.yaml`" in check.text
+    # what has another reason is not said to be late, unless a delay explains about as much
+    gain = UnsteadyGain("joint", SPEED, 0.05, 0.001, 0.99, {}, 100.0, 5.0)
+    assert same_time(replace(result, asked=Asked(gains=(gain,), late=False))).level == "info"
+    assert same_time(replace(result, asked=Asked(gains=(gain,), late=True))).level == check.level
 
 
 @pytest.mark.parametrize("late", [-2e-3, 12e-3])

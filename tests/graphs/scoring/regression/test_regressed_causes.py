@@ -61,6 +61,10 @@ def more_at_rest(_, u, __, data):
     return u - np.array([0.0, 0.8, 0.0]) * np.exp(-((data.qvel / 0.3) ** 2)) * np.tanh(SHARP * data.qvel)
 
 
+def ripple(_, u, __, data):
+    return u + np.array([0.3, 0.15, 0.06]) * np.sin(11.0 * data.qpos)
+
+
 def growing(share):
     def drive(_, u, __, data):
         return u - share * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
@@ -124,6 +128,12 @@ def test_cables_are_springs_at_all_joints(robot):
     assert [cause.label for cause in causes] == [f"parallel_spring@{joint}" for joint in ARM.joints]
 
 
+def test_torque_that_repeats_with_the_position_is_a_ripple_with_its_order(robot):
+    causes = regressed_causes(joint_rows(robot, [recording(drive=ripple)]))
+    assert [cause.label for cause in causes] == [f"cogging@{joint}" for joint in ARM.joints]
+    assert [cause.shapes["order"] for cause in causes] == pytest.approx([11.0] * 3, abs=1.0)
+
+
 def test_friction_that_grows_with_torque_is_told_with_its_share(robot):
     found = load_frictions(joint_rows(robot, [recording(drive=growing(0.06))]))
     assert found
@@ -154,6 +164,12 @@ def test_what_pushes_from_outside_is_no_load_and_is_told_with_its_torque(robot, 
     assert found.joint == f"j{push[2]}" and found.push == pytest.approx(torque, rel=0.05)
     ends = max(push[0], 0.0), min(push[1], found.end)
     assert (found.start, found.stop) == pytest.approx(ends, abs=0.05)
+
+
+def test_a_push_is_told_with_coarse_encoders(robot):
+    coarse = {"counts": 4096, "encoder_rate": 100.0, "command_rate": 100.0}
+    found = changed_load(joint_rows(robot, [recording(push=(4.0, 4.8, 1, 4.0), **coarse)]), ["here"])
+    assert found.joint == "j1" and found.push == pytest.approx(4.0, rel=0.1)
 
 
 def test_a_target_that_is_seen_late_does_not_hide_what_drives_carry(robot):

@@ -82,6 +82,17 @@ def test_what_a_gain_falls_with_is_told_and_the_constant_without_loss(robots, un
         assert [one.lost for one in found] == pytest.approx([0.06] * 3, abs=0.01)
 
 
+@pytest.mark.parametrize("seed", [2, 4])
+def test_a_gain_that_falls_is_told_with_coarse_encoders(robots, seed):
+    def drive(_, u, __, data):
+        return u * (1.0 - 0.04 * np.abs(data.qvel))
+
+    coarse = {"counts": 4096, "encoder_rate": 100.0, "command_rate": 100.0, "seed": seed}
+    found = most_plausible(rows := rows_of(robots, "N m", drive=drive, **coarse), ["here"], regressed_causes(rows))
+    assert found.causes == () and found.changed is None and found.link is None
+    assert {one.form for one in found.gains} == {SPEED} and not found.late
+
+
 def growing_friction(_, u, __, data):
     return u - 0.06 * np.abs(u - data.qfrc_bias) * np.tanh(SHARP * data.qvel)
 

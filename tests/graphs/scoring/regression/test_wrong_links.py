@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulated_arm import SHARP, Arm, divided, moved, robot_file
@@ -98,6 +100,13 @@ def test_a_tool_that_the_urdf_lacks_is_mass_at_another_place(robots):
     found = asked(robots, drive=tool(0.2, (0.02, 0.01, -0.4)))
     assert found.link is not None and found.link.joint == "j2" and len(found.link.moments) == 3
     assert found.link.explained > 0.9
+
+
+def test_a_base_that_is_not_level_blames_no_link(robots):
+    encoder, command = moved(replace(ARM, gravity=(1.2, 0.5, -9.72)), **HOW)
+    rows = joint_rows(robots["N m"], [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
+    found = most_plausible(rows, ["arm.mcap"], regressed_causes(rows))
+    assert found.link is None and not found.names
 
 
 def weaker(_, u, __, ___):
