@@ -147,7 +147,8 @@ def discover_arm(
 def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Robot]]:
     """All effects that a calibrated arm lacks, best first, and robots that begin with one, by its label.
 
-    Where a response is missing, springs of locked joints are put in and tried, too.
+    Where a response is missing, springs of locked joints are put in and tried, too; the likeliest of them comes first,
+    for nothing is known of the others before that is in the model.
     """
     candidates = arm_candidates(result)
     if result.frequency is None or not badly_explained(result.frequency.explained):
@@ -155,6 +156,9 @@ def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Rob
     screened = screened_springs(result.frequency, candidates)
     known = {c.hypothesis.label: c for c, _ in screened}
     found = [known.get(c.hypothesis.label, c) for c in candidates]
+    if screened:  # the slopes of all others are those at values that have no meaning
+        first = screened[0][0].hypothesis.label
+        found = [replace(c, explained_by="" if c.hypothesis.label == first else first) for c in found]
     return sorted(found, key=lambda c: -c.evidence), {c.hypothesis.label: robot for c, robot in screened}
 
 
