@@ -46,7 +46,7 @@ def run_arm_search(
         ArmDiscovery,
         ArmStep,
         calibrated,
-        candidates_of,
+        diagnosed,
         discover_arm,
     )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
@@ -70,7 +70,7 @@ def run_arm_search(
         progress("calibrating", 0.0)
         result = calibrated(robot, sessions, recordings)
         progress("looking for effects", 0.9)
-        candidates = [c.beside_the_best for c in candidates_of(result)[0]]
+        candidates = diagnosed(result, sessions, recordings, progress)
         found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
         if files.json is not None:
             content = {"adequate": _adequate(candidates), "candidates": [candidate_json(c) for c in candidates]}
