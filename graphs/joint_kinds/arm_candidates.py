@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.linear_responses import STIFFNESSES, ResponseColumns
-from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, with_look_alikes
+from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, Looked, with_look_alikes
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information, prior_pull
@@ -76,7 +76,7 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
     parts: list[LinearKind] = [part for part in (poses, responses) if part is not None]
     linear = LinearKinds(parts, *_ties(result, poses))
     judge = EffectJudge(linear, len(effects))
-    extras, found = [], []
+    looked, found = list[Looked](), []
     for hypothesis in effects:
         extra: dict[str, Array] = {}
         if poses is not None and result.poses is not None and POSES not in hypothesis.kind.unseen:
@@ -84,10 +84,16 @@ def arm_candidates(result: Calibrated) -> list[ArmCandidate]:
         looks = max(len(hypothesis.kind.orders), 1)
         if columns is not None and FREQUENCY not in hypothesis.kind.unseen:
             extra, looks = _with_responses(judge, columns, hypothesis, extra, looks)
-        extras.append(extra)
+        looked.append((hypothesis, extra, looks))
         found.append(judge.candidate(hypothesis, extra, looks))
+    extras = [extra for _, extra, _ in looked]
     alone = {part.kind: _alike(_spaces([part], linear, extras)) for part in parts} if len(parts) > 1 else {}
     found = with_look_alikes(found, alone, _alike(_spaces(parts, linear, extras)))
+    missing = [i for i, c in enumerate(found) if c.verdict == "missing"]
+    best = max(missing, key=lambda i: found[i].evidence, default=0)
+    for i in missing:
+        if i != best and judge.explains(looked[best], looked[i]):
+            found[i] = replace(found[i], explained_by=found[best].hypothesis.label)
     return sorted(found, key=lambda c: -c.evidence)
 
 

@@ -144,10 +144,34 @@ def discover_arm(
         added, result = following
 
 
+def diagnosed(
+    result: Calibrated, sessions: Sequence[Poses], recordings: Sequence[Shaken], report: Report
+) -> list[ArmCandidate]:
+    """All effects that a calibrated arm lacks; where several are missing, as a model with the likeliest one sees them.
+
+    Args:
+        result: the calibrated arm.
+        sessions: the poses that it is calibrated with.
+        recordings: the same, shaken.
+        report: called with a text and the share done.
+    """
+    candidates, begins = candidates_of(result)
+    missing = [c for c in candidates if c.verdict == "missing"]
+    following = None if len(missing) < 2 else _best(result, _leading(candidates), begins, sessions, recordings, report)
+    if following is None:
+        return [c.beside_the_best for c in candidates]
+    first, other = following[0].hypothesis.label, following[1]
+    report(f"looking for effects beside {first}", 0.95)
+    still = {c.hypothesis.label for c in candidates_of(other)[0] if c.verdict == "missing"} | {first}
+    named = [replace(c, explained_by="" if c.hypothesis.label in still else first) for c in candidates]
+    return [c.beside_the_best for c in sorted(named, key=lambda c: c.hypothesis.label != first)]
+
+
 def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Robot]]:
     """All effects that a calibrated arm lacks, best first, and robots that begin with one, by its label.
 
-    Where a response is missing, springs of locked joints are put in and tried, too.
+    Where a response is missing, springs of locked joints are put in and tried, too; the likeliest of them comes first,
+    for nothing is known of the others before that is in the model.
     """
     candidates = arm_candidates(result)
     if result.frequency is None or not badly_explained(result.frequency.explained):
@@ -155,6 +179,9 @@ def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Rob
     screened = screened_springs(result.frequency, candidates)
     known = {c.hypothesis.label: c for c, _ in screened}
     found = [known.get(c.hypothesis.label, c) for c in candidates]
+    if screened:  # the slopes of all others are those at values that have no meaning
+        first = screened[0][0].hypothesis.label
+        found = [replace(c, explained_by="" if c.hypothesis.label == first else first) for c in found]
     return sorted(found, key=lambda c: -c.evidence), {c.hypothesis.label: robot for c, robot in screened}
 
 

@@ -57,6 +57,8 @@ class ArmCandidate:
         look_alikes: labels of effects that would do the same here.
         verdict: missing, possible, absent or untestable.
         alone: by kind, effects that would do the same in this kind alone.
+        explained_by: label of the likeliest missing effect, where with that in the model this one is not missing any
+            more; "" for that one, and for what it leaves.
     """
 
     hypothesis: ArmHypothesis
@@ -69,6 +71,12 @@ class ArmCandidate:
     look_alikes: tuple[str, ...]
     verdict: str
     alone: Mapping[str, tuple[str, ...]]
+    explained_by: str = ""
+
+    @property
+    def beside_the_best(self) -> ArmCandidate:
+        """The same, as a model with the likeliest missing effect sees it: possible where that explains it."""
+        return replace(self, verdict="possible") if self.explained_by and self.verdict == "missing" else self
 
     @property
     def gain(self) -> float:
@@ -84,6 +92,10 @@ class ArmCandidate:
     def shown_by(self) -> tuple[str, ...]:
         """Kinds that show it."""
         return tuple(kind for kind, gain in self.gains.items() if gain.shows)
+
+
+Looked = tuple[ArmHypothesis, Mapping[str, Array], int]
+"""An effect, its whitened columns by kind, and the number of orders or stiffnesses of which it is the best one."""
 
 
 class EffectJudge:
@@ -117,8 +129,7 @@ class EffectJudge:
         sizes, own = step[p:], np.sqrt(np.diag(covariance))[p:]
         possible = not kind.soft or (bool(np.all(sizes > -own)) and bool(np.any(sizes > own)))
         significant = p_value * self._count < CHANCE
-        shown = any(gain.shows for gain in gains.values()) and all(gain.share > -GAIN for gain in gains.values())
-        verdict = "missing" if significant and shown and possible else "absent"
+        verdict = "missing" if significant and _shown(gains) and possible else "absent"
         if verdict == "absent" and p_value < 1e-3 and evidence > 0.0 and possible:
             verdict = "possible"
         if np.all(own > TOUCHED * sigmas):
@@ -127,16 +138,36 @@ class EffectJudge:
             hypothesis, score, p_value, gains, evidence, tuple(sizes.tolist()), tuple(own.tolist()), (), verdict, {}
         )
 
+    def explains(self, best: Looked, other: Looked) -> bool:
+        """Whether an effect is not missing any more where another one is in the model."""
+        linear, (first, extra, _), (hypothesis, more, looks) = self._linear, best, other
+        alone = np.full(len(first.names), first.kind.size)
+        sigmas = np.append(alone, np.full(len(hypothesis.names), hypothesis.kind.size))
+        both = {}
+        for part in linear.parts:
+            if part.kind in extra or part.kind in more:
+                pair = ((extra, len(first.names)), (more, len(hypothesis.names)))
+                both[part.kind] = np.hstack([each.get(part.kind, np.zeros((len(part.r), k))) for each, k in pair])
+        fall = linear.fitted(both, sigmas)[2] - linear.fitted(extra, alone)[2]
+        p_value = min(looks * float(gammaincc(0.5 * len(hypothesis.names), max(fall, 0.0) / 2.0)), 1.0)
+        if p_value * self._count >= CHANCE:
+            return True
+        return not _shown(self._gains(both, sigmas, self._left_out(extra, alone, linear.parts))[0])
+
     def score(self, hypothesis: ArmHypothesis, extra: Mapping[str, Array]) -> float:
         """Fall of chi2 alone."""
         return self._linear.fitted(extra, np.full(len(hypothesis.names), hypothesis.kind.size))[2]
 
-    def _gains(self, extra: Mapping[str, Array], sigmas: Array) -> tuple[dict[str, Gain], float]:
+    def _gains(
+        self, extra: Mapping[str, Array], sigmas: Array, before: Mapping[str, Array] | None = None
+    ) -> tuple[dict[str, Gain], float]:
+        """What columns are worth by kind, and the evidence; beyond a model that is so far off, or the present one."""
         parts = [part for part in self._linear.parts if part.kind in extra]
+        before = self._before if before is None else before
         after = self._left_out(extra, sigmas, parts)
         gains, evidence = {}, 0.0
         for part in parts:
-            was, now = self._before[part.kind], after[part.kind]
+            was, now = before[part.kind], after[part.kind]
             left = float(now.sum()) / max(float(was.sum()), 1e-300)
             gains[part.kind] = Gain(1.0 - left, float(np.mean(now < was)))
             evidence -= part.counted * float(np.log(left))
@@ -152,6 +183,11 @@ class EffectJudge:
                 each.append(part.left_out(*self._linear.of(part, extra, step), fold))
             found[part.kind] = np.array(each)
         return found
+
+
+def _shown(gains: Mapping[str, Gain]) -> bool:
+    """Whether a kind shows an effect and none speaks against it."""
+    return any(gain.shows for gain in gains.values()) and all(gain.share > -GAIN for gain in gains.values())
 
 
 def with_look_alikes(

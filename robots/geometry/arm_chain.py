@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, across, turned
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RobotError
-from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS, LINK_MASS, PAYLOAD, TOOL
+from jointscope.robots.geometry.error_parameters import LINK_MASS, PAYLOAD, TOOL
 from jointscope.robots.urdf.motion_axis import motion_axis
 
 Array = NDArray[np.float64]
-ALONG_X = 0.9  # cosine from which an axis is along x, so that y takes its place as the direction across
 
 
 @dataclass(frozen=True)
@@ -171,19 +171,3 @@ def cross(a: Array, b: Array) -> Array:
 
 def _vector(errors: Mapping[str, float], owner: str) -> Array:
     return np.array([errors.get(f"{owner}.{part}", 0.0) for part in LENGTHS])
-
-
-def across(along: Array) -> tuple[Array, Array, Array]:
-    """The axis of a joint, and the two directions across it, x' and y'."""
-    x = np.eye(3)[1 if abs(along[0]) > ALONG_X else 0]
-    x = x - along * (along @ x)
-    x = x / np.linalg.norm(x)
-    return along, x, np.cross(along, x)
-
-
-def turned(axis: Array, angle: Array) -> Array:
-    """Rotations about one axis, shape (m, 3, 3) or (3, 3)."""
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = angle[..., None, None]
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))

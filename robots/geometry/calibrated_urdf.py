@@ -14,9 +14,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.misplaced_joints import LENGTHS, across, turned
 from jointscope.robots.errors import RobotError
-from jointscope.robots.geometry.arm_chain import across, turned
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, TRACKER
+from jointscope.robots.geometry.error_parameters import TOOL, TRACKER
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.urdf.motion_axis import motion_axis
 from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text

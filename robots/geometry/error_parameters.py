@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, misplacement_names
 from jointscope.robots.parts.parameter import Parameter
 
 TRACKER, TOOL = "tracker", "tool"
-LENGTHS = ("lx", "ly", "lz")
-ANGLES = ("mis_y", "mis_x", "offset")  # in the order in which they turn
 BACKLASH = "backlash"
 WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of an encoder's error, once per turn
 RIPPLE = ("gear_ripple.cos", "gear_ripple.sin", "gear_ripple.order")  # of a gear's error, `order` times per turn
@@ -34,10 +33,7 @@ LOAD_FRICTION = "load_dependent_friction.coefficient"  # of the torque that a dr
 
 def error_names(joints: Sequence[str]) -> tuple[str, ...]:
     """Names of all geometric errors along a chain of joints, from the tracker to the target."""
-    names = [f"{TRACKER}.{part}" for part in LENGTHS]
-    for joint in joints:
-        names += [f"{joint}.{part}" for part in (*LENGTHS, *ANGLES)]
-    return (*names, *(f"{TOOL}.{part}" for part in (*LENGTHS, *ANGLES)))
+    return (*(f"{TRACKER}.{part}" for part in LENGTHS), *misplacement_names([*joints, TOOL]))
 
 
 def is_geometry(name: str) -> bool:

@@ -20,12 +20,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.equations_of_motion import FreeEquations
+from jointscope.robots.bodies.misplaced_joints import across, misplaced, turned
 from jointscope.robots.errors import RobotError
-from jointscope.robots.geometry.arm_chain import across, turned
 from jointscope.robots.geometry.error_parameters import (
     BEARING,
     DAMPING,
-    LENGTHS,
     LINK_INERTIA,
     LINK_MASS,
     PAYLOAD,
@@ -185,7 +184,7 @@ class FlexibleArm:
         for j in range(1, old.njoints):
             name, (parent, T) = old.names[j], host[old.parents[j]]
             along, x, y = across(motion_axis(old.joints[j])[3:])
-            placed = T * _with_errors(old.jointPlacements[j], name, values, (along, x, y))
+            placed = T * misplaced(old.jointPlacements[j], name, values, (along, x, y))
             turn = turned(along, np.array(q[self._tree.joints.index(name)] if name in self._tree.joints else 0.0))
             locked = pin.SE3(turn, np.zeros(3))
             if name in self._turning:
@@ -203,18 +202,6 @@ class FlexibleArm:
             point = pin.Inertia(values[PAYLOAD], np.array(frame.placement.act(self._target[1])), np.zeros((3, 3)))
             new.appendBodyToJoint(parent, point, placed)
         return new
-
-
-def _with_errors(
-    placement: pin.SE3, name: str, values: Mapping[str, float], axes: tuple[Array, Array, Array]
-) -> pin.SE3:
-    """Where a joint is with its geometric errors, as in `ArmChain`."""
-    along, x, y = axes
-    R = np.array(placement.rotation)
-    for part, axis in (("mis_y", y), ("mis_x", x), ("offset", along)):
-        R = R @ turned(axis, np.array(values.get(f"{name}.{part}", 0.0)))
-    shift = np.array([values.get(f"{name}.{part}", 0.0) for part in LENGTHS])
-    return pin.SE3(R, np.array(placement.translation) + shift)
 
 
 def _hinge(axis: Array) -> pin.JointModelRevoluteUnaligned:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The rigid bodies as the model has them now: soft bearings inserted, inertias and Coriolis terms as parameters.
+"""The rigid bodies as the model has them now: soft bearings inserted, inertias, geometry, Coriolis terms as parameters.
 
 Accelerations are M^-1 (tau - s c - g) with the scale s of the Coriolis terms; they are linear in s, and M is linear in
 every inertia parameter, so the derivatives by s follow from differences that are exact, and those by an inertia from
-the torque of a body that has nothing else.
+the torque of a body that has nothing else. Derivatives by errors of the geometry are differences of torques.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.misplaced_joints import misplace, misplacement_names
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.turned_gravity import turned_gravity
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 from jointscope.robots.effect_kinds.structure import Structure
-from jointscope.robots.model.turned_axes import TurnedAxis, across_axes, turn_torques
+from jointscope.robots.model.turned_axes import TurnedAxis, across_axes
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
+DISPLACED = 1e-4  # [m], [rad] to both sides, over which torques are compared
 ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # of an inertia in pinocchio's dynamic parameters
 
 
@@ -73,19 +75,18 @@ class StructuredTree:
         self.coriolis_scale = next((e.parameter("scale") for e in robot.effects if _form(e.effect) == "coriolis"), None)
         tilted = [e for e in robot.effects if _form(e.effect) == "gravity"]
         self._tilt = tuple(e.parameter(p.name) for e in tilted for p in e.effect.parameters)
-        self._turned = [
-            TurnedAxis(
-                tuple(e.parameter(p.name) for p in e.effect.parameters), self.kinematics.model.getJointId(e.owner)
-            )
-            for e in robot.effects
-            if _form(e.effect) == "axis"
-        ]
+        turned = [e for e in robot.effects if _form(e.effect) == "axis"]
+        self._turned = [TurnedAxis.of(e, self.kinematics.model) for e in turned]
+        self._misplaced = [name for name in misplacement_names(robot.joints) if name in robot.parameters]
+        of_bodies = [each.name for each in self._changes] + [name for name, *_ in self._armature]
+        self._geometry = [*(name for axis in self._turned for name in axis.names), *self._misplaced]
+        self._own = (*of_bodies, *self._tilt, *self._geometry)
         self._cache: tuple[tuple[float, ...], RigidTree] | None = None
 
     @property
     def varies(self) -> bool:
         """Whether any parameter changes the tree."""
-        return bool(self._changes or self._armature or self.coriolis_scale or self._tilt or self._turned)
+        return bool(self._own or self.coriolis_scale)
 
     def acceleration(self, q: Array, v: Array, tau: Array, values: Mapping[str, float]) -> Array:
         """Accelerations, shape (m, n_link) [rad/s^2]; arguments as those of `RigidTree.acceleration`."""
@@ -124,7 +125,7 @@ class StructuredTree:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             for name, torque in zip(self._tilt, torques, strict=True):
                 found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
-        for name, torque in self._turns(tree, (q, v, a), values, scale):
+        for name, torque in self._torques_of_geometry(tree, (q, v, a), scale, values):
             found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         if self.coriolis_scale is not None:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
@@ -138,14 +139,19 @@ class StructuredTree:
         if self._tilt:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             found |= dict(zip(self._tilt, torques, strict=True))
-        return found | dict(self._turns(tree, (q, still, still), values, 0.0))
+        return found | dict(self._torques_of_geometry(tree, (q, still, still), 0.0, values))
 
-    def _turns(
-        self, tree: RigidTree, motion: tuple[Array, Array, Array], values: Mapping[str, float], coriolis: float
+    def _torques_of_geometry(
+        self, tree: RigidTree, motion: tuple[Array, Array, Array], coriolis: float, values: Mapping[str, float]
     ) -> Iterator[tuple[str, Array]]:
-        """Names and torques of all turned axes."""
-        for axis in self._turned:
-            yield from zip(axis.names, turn_torques(self.kinematics, tree, axis, values, motion, coriolis), strict=True)
+        """Torque that a unit of each error of the geometry asks for, shape (m, n_link) each."""
+        q, v, a = motion
+        shares = {1.0: coriolis, 0.0: 1.0 - coriolis} if tree.coriolis else {0.0: 1.0}  # by speed
+        used = [(speed * v, share) for speed, share in shares.items() if share]
+        for name in self._geometry:
+            ends = [self._with_values({**values, name: values[name] + step}) for step in (DISPLACED, -DISPLACED)]
+            ahead, behind = (sum(share * end.torque(q, w, a) for w, share in used) for end in ends)
+            yield name, np.asarray(ahead - behind) / (2.0 * DISPLACED)
 
     @staticmethod
     def _torques_of(
@@ -156,27 +162,29 @@ class StructuredTree:
 
     def bodies(self, values: Mapping[str, float]) -> RigidTree:
         """The bodies at these values."""
-        if not (self._changes or self._armature or self._tilt or self._turned):
+        if not self._own:
             return self.kinematics
-        names = [*(c.name for c in self._changes), *(name for name, *_ in self._armature), *self._tilt]
-        names += [name for axis in self._turned for name in axis.names]
-        key = tuple(values[name] for name in names)
+        key = tuple(values[name] for name in self._own)
         known = self._cache  # another thread may put other bodies there
         if known is None or known[0] != key:
-            model = self.kinematics.model.copy()
-            for change in self._changes:
-                _change(model, change, values[change.name] - change.offset)
-            armature = np.array(model.armature)
-            for name, _, coordinate in self._armature:
-                armature[coordinate] = values[name]
-            model.armature = armature
-            if self._tilt:
-                tilt = np.array([values[name] for name in self._tilt])
-                model.gravity = pin.Motion(turned_gravity(self.kinematics.gravity, tilt)[0], np.zeros(3))
-            for axis in self._turned:
-                axis.turned(model, np.array([values[name] for name in axis.names]))
-            known = self._cache = (key, self.kinematics.with_model(model))
+            known = self._cache = (key, self._with_values(values))
         return known[1]
+
+    def _with_values(self, values: Mapping[str, float]) -> RigidTree:
+        model = self.kinematics.model.copy()
+        misplace(model, {name: values[name] for name in self._misplaced})
+        for change in self._changes:
+            _change(model, change, values[change.name] - change.offset)
+        armature = np.array(model.armature)
+        for name, _, coordinate in self._armature:
+            armature[coordinate] = values[name]
+        model.armature = armature
+        if self._tilt:
+            tilt = np.array([values[name] for name in self._tilt])
+            model.gravity = pin.Motion(turned_gravity(self.kinematics.gravity, tilt)[0], np.zeros(3))
+        for axis in self._turned:
+            axis.turned(model, np.array([values[name] for name in axis.names]))
+        return self.kinematics.with_model(model)
 
 
 def inertia_torques(

@@ -8,7 +8,6 @@ with the placement P_j of the joint in the link before it. What the joint moves 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +15,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
+from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.urdf.motion_axis import motion_axis
 
 Array = NDArray[np.float64]
-
 STEP = 1e-4  # [rad] of central differences: both rounding and bend are below 1e-8 of the torque
 
 
@@ -35,6 +34,11 @@ class TurnedAxis:
     names: tuple[str, ...]
     joint: int
 
+    @staticmethod
+    def of(here: EffectAt, model: pin.Model) -> TurnedAxis:
+        """The axis of an effect's owner."""
+        return TurnedAxis(tuple(here.parameter(p.name) for p in here.effect.parameters), model.getJointId(here.owner))
+
     def turned(self, model: pin.Model, angles: Array) -> None:
         """Turns the axis of a model further by two angles, shape (2,) [rad]."""
         turn = np.zeros(3)
@@ -42,41 +46,21 @@ class TurnedAxis:
         model.jointPlacements[self.joint] = model.jointPlacements[self.joint] * pin.SE3(pin.exp3(turn), np.zeros(3))
 
 
-def turn_torques(
-    kinematics: RigidTree,
-    bodies: RigidTree,
-    axis: TurnedAxis,
-    values: Mapping[str, float],
-    motion: tuple[Array, Array, Array],
-    coriolis: float,
-) -> list[Array]:
-    """Torque that a unit of each angle asks for, shape (m, n_link) each [N m/rad].
+def turn_torques(tree: RigidTree, axis: TurnedAxis, motion: tuple[Array, Array, Array]) -> list[Array]:
+    """Torque that a unit of each angle asks for, from where the axis stands, shape (m, n_link) each [N m/rad].
 
     Args:
-        kinematics: with the axes of the URDF.
-        bodies: with all that parameters change now.
+        tree: the bodies.
         axis: which is turned.
-        values: present values of its angles, by name [rad].
         motion: positions, velocities and accelerations, shape (m, n_link) each.
-        coriolis: share of the Coriolis terms, where the tree has them.
     """
-    angles = np.array([values[name] for name in axis.names])
-    q, v, a = motion
-    share = coriolis if bodies.coriolis else 1.0
 
     def torque(turn: Array) -> Array:
-        model = bodies.model.copy()
-        model.jointPlacements[axis.joint] = kinematics.model.jointPlacements[axis.joint]
+        model = tree.model.copy()
         axis.turned(model, turn)
-        tree = bodies.with_model(model)
-        moving = tree.torque(q, v, a)
-        if share == 1.0:
-            return moving
-        still = tree.torque(q, np.zeros_like(v), a)
-        return np.asarray(still + share * (moving - still))
+        return tree.with_model(model).torque(*motion)
 
-    steps = STEP * np.eye(2)
-    return [(torque(angles + step) - torque(angles - step)) / (2.0 * STEP) for step in steps]
+    return [(torque(step) - torque(-step)) / (2.0 * STEP) for step in STEP * np.eye(2)]
 
 
 def across_axes(model: pin.Model, joint: int) -> tuple[int, int]:

@@ -171,6 +171,14 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--workers": args.workers > 1,
     }
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
+    sample_by_sample = next((option for option in ("--incremental", "--solver samples") if of_motion[option]), None)
+    others = {"--poses": args.poses, "--rests": args.rests, "--frequency": args.frequency}
+    beside = next((option for option, paths in others.items() if paths), None)
+    if sample_by_sample and beside:
+        raise RecordingError(
+            f"{sample_by_sample} goes along motion alone, and {beside} has none; leave {sample_by_sample} out, and the "
+            "batch takes all kinds in one graph"
+        )
     if args.urdf is not None and not args.poses:
         raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
 

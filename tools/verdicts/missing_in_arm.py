@@ -15,7 +15,8 @@ def missing_in_arm(result: Calibrated) -> tuple[ArmCandidate, ...]:
     frequency = result.frequency
     if frequency is None or (frequency.settled and not badly_explained(frequency.explained)):
         return ()
-    return tuple(c for c in candidates_of(result)[0] if c.verdict == "missing")
+    found = [c.beside_the_best for c in candidates_of(result)[0]]
+    return tuple(c for c in found if c.verdict == "missing")
 
 
 def missing_sentence(missing: tuple[ArmCandidate, ...]) -> str:

@@ -51,7 +51,7 @@ def axis_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
     names = tuple(size.name for size in hypothesis.sizes)
     axis = TurnedAxis(names, tree.model.getJointId(hypothesis.here.owner))
     motion = (s.x[:, layout.q_link], s.x[:, layout.v_link], s.a_link)
-    return _against(turn_torques(tree, tree, axis, dict.fromkeys(names, 0.0), motion, 1.0), s)
+    return _against(turn_torques(tree, axis, motion), s)
 
 
 def _against(torques: Iterable[Array], s: ScoreSignals) -> list[Column]:

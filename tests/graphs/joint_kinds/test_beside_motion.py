@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shaken_arm import made_up
-from three_axes import record, three_axes
+from three_axes import geometry_in_doubt, record, three_axes
 from weighed_springs import WeighedSprings
 
 import jointscope as js
@@ -93,6 +93,20 @@ def test_a_drive_that_is_softer_in_the_motion_is_a_contradiction(tmp_path):
     assert responses_agree(both).doubtful
     (check,) = [c for c in judge(both).checks if c.name == "Kinds that tell the same values"]
     assert check.level == "bad" and "contradict each other" in check.text
+
+
+@pytest.mark.slow
+def test_an_arm_whose_geometry_is_off_is_no_contradiction_where_its_file_says_that_it_may_be(tmp_path):
+    truth = record(tmp_path, perfect=False)
+    bags = [tmp_path / "both" / f"frequency_{k}.mcap" for k in (1, 2)]
+    both = js.calibrate(geometry_in_doubt(tmp_path), tmp_path / "moves.mcap", frequency=bags)
+    assert responses_agree(both).p_value > 0.01
+    for name in DRIVES:
+        assert abs(both[name].value - truth[name]) < 3.0 * both[name].sigma, name
+        assert abs(both[name].value / truth[name] - 1.0) < 3e-4, name
+    both.save(tmp_path / "found.yaml", report=tmp_path / "found.html")
+    page = (tmp_path / "found.html").read_text(encoding="utf-8")
+    assert page.count("Response in") >= 2 and "Motion and frequency responses agree" in page
 
 
 @pytest.fixture(scope="module")

@@ -1,19 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slopes of accelerations by parameters of the bodies, with any share of the Coriolis terms."""
+"""Slopes of accelerations by parameters of the bodies, with any share of the Coriolis terms; geometry with errors."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from robots_to_compare import READY, _rigid, _with, _without_coriolis, mimicking, states, without_gyros
 
+from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.geometry.calibrated_urdf import move_joints
+from jointscope.robots.geometry.error_parameters import error_parameters
+from jointscope.robots.model.structured_tree import StructuredTree
+from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 
 COUNT = 6
 BLIND = without_gyros(mimicking(READY, READY.joints))
 EFFECTS = ("inertia_error", "payload", "link_mass", "bearing_flexibility", "coriolis", "gravity_direction")
 EFFECTS += ("axis_misalignment",)
+
+
+def misplaced(robot):
+    """With errors of its geometry, of millimetres and milliradians."""
+    errors, rng = error_parameters(robot.joints, 1e-3, 3e-3), np.random.default_rng(4)
+    values = {name: 3e-3 * rng.standard_normal() for name in errors}
+    return replace(robot, parameters={**robot.parameters, **errors}).with_values(values)
 
 
 def changed_bodies(robot):
@@ -22,7 +38,7 @@ def changed_bodies(robot):
     for name in EFFECTS:
         if catalogue()[name].owners_of(robot):
             robot = _with(catalogue()[name], robot)
-    return robot
+    return misplaced(robot)
 
 
 @pytest.mark.parametrize("scale", [-0.2, 0.0, 0.37, 1.0, 1.3])
@@ -35,7 +51,7 @@ def test_slopes_by_parameters_of_the_bodies_are_those_of_differences(base, scale
     x[:, robot.layout.v_link] += 1.0
     u, values = np.zeros((COUNT, robot.n)), np.array([robot.parameters[name].value for name in joints.names])
     slopes = joints.with_derivatives(x, u, values).by_parameter
-    of_bodies = (*EFFECTS, "inertia")
+    of_bodies = (*EFFECTS, "inertia", *LENGTHS, *ANGLES)
     for k, name in enumerate(joints.names):
         if any(part in name.split(".") for part in of_bodies):
             step = 1e-5 * max(abs(values[k]), 0.3) * np.eye(len(values))[k]
@@ -48,3 +64,18 @@ def test_slopes_by_parameters_of_the_bodies_are_those_of_differences(base, scale
             expected = (4.0 * difference(0.5 * step) - difference(step)) / 3.0
             size = max(np.abs(expected).max(), 1.0)
             np.testing.assert_allclose(slopes[:, :, k], expected, rtol=1e-5, atol=1e-6 * size, err_msg=name)
+
+
+def test_errors_of_the_geometry_are_those_of_a_urdf_that_has_them(tmp_path):
+    robot = misplaced(READY)
+    root = read_urdf(robot.tree.urdf)
+    nowhere = SimpleNamespace(link=None, tracker_link=None)  # no target
+    move_joints(root, SimpleNamespace(poses=nowhere, parameters=robot.parameters, tree=robot.tree))
+    (tmp_path / "moved.urdf").write_text(urdf_text(root), encoding="utf-8")
+    gravity = np.array([0.0, 0.0, -9.81])
+    moved = RigidTree(tmp_path / "moved.urdf", robot.joints, gravity)
+    robot = replace(robot, tree=RigidTree(robot.tree.urdf, robot.joints, gravity))
+    q, v, a = np.random.default_rng(5).standard_normal((3, COUNT, robot.n))
+    bodies = StructuredTree(robot).bodies({name: p.value for name, p in robot.parameters.items()})
+    np.testing.assert_allclose(bodies.torque(q, v, a), moved.torque(q, v, a), rtol=1e-9, atol=1e-9)
+    assert np.abs(bodies.torque(q, v, a) - robot.tree.torque(q, v, a)).max() > 1e-3

@@ -39,6 +39,8 @@ def test_other_kinds_and_options_of_motion_are_refused(bag, tmp_path, capsys):
     both = ["tx90l", OPTION, bag, "--poses", bag, *out]
     assert "--rests and --poses go into one estimate where motion is there" in refused([*both, "--rests", bag], capsys)
     assert "leave it out with --poses" in refused([*both, "--incremental"], capsys)
+    moving = refused(["tx90l", tmp_path / "moves.mcap", OPTION, bag, "--incremental", *out], capsys)
+    assert "goes along motion alone, and --frequency has none; leave --incremental out" in moving
     assert "--rrd shows motion" in refused([*both, "--rrd", tmp_path / "o.rrd"], capsys)
     assert "leave it out with --frequency" in refused(["tx90l", OPTION, bag, "--incremental", *out], capsys)
     assert "use --report" in refused(["tx90l", OPTION, bag, "--rrd", tmp_path / "o.rrd", *out], capsys)

@@ -45,6 +45,18 @@ def ranking_text(candidates: Sequence[ArmCandidate], said: str, kinds: Sequence[
     return f"{told}\n{text_table(head, rows, sides)}"
 
 
+def explained_sentences(candidates: Sequence[ArmCandidate]) -> list[str]:
+    """Effects that would be missing if the likeliest one were not; none where there is nothing of that sort."""
+    explained = [c for c in candidates if c.verdict == "possible" and c.explained_by]
+    if not explained:
+        return []
+    labels = ", ".join(c.hypothesis.label for c in explained[:SHOWN])
+    return [
+        f"{explained[0].explained_by} explains what these would: {labels}. `jointscope discover` with the same "
+        "recordings adds it and asks again."
+    ]
+
+
 def told_apart(candidate: ArmCandidate) -> list[str]:
     """What each kind alone would have said of an effect, where all kinds together know more."""
     found = []

@@ -46,12 +46,13 @@ def run_arm_search(
         ArmDiscovery,
         ArmStep,
         calibrated,
-        candidates_of,
+        diagnosed,
         discover_arm,
     )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
+        explained_sentences,
         ranking_text,
         recordings_said,
         told_apart,
@@ -69,13 +70,13 @@ def run_arm_search(
         progress("calibrating", 0.0)
         result = calibrated(robot, sessions, recordings)
         progress("looking for effects", 0.9)
-        candidates, _ = candidates_of(result)
+        candidates = diagnosed(result, sessions, recordings, progress)
         found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
         if files.json is not None:
             content = {"adequate": _adequate(candidates), "candidates": [candidate_json(c) for c in candidates]}
             write_json(files.json, content)
         leading = [c for c in candidates if c.verdict == "missing"][:3]
-        said = [line for c in leading for line in told_apart(c)]
+        said = explained_sentences(candidates) + [line for c in leading for line in told_apart(c)]
         said += unseen_sentences(candidates, found.kinds if len(found.kinds) > 1 else ())
         return "\n\n".join([ranking_text(candidates, recordings_said(found), found.kinds), *said])
     found = discover_arm(robot, sessions, held, progress, recordings, held_shaken)
@@ -101,6 +102,7 @@ def candidate_json(c: Any) -> dict[str, Any]:
         "shown_by": list(c.shown_by),
         "untestable_by": dict(kind.unseen),
         "look_alikes": list(c.look_alikes),
+        "explained_by": c.explained_by or None,
         "look_alikes_by_kind": {name: list(labels) for name, labels in c.alone.items()},
         "verdict": c.verdict,
     }
