@@ -25,8 +25,9 @@ from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.robots.bodies.misplaced_joints import LENGTHS
 from jointscope.robots.errors import SolveError
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_names
+from jointscope.robots.geometry.error_parameters import TOOL, error_names
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas

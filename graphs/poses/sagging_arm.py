@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.poses.what_gives_way import WhatGivesWay
+from jointscope.robots.bodies.misplaced_joints import LENGTHS
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.pose_section import no_poses
 from jointscope.robots.geometry.arm_chain import ArmChain, ChainPoint
 from jointscope.robots.geometry.arm_effects import DRIFT
-from jointscope.robots.geometry.error_parameters import LENGTHS, TRACKER
+from jointscope.robots.geometry.error_parameters import TRACKER
 from jointscope.robots.geometry.gravity_slopes import gravity_slopes
 from jointscope.robots.model.robot import Robot
 

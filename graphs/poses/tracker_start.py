@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL
+from jointscope.robots.bodies.misplaced_joints import LENGTHS
+from jointscope.robots.geometry.error_parameters import TOOL
 from jointscope.robots.geometry.tracker_fit import tracker_and_shift
 
 Array = NDArray[np.float64]

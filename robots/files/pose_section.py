@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from jointscope.robots.bodies.misplaced_joints import LENGTHS
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_chain import ArmChain
-from jointscope.robots.geometry.error_parameters import LENGTHS, TOOL, error_parameters
+from jointscope.robots.geometry.error_parameters import TOOL, error_parameters
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.sensors import Topic

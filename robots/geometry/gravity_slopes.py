@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.geometry.arm_chain import ChainPoint, cross
-from jointscope.robots.geometry.error_parameters import ANGLES, LENGTHS, LINK_MASS, PAYLOAD, TOOL
+from jointscope.robots.geometry.error_parameters import LINK_MASS, PAYLOAD, TOOL
 
 Array = NDArray[np.float64]
 YIELDING = (2, 4, 3)  # the joint, x', y' among the turns at a joint: what gives way under its torque
