@@ -163,7 +163,8 @@ def diagnosed(
     first, other = following[0].hypothesis.label, following[1]
     report(f"looking for effects beside {first}", 0.95)
     still = {c.hypothesis.label for c in candidates_of(other)[0] if c.verdict == "missing"} | {first}
-    named = [replace(c, explained_by="" if c.hypothesis.label in still else first) for c in candidates]
+    gone = {c.hypothesis.label for c in missing} - still
+    named = [replace(c, explained_by=first if c.hypothesis.label in gone else "") for c in candidates]
     return [c.beside_the_best for c in sorted(named, key=lambda c: c.hypothesis.label != first)]
 
 
