@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.scoring.regression.turned_link import turn_instead
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
@@ -73,6 +74,9 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     """A link that weighs something else by regression: by how much, what that changes, and what to do."""
     robot, urdf = result.robot, result.robot.tree.urdf.name
     body = robot.tree.model.inertias[robot.tree.model.getJointId(link.joint)].mass
+    turn = turn_instead(robot.tree.model, link)
+    if turn is not None:
+        return _other_zero(result, link, turn)
     alike = f" (or one that {' or '.join(link.alike)} moves, which looks alike here)" if link.alike else ""
     by = f"{link.mass:+.3g} ± {significant(link.sigma, 1)} kg"
     which = f"the link that {link.joint} moves{alike}"
@@ -93,6 +97,19 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
         f"at {link.seen_at}, {significant(100.0 * link.size, 2)} % of its drive's torque{then}{drives}. Correct the "
         f"URDF, then {_again(result)}; or let it be found: `jointscope add {robot_argument(result.start)} "
         f"link_mass@{link.joint} -o {output}`, then calibrate again."
+    )
+
+
+def _other_zero(result: CalibrationResult, link: WrongLink, turn: float) -> str:
+    """The centre of mass of the last link seems to be turned about its axis: the zero of its encoder, most likely."""
+    effect, joint = "encoder_offset", link.joint
+    output = edited_argument(result.start, effect)
+    return (
+        f"By regression of all joints the encoder of {joint} reads {significant(turn, 2)} rad too much against the URDF "
+        f"(or the centre of mass behind {joint} is turned about its axis, which looks the same): that is the shape of "
+        f"{100.0 * link.explained:.0f} % of what is missing at {link.seen_at}, {significant(100.0 * link.size, 2)} % "
+        f"of its drive's torque. Add it: `jointscope add {robot_argument(result.start)} {effect}@{joint} -o {output}`, "
+        f"then calibrate again; or correct the URDF, then {_again(result)}."
     )
 
 

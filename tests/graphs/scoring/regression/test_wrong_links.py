@@ -12,6 +12,7 @@ from simulated_arm import SHARP, Arm, divided, moved, robot_file
 from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
 from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
+from jointscope.graphs.scoring.regression.turned_link import turn_instead
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -149,3 +150,22 @@ def by_direction(_, u, __, data):
 )
 def test_links_that_weigh_what_they_should_are_not_blamed(robots, how):
     assert asked(robots, **how).link is None
+
+
+@pytest.mark.parametrize("offset", [0.04, -0.07])
+def test_a_link_that_seems_turned_about_its_axis_has_an_encoder_with_another_zero(robots, offset):
+    robot = robots["N m"]
+    encoder, command = moved(ARM, **HOW)
+    encoder = replace(encoder, values=encoder.values + np.array([0.0, 0.0, offset]))
+    rows = joint_rows(robot, [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
+    link = most_plausible(rows, ["arm.mcap"], regressed_causes(rows)).link
+    assert link.joint == ARM.joints[-1]
+    assert turn_instead(robot.tree.model, link) == pytest.approx(offset, rel=0.05)
+
+
+def test_a_tool_at_the_tip_and_a_link_with_others_behind_it_are_not_turned(robots):
+    robot = robots["N m"]
+    link = asked(robots, drive=tool(0.5, (0.3, 0.0, 0.1))).link
+    assert link.moments
+    assert turn_instead(robot.tree.model, link) is None
+    assert turn_instead(robot.tree.model, replace(link, joint=ARM.joints[0])) is None
