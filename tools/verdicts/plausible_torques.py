@@ -105,7 +105,7 @@ def _other_zero(result: CalibrationResult, link: WrongLink, turn: float) -> str:
     effect, joint = "encoder_offset", link.joint
     output = edited_argument(result.start, effect)
     return (
-        f"By regression of all joints the encoder of {joint} reads {significant(turn, 2)} rad too much against the URDF "
+        f"By regression of all joints the encoder of {joint} reads {significant(turn, 2)} rad too much for the URDF "
         f"(or the centre of mass behind {joint} is turned about its axis, which looks the same): that is the shape of "
         f"{100.0 * link.explained:.0f} % of what is missing at {link.seen_at}, {significant(100.0 * link.size, 2)} % "
         f"of its drive's torque. Add it: `jointscope add {robot_argument(result.start)} {effect}@{joint} -o {output}`, "
