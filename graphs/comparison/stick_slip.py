@@ -3,7 +3,8 @@
 
 Rounded off, friction that stops a motor many times over in one step wants dozens of substeps, and lets a motor that
 stands creep. As a sign it is constant while a motor slips, so that few steps of Runge-Kutta follow the motion; a motor
-that stops stays where it is until more than its friction pulls at it.
+that stops stays where it is until more than its friction pulls at it. A step in which a motor turns round is cut there:
+behind a jump of its command a light motor gains most of its speed within one step.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from jointscope.robots.model.robot import Robot
 Array = NDArray[np.float64]
 
 SIGN, NOTHING = 1e9, 1e-9  # [s/rad] sharpness of friction that is a sign, and of friction that is not there
+SECANTS = 2  # by which the moment is found where a motor comes to rest: damped motors do not slow down evenly
 CREEP = 1e-6  # [rad/s] a velocity that says no more than its direction
 
 
@@ -37,6 +39,7 @@ class StickSlip:
         cuts = StepCuts(slippery, h)
         self._count = max(cuts.fine - 1, cuts.coarse)  # the last one would be for a change of sign
         self._q, self._v = robot.layout.q_motor, robot.layout.v_motor
+        self._columns = np.arange(robot.layout.size)[self._v]
 
     def advance(self, x: Array, torque: Array, h: Array) -> Array:
         """States after steps of length h.
@@ -46,12 +49,34 @@ class StickSlip:
             torque: of the motors, shape (s, n) [N m].
             h: shape (s, 1) [s].
         """
-        h = h / self._count
+        h = np.broadcast_to(h / self._count, (len(x), 1))
         for _ in range(self._count):
-            x = self._one(x, torque, h)
+            x = self._one(x, torque, h, len(self._columns))
         return x
 
-    def _one(self, x: Array, torque: Array, h: Array) -> Array:
+    def _one(self, x: Array, torque: Array, h: Array, turns: int) -> Array:
+        """States after one step, which is cut where a motor turns round, so many times at the most."""
+        after, direction = self._slipped(x, torque, h)
+        before, v = x[:, self._v], after[:, self._v].copy()
+        turned = (np.abs(before) > CREEP) & (v * direction < 0.0)
+        after[:, self._v] = np.where(v * direction > 0.0, v, 0.0)
+        cut = np.flatnonzero(np.any(turned, axis=1)) if turns else np.zeros(0, np.intp)
+        if len(cut):
+            share = np.where(turned[cut], before[cut] / np.where(turned[cut], before[cut] - v[cut], 1.0), 1.0)
+            first = np.argmin(share, axis=1)
+            until = np.take_along_axis(share, first[:, None], axis=1)
+            rows, stops = np.arange(len(cut)), self._columns[first]
+            at_rest, _ = self._slipped(x[cut], torque[cut], until * h[cut])
+            for _ in range(SECANTS):
+                began, left = x[cut, stops], at_rest[rows, stops]
+                until = np.minimum(until * (began / (began - left))[:, None], 1.0)
+                at_rest, _ = self._slipped(x[cut], torque[cut], until * h[cut])
+            at_rest[rows, stops] = 0.0
+            after[cut] = self._one(at_rest, torque[cut], (1.0 - until) * h[cut], turns - 1)
+        return after
+
+    def _slipped(self, x: Array, torque: Array, h: Array) -> tuple[Array, Array]:
+        """States after a step, and where motors go in it, as `_at_beginning`; friction acts as if none turned round."""
         pull = self._smooth.of_motors(x, torque)
         direction, friction = self._at_beginning(x, pull)
         sticks = direction == 0.0
@@ -63,10 +88,7 @@ class StickSlip:
             rate[:, self._q] = np.where(sticks, 0.0, rate[:, self._q])
             return rate
 
-        after = runge_kutta(rates, x, h)
-        v = after[:, self._v]
-        after[:, self._v] = np.where(v * direction > 0.0, v, 0.0)
-        return after
+        return runge_kutta(rates, x, h), direction
 
     def _at_beginning(self, x: Array, pull: Array) -> tuple[Array, Array]:
         """Where each motor goes, 1 or -1, or 0 where friction holds it, and the acceleration by friction, shape (s, n).

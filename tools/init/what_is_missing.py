@@ -47,7 +47,7 @@ def what_is_missing(robot: Robot, recording: Recording, poor: Sequence[str]) -> 
             f"{changed.joint}; `jointscope calibrate` says how to leave that out"
         )
     if (link := found.link) is not None:
-        if (turn := turn_instead(robot.tree.model, link)) is not None:
+        if (turn := turn_instead(robot.tree, link)) is not None:
             label, output = f"encoder_offset@{link.joint}", edited_argument(robot, "encoder_offset")
             return (
                 f"the encoder of {link.joint} seems to read {turn:.2g} rad too much: jointscope add "

@@ -74,7 +74,7 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     """A link that weighs something else by regression: by how much, what that changes, and what to do."""
     robot, urdf = result.robot, result.robot.tree.urdf.name
     body = robot.tree.model.inertias[robot.tree.model.getJointId(link.joint)].mass
-    turn = turn_instead(robot.tree.model, link)
+    turn = turn_instead(robot.tree, link)
     if turn is not None:
         return _other_zero(result, link, turn)
     alike = f" (or one that {' or '.join(link.alike)} moves, which looks alike here)" if link.alike else ""

@@ -11,21 +11,22 @@ with the joint's axis a; a mass that is placed otherwise does so only by chance.
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink
+from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.model.turned_axes import joint_axis
 
 ASTRAY = 0.2  # of the change, largest part that no turn about the axis makes
 
 
-def turn_instead(model: pin.Model, link: WrongLink) -> float | None:
+def turn_instead(tree: RigidTree, link: WrongLink) -> float | None:
     """How much too far an encoder reads [rad] if first moments do that; None where no turn of the last link does.
 
     Args:
-        model: bodies of the URDF.
+        tree: bodies of the URDF.
         link: as the regression has it.
     """
+    model = tree.model
     joint = model.getJointId(link.joint)
     if not link.moments or joint in list(model.parents)[1:]:  # links behind would be turned along
         return None

@@ -72,3 +72,27 @@ def test_a_slipping_motor_goes_as_a_simulation_by_plain_small_steps(robot):
         q += dt * v
     found = x[0, robot.layout.q_motor][0], x[0, robot.layout.v_motor][0]
     np.testing.assert_allclose(found, (q, v), rtol=2e-3)
+
+
+@pytest.mark.parametrize("back", [-0.02, -0.4, -1.5])
+def test_a_motor_that_is_turned_round_within_a_step_goes_as_by_plain_small_steps(robot, back):
+    """Behind a jump of its command; the others keep their way, and so does the next state of many."""
+    torque = np.zeros((2, robot.n))
+    torque[0, 0] = 3.0
+    x = np.vstack([hanging(robot, 0.3), hanging(robot, 0.3)])
+    x[0, robot.layout.v_motor] = [back, 0.3, 0.3, 0.3]
+    b, k_mi, mu, K, D = (
+        robot.drive_parameter("joint1", name).value
+        for name in ("inertia", "k_mi", "coulomb_torque", "stiffness", "damping")
+    )
+    q, v, dt = 0.0, back, 1e-7
+    for _ in range(round(H / dt)):
+        v += dt / b * (torque[0, 0] - k_mi * v - mu * np.sign(v) - K * q - D * v)
+        q += dt * v
+    after = StickSlip(robot, H).advance(x, torque, np.full((2, 1), H))
+    assert v > 3.0
+    found = after[0, robot.layout.q_motor][0], after[0, robot.layout.v_motor][0]
+    np.testing.assert_allclose(found, (q, v), rtol=5e-3)
+    alone = StickSlip(robot, H).advance(x[1:], torque[1:], np.full((1, 1), H))
+    np.testing.assert_allclose(after[1], alone[0], rtol=1e-12)
+    np.testing.assert_allclose(after[0, robot.layout.v_motor][1:], alone[0, robot.layout.v_motor][1:], rtol=1e-3)

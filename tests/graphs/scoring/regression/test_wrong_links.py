@@ -160,12 +160,12 @@ def test_a_link_that_seems_turned_about_its_axis_has_an_encoder_with_another_zer
     rows = joint_rows(robot, [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
     link = most_plausible(rows, ["arm.mcap"], regressed_causes(rows)).link
     assert link.joint == ARM.joints[-1]
-    assert turn_instead(robot.tree.model, link) == pytest.approx(offset, abs=0.005)  # the calibration finds its size
+    assert turn_instead(robot.tree, link) == pytest.approx(offset, abs=0.005)  # the calibration finds its size
 
 
 def test_a_tool_at_the_tip_and_a_link_with_others_behind_it_are_not_turned(robots):
     robot = robots["N m"]
     link = asked(robots, drive=tool(0.5, (0.3, 0.0, 0.1))).link
     assert link.moments
-    assert turn_instead(robot.tree.model, link) is None
-    assert turn_instead(robot.tree.model, replace(link, joint=ARM.joints[0])) is None
+    assert turn_instead(robot.tree, link) is None
+    assert turn_instead(robot.tree, replace(link, joint=ARM.joints[0])) is None
