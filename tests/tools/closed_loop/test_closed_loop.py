@@ -254,3 +254,18 @@ def test_a_model_of_another_robot_is_refused():
         RobotError, match=r"is no model of doggy: joints: expected joint1, joint2, joint3, got joint1, "
     ):
         run_closed_loop(robot, other, 3.0, 3)
+
+
+@pytest.mark.slow
+def test_motors_that_move_several_joints_track_as_well(tmp_path):
+    robot = load_robot("doggy")
+    text = robot.path.read_text(encoding="utf-8").replace("urdf: doggy.urdf", f"urdf: {robot.tree.urdf.resolve()}")
+    path = tmp_path / "coupled.yaml"
+    matrix = "transmission: {matrix: [[1, 0, 0], [0.2, 1, 0], [0, -0.3, 1]]}"
+    path.write_text(f"{text}\n{matrix}\n", encoding="utf-8")
+    coupled = load_robot(path)
+    assert not np.allclose(coupled.transmission, np.eye(3))
+    result = run_closed_loop(coupled, None, SECONDS, 3, options=LoopOptions(make_estimator=HoldingEstimator))
+    p, feedback = (result.run(controller, "true").tracking for controller in ("p", "state_feedback"))
+    assert feedback.link_position_rms < 0.02 * p.link_position_rms
+    assert feedback.hit_position < 3e-3  # [m]
