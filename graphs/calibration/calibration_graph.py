@@ -120,7 +120,8 @@ class CalibrationGraph:
         """The minimum of the graph as it is now, by `gtsam.LevenbergMarquardtOptimizer` from `values`.
 
         Raises:
-            SolveError: a factor has a key that the graph's values lack, or nothing determines a variable.
+            SolveError: a factor has a key that the graph's values lack, or no finite error, or nothing determines a
+                variable.
         """
         self._check_keys(self.values)
         parameters = marquardt_parameters()
@@ -183,6 +184,15 @@ class CalibrationGraph:
                     f"factor {i} touches {gtsam.DefaultKeyFormatter(missing[0])}, which the graph's values lack; "
                     f"insert a start value for it into `values`, or use one of `keys`: {', '.join(self.keys)}"
                 )
+        # GTSAM's optimizer returns its start as if nothing were wrong
+        if not np.isfinite(self.graph.error(values)):
+            wrong = next(i for i in range(self.graph.size()) if not np.isfinite(self.graph.at(i).error(values)))
+            factor = self.graph.at(wrong)
+            touched = ", ".join(gtsam.DefaultKeyFormatter(key) for key in factor.keys())
+            raise SolveError(
+                f"factor {wrong} on {touched} has the error {factor.error(values):g} at these values; expected a "
+                "finite one: correct the factor, or start from other values"
+            )
 
 
 def _block_keys(calibrations: Sequence[Calibration], values: gtsam.Values) -> dict[str, int]:

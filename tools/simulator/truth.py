@@ -38,7 +38,8 @@ def true_robot(robot: Robot, overrides: Mapping[str, float]) -> Robot:
     places |= {name for target in robot.targets for name in target.own}
     for parameter in truth.parameters.values():
         friction_or_damping = parameter.name.endswith((".coulomb_torque", ".damping", ".k_mi"))
-        least = -np.inf if parameter.name in places else 0.0 if friction_or_damping else TINY
+        signed = parameter.name in places or not parameter.positive
+        least = -np.inf if signed else 0.0 if friction_or_damping else TINY
         if not np.isfinite(parameter.value) or parameter.value < least:
             raise SimulationError(f"{parameter.name}: cannot be simulated with {parameter.value:g} {parameter.unit}")
     return truth

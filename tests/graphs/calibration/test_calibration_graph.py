@@ -93,3 +93,13 @@ def test_a_factor_with_a_key_that_the_graph_lacks_is_an_error(calibrated):
 def test_a_parameter_that_is_not_free_is_an_error(calibrated):
     with pytest.raises(SolveError, match=r"no free parameter 'joint9.stiffness' in the graph; it has motor.k_pwm"):
         CalibrationGraph.of(calibrated).coordinate("joint9.stiffness")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_users_factor_without_a_finite_error_is_named(calibrated, value):
+    graph = CalibrationGraph.of(calibrated)
+    graph.graph.add(_about("joint1.stiffness", graph, value, 0.01))
+    last = graph.graph.size() - 1
+    for ask in (graph.optimize, graph.without_states):
+        with pytest.raises(SolveError, match=rf"^factor {last} on .* expected a finite one"):
+            ask()
