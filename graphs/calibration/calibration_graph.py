@@ -108,7 +108,7 @@ class CalibrationGraph:
         Raises:
             SolveError: as `optimize` says.
         """
-        self._check_keys(values)
+        self._check(values)
         try:
             covariance = gtsam.Marginals(self.graph, values).marginalCovariance(self.keys[DYNAMICS])
         except RuntimeError as err:
@@ -123,7 +123,7 @@ class CalibrationGraph:
             SolveError: a factor has a key that the graph's values lack, or no finite error, or nothing determines a
                 variable.
         """
-        self._check_keys(self.values)
+        self._check(self.values)
         parameters = marquardt_parameters()
         parameters.setOrdering(self.ordering)
         try:
@@ -151,7 +151,7 @@ class CalibrationGraph:
             SolveError: as `optimize` says.
         """
         values = self.values if values is None else values
-        self._check_keys(values)
+        self._check(values)
         states = gtsam.Ordering()
         for name, key in self.keys.items():
             if name.startswith("x "):
@@ -176,7 +176,7 @@ class CalibrationGraph:
             lines.append(f"{i:4d}  {factor.dim()} rows{kind and f' of {kind}'}: {', '.join(touched)}")
         return "\n".join(lines)
 
-    def _check_keys(self, values: gtsam.Values) -> None:
+    def _check(self, values: gtsam.Values) -> None:
         for i in range(self.graph.size()):
             missing = [key for key in self.graph.at(i).keys() if not values.exists(key)]
             if missing:

@@ -8,14 +8,13 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
-from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
+from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 
-SUSPICIOUS = ("gap", "unit", "axes", MIRRORED, SATURATION)  # kinds of notices that may explain a failure
+SUSPICIOUS = ("gap", *PLAIN_MISTAKES)  # kinds of notices that may explain a failure
 MOST = 3
 
 P = ParamSpec("P")

@@ -37,10 +37,9 @@ from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, 
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
-from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
+from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
@@ -200,7 +199,7 @@ def _to_look_at_first(base: BaseModel) -> list[str]:
     The robot as it was before its calibration is screened: a mounting that was calibrated hides axes that are swapped.
     """
     notices = [notice for recording in base.recordings for notice in screen_all(recording, base.result.start)]
-    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in ("unit", "axes", MIRRORED, SATURATION))
+    texts = dict.fromkeys(notice.text for notice in notices if notice.kind in PLAIN_MISTAKES)
     texts |= dict.fromkeys(moment.sentence(bag.recording) for bag in base.result.bags for moment in bag.isolated)
     return [f"{LOOK_FIRST}: {text}." for text in texts]
 

@@ -30,13 +30,13 @@ from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowes
 from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
 from jointscope.graphs.solving.batch_solver import Solver, solve
-from jointscope.graphs.starts.saturated_drives import screen_all
 from jointscope.robots.errors import EffectError, JointscopeError, RecordingError
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.screening import screen
 
 BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
@@ -62,7 +62,7 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
 
 
 def _refuse_mirrored(robot: Robot, recording: Recording) -> None:
-    for notice in screen_all(recording, robot):
+    for notice in screen(recording, robot):
         if notice.kind == MIRRORED:
             raise RecordingError(
                 f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file, or leave "

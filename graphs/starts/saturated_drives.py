@@ -14,11 +14,13 @@ from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_li
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import si_unit
 
 SATURATION = "saturation"  # kind of its notices
+PLAIN_MISTAKES = ("unit", "axes", MIRRORED, SATURATION)  # kinds of notices that say what is wrong in a robot file
 FALLS = 0.1  # of a level that is gone at the largest speed, from which it falls with speed
 MARGIN = 0.02  # [s] before and after commands beyond a limit
 NEAR = 0.15  # [s] between moments that are left out as one

@@ -7,15 +7,13 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
+from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.tools.terminal.progress import ERASE_LINE
 
 LIMIT = "limit"
-PLAIN_MISTAKES = ("unit", "axes", MIRRORED, LIMIT, SATURATION)  # kinds of notices
 CONTRADICTED = (
     "Look at this first: what is wrong in the robot file is mended there; a model that contradicts its recording takes "
     "long to calibrate (Ctrl-C ends it).\n"
@@ -41,7 +39,7 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     kinds = set()
     for recording in recordings:
         for notice in _screened(recording, robot):
-            if notice.kind in PLAIN_MISTAKES:
+            if notice.kind in (*PLAIN_MISTAKES, LIMIT):
                 seen.setdefault(notice.text, recording.path)
                 kinds.add(notice.kind)
     if not seen:

@@ -93,8 +93,7 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     then = f"; with it {worst} would be {100.0 * (moved[worst] - 1.0):+.2g} %" if worst else ""
     output = edited_argument(result.start, "link_mass")
     return (
-        f"By regression of all joints {what}: that is the shape of {100.0 * link.explained:.0f} % of what is missing "
-        f"at {link.seen_at}, {significant(100.0 * link.size, 2)} % of its drive's torque{then}{drives}. Correct the "
+        f"By regression of all joints {what}: {_seen(link)}{then}{drives}. Correct the "
         f"URDF, then {_again(result)}; or let it be found: `jointscope add {robot_argument(result.start)} "
         f"link_mass@{link.joint} -o {output}`, then calibrate again."
     )
@@ -106,10 +105,17 @@ def _other_zero(result: CalibrationResult, link: WrongLink, turn: float) -> str:
     output = edited_argument(result.start, effect)
     return (
         f"By regression of all joints the encoder of {joint} reads {significant(turn, 2)} rad too much for the URDF "
-        f"(or the centre of mass behind {joint} is turned about its axis, which looks the same): that is the shape of "
-        f"{100.0 * link.explained:.0f} % of what is missing at {link.seen_at}, {significant(100.0 * link.size, 2)} % "
-        f"of its drive's torque. Add it: `jointscope add {robot_argument(result.start)} {effect}@{joint} -o {output}`, "
+        f"(or the centre of mass behind {joint} is turned about its axis, which looks the same): "
+        f"{_seen(link)}. Add it: `jointscope add {robot_argument(result.start)} {effect}@{joint} -o {output}`, "
         f"then calibrate again; or correct the URDF, then {_again(result)}."
+    )
+
+
+def _seen(link: WrongLink) -> str:
+    """Where it shows, and how large it is there."""
+    return (
+        f"that is the shape of {100.0 * link.explained:.0f} % of what is missing at {link.seen_at}, "
+        f"{significant(100.0 * link.size, 2)} % of its drive's torque"
     )
 
 

@@ -83,14 +83,15 @@ def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[Regresse
         paths: of its recordings.
         causes: effects that may be named.
     """
-    gains, link, changed = unsteady_gains(rows), wrong_link(rows), changed_load(rows, paths)
+    tilted, late = tilted_base(rows), late_commands(rows)
+    gains, link, changed = unsteady_gains(rows), wrong_link(rows, tilted), changed_load(rows, paths)
     options = [
         (sum(cause.evidence for cause in causes), Asked(causes=causes)),
         (sum(gain.evidence for gain in gains), Asked(gains=gains)),
         (link.evidence if link else 0.0, Asked(link=link)),
         (changed.evidence if changed else 0.0, Asked(changed=changed)),
-        (late := late_commands(rows), Asked()),
-        (tilted_base(rows), Asked()),
+        (late, Asked()),
+        (tilted, Asked()),
     ]
     worth, best = max(options, key=lambda option: option[0])
     return replace(best, late=late > COMPARABLE * worth)

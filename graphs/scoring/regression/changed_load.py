@@ -33,9 +33,7 @@ BETWEEN = 9  # times around each of them
 EDGE = 0.1  # share of a recording at either end within which nothing is told
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left ...
 THAN_ALWAYS = 0.5  # ... and of what is left where the same acts all the time
-FEWEST = (
-    6  # windows in the stretch and beside it for each size: fewer may be what reversals or steps of a counter leave
-)
+FEWEST = 6  # windows in the stretch and beside it for each size: fewer may be reversals or steps of a counter
 LARGE = 0.01  # of the drive's rms torque
 ENDS = 2  # of a stretch, which are looked for
 BY_CHANCE = 1e-4  # probability that a stretch need not be more plausible than

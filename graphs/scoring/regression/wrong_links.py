@@ -106,11 +106,12 @@ class _Told(NamedTuple):
     evidence: float
 
 
-def wrong_link(rows: JointRows) -> WrongLink | None:
+def wrong_link(rows: JointRows, tilted: float) -> WrongLink | None:
     """The link whose weight explains most, where it explains nearly all that is missing at a joint.
 
     Args:
         rows: of the regression.
+        tilted: evidence for a base that is not level, as `tilted_base` finds it.
     """
     robot, effect = rows.robot, catalogue()[EFFECT]
     if not np.any(robot.tree.gravity):
@@ -127,7 +128,7 @@ def wrong_link(rows: JointRows) -> WrongLink | None:
     # of those that are as good the simplest, and a mass is simpler than a mass at another place
     best = max((one for one in told if one.evidence >= least), key=lambda one: (-one.sizes, one.evidence))
     drives = _of_drives(rows, best)
-    if drives > best.evidence or tilted_base(rows) > (best.evidence if best.sizes == 1 else least):
+    if drives > best.evidence or tilted > (best.evidence if best.sizes == 1 else least):
         return None
     return _sure(rows, best, [one for one in told if one.evidence >= least], drives >= least)
 
@@ -230,7 +231,6 @@ def _sure(rows: JointRows, best: _Told, as_good: Sequence[_Told], drives: bool) 
     if shares[first] > LEFT or len(names) < FEWEST_BLOCKS:
         return None
     others = [_solved(rows, best.here, [one.without(name) for one in best.some])[0] for name in names]
-
     sigmas = np.sqrt((len(names) - 1.0) * np.var(others, axis=0))
     body = robot.tree.model.inertias[robot.tree.model.getJointId(best.here.here.owner)]
     possible = body.mass + best.found[0] > -SURE * sigmas[0]

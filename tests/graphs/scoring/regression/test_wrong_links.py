@@ -7,30 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_arm import SHARP, Arm, divided, moved, robot_file
+from simulated_arm import SHARP, Arm, divided, moved
 
 from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
 from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.scoring.regression.turned_link import turn_instead
-from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
 
 ARM, SECONDS = Arm(), 10.0
 CONSTANTS = (8.0, 5.0, 2.0)  # [N m/A]
 HOW = {"seconds": SECONDS, "encoder_rate": 250.0, "command_rate": 250.0}
 MASSES = (3.0, 1.8, 1.08)  # [kg]
-
-
-@pytest.fixture(scope="module")
-def robots(tmp_path_factory):
-    """The robot with commands in N m, and in A."""
-    path = robot_file(ARM, tmp_path_factory.mktemp("arm"))
-    constants = "".join(f"\n  {joint}.torque_constant: {{value: 4.0, unit: N m/A}}" for joint in ARM.joints)
-    amperes = path.with_name("amperes.yaml")
-    text = path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
-    amperes.write_text(text + constants.lstrip("\n") + "\n", encoding="utf-8")
-    return {"N m": load_robot(path), "A": load_robot(amperes)}
 
 
 def asked(robots, unit="N m", **how):
