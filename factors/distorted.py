@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from jointscope.factors.factor import Linearization, Samples
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.link_encoder import LinkEncoderFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
+from jointscope.factors.seen_through import SeenThrough
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 
@@ -27,49 +29,27 @@ STEP = 1e-30  # [unit of the signal] of complex derivatives
 
 
 @dataclass(frozen=True)
-class DistortedFactor:
+class DistortedFactor(SeenThrough[GyroFactor | LinkEncoderFactor | MotorEncoderFactor]):
     """A sensor factor on one state with effects on its reading.
 
     Attributes:
-        inner: the sensor without them.
         effects: what disturbs it, and the channels that each acts on.
         times: stamps since the start of the recording, shape (m,) [s].
         fixed: parameters that calibration leaves alone, by full name.
     """
 
-    inner: GyroFactor | LinkEncoderFactor | MotorEncoderFactor
     effects: tuple[tuple[EffectAt, NDArray[np.intp]], ...]
     times: Array
     fixed: Mapping[str, float]
-
-    states = 1
-
-    def __len__(self) -> int:
-        return len(self.inner)
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.inner.name
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Channels."""
-        return self.inner.rows
 
     @property
     def blocks(self) -> tuple[str, ...]:
         """Blocks of the sensor, and dynamics."""
         return (*self.inner.blocks, DYNAMICS)
 
-    @property
-    def sigmas(self) -> Array:
-        """Noise of the sensor."""
-        return self.inner.sigmas
-
-    def select(self, samples: Samples) -> DistortedFactor:
+    def select(self, samples: Samples) -> Self:
         """The same factor for some of the samples."""
-        return replace(self, inner=self.inner.select(samples), times=self.times[samples])
+        return replace(super().select(samples), times=self.times[samples])
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, c)."""

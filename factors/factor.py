@@ -9,7 +9,7 @@ noise is diagonal; `sigmas` whitens them.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Linearization:
 
     Attributes:
         residual: predicted minus zero of the factor, shape (m, r), in the units of `Factor.sigmas`.
-        by_state: derivative by each state the factor touches, shape (m, r, 4n) each.
+        by_state: derivative by each state the factor touches, shape (m, r, d) each.
         by_block: derivative by the coordinates of each block of the calibration, shape (m, r, size).
     """
 
@@ -62,11 +62,11 @@ class Factor(Protocol):
     def __len__(self) -> int:
         """Number of samples."""
 
-    def select(self, samples: Samples) -> Factor:
+    def select(self, samples: Samples) -> Self:
         """The same factor for some of the samples."""
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
-        """Residuals, shape (m, r), at states of shape (m, 4n) each."""
+        """Residuals, shape (m, r), at states of shape (m, d) each."""
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
-        """Residuals and derivatives at states of shape (m, 4n) each."""
+        """Residuals and derivatives at states of shape (m, d) each."""

@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Factor, Linearization, Samples
+from jointscope.factors.seen_through import SeenThrough
 from jointscope.robots.model.lateness import Lateness
 from jointscope.robots.parts.state_layout import StateLayout
 
@@ -28,11 +30,10 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class InterpolatedFactor:
+class InterpolatedFactor(SeenThrough[Factor]):
     """A factor on one state, moved to the times of its samples.
 
     Attributes:
-        inner: factor of the sensor.
         fraction: (t - t_k) / h of each sample, shape (m,); outside [0, 1] the polynomial goes on.
         h: distance of the two ticks, shape (m,) [s].
         layout: of the states.
@@ -40,27 +41,16 @@ class InterpolatedFactor:
         fixed: parameters that calibration leaves alone, by full name.
     """
 
-    inner: Factor
     fraction: Array
     h: Array
     layout: StateLayout
     late: Lateness | None = None
     fixed: Mapping[str, float] = field(default_factory=dict)
 
-    states = 2
-
-    def __len__(self) -> int:
-        return len(self.inner)
-
     @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.inner.name
-
-    @property
-    def rows(self) -> tuple[str, ...]:
-        """Rows of the sensor."""
-        return self.inner.rows
+    def states(self) -> int:
+        """Two: the ticks on both sides."""
+        return 2
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -68,18 +58,12 @@ class InterpolatedFactor:
         inner = self.inner.blocks
         return inner if self.late is None or DYNAMICS in inner else (*inner, DYNAMICS)
 
-    @property
-    def sigmas(self) -> Array:
-        """Noise of the sensor."""
-        return self.inner.sigmas
-
-    def select(self, samples: Samples) -> InterpolatedFactor:
+    def select(self, samples: Samples) -> Self:
         """The same factor for some of the samples."""
         late = self.late
         if late is not None:
             late = replace(late, stamps=late.stamps[samples], anchor=late.anchor[samples])
-        part = replace(self, inner=self.inner.select(samples), fraction=self.fraction[samples], h=self.h[samples])
-        return replace(part, late=late)
+        return replace(super().select(samples), fraction=self.fraction[samples], h=self.h[samples], late=late)
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""

@@ -6,38 +6,27 @@ Variables: those of the sensor.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.factors.factor import Factor, Linearization, Samples
+from jointscope.factors.factor import Factor, Linearization
+from jointscope.factors.seen_through import SeenThrough
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SomeChannels:
+class SomeChannels(SeenThrough[Factor]):
     """Rows of a sensor factor on one state.
 
     Attributes:
-        inner: all channels.
         channels: chosen rows, shape (c,).
     """
 
-    inner: Factor
     channels: NDArray[np.intp]
-
-    states = 1
-
-    def __len__(self) -> int:
-        return len(self.inner)
-
-    @property
-    def name(self) -> str:
-        """Name of the sensor."""
-        return self.inner.name
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -45,18 +34,9 @@ class SomeChannels:
         return tuple(self.inner.rows[j] for j in self.channels)
 
     @property
-    def blocks(self) -> tuple[str, ...]:
-        """Blocks of the sensor."""
-        return self.inner.blocks
-
-    @property
     def sigmas(self) -> Array:
         """Noise of the chosen channels."""
         return self.inner.sigmas[..., self.channels]
-
-    def select(self, samples: Samples) -> SomeChannels:
-        """The same factor for some of the samples."""
-        return replace(self, inner=self.inner.select(samples))
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the chosen channels, shape (m, c)."""
