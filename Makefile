@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# make demo | story | docs | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | clean
+# make demo | story | docs | test | test-all | lint | bench | bench-arms | bench-discovery | bench-estimator | bench-real | fuzz | pythons | clean
 # Everything lives in .venv; a second run installs only what changed.
 
 SUITABLE := import sys; sys.exit(sys.version_info < (3, 11))
@@ -11,7 +11,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 SOURCES := $(shell find robots factors graphs tools -type f -not -path '*/__pycache__/*')
 TYPES := build/types
 
-.PHONY: demo docs story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l bench-biorob fuzz clean
+.PHONY: demo docs story test test-all lint style types bench bench-arms bench-discovery bench-estimator bench-real bench-tx90l bench-biorob fuzz pythons clean
 .NOTPARALLEL:
 
 demo: $(VENV)/sim $(VENV)/code
@@ -83,6 +83,18 @@ bench-biorob: $(VENV)/code
 # Below an hour; fails where something is found.
 fuzz: $(VENV)/sim $(VENV)/code
 	$(BIN)/python benchmarks/fuzz_bags.py
+
+# The wheel in an empty environment of each Python: the demo must find the hidden effect. Those that are missing are said.
+PYTHONS ?= python3.11 python3.12 python3.13
+pythons: $(VENV)/made
+	rm -rf build/pythons && mkdir -p build/pythons/wheel
+	$(PIP) wheel --no-deps --wheel-dir build/pythons/wheel .
+	@for p in $(PYTHONS); do \
+		$$p -c '$(SUITABLE)' >/dev/null 2>&1 || { echo "$$p: not on this machine"; continue; }; \
+		d=$(CURDIR)/build/pythons/$$(basename $$p); \
+		$$p -m venv $$d && $$d/bin/python -m pip --disable-pip-version-check --quiet install "$$(echo build/pythons/wheel/*.whl)[sim,plot]" \
+		&& (cd $$d && bin/jointscope demo > demo.txt) && echo "$$($$d/bin/python --version): $$(grep 'was found' $$d/demo.txt)" || exit 1; \
+	done
 
 clean:
 	rm -rf $(VENV) build demo *.egg-info .mypy_cache .pytest_cache .ruff_cache
