@@ -14,9 +14,11 @@ from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
-from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
+from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
+from jointscope.tools.verdicts.priors.far_from_priors import far_from_priors
+from jointscope.tools.verdicts.priors.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.same_values import same_by_regression, same_values
 from jointscope.tools.verdicts.short_steps import short_steps
@@ -90,12 +92,14 @@ def judge(result: CalibrationResult) -> Judgement:
         _determined(result),
         Check(held[0], "Values from data, not from priors", held[1]),
     ]
+    far = far_from_priors(result)
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
         *(Check("bad", name, text) for name, text in reasons),
         *signs,
         *_agreeing(signs),
         *(_consequences(about_values) if reasons else about_values),
+        Check(far[0], AS_EXPECTED_BY_PRIORS, far[1]),
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         Check(*same_by_regression(result)),

@@ -14,8 +14,8 @@ from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.findings import findings
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.robots.files.effects_at_once import add_effects
-from jointscope.tools.verdicts.held_values import values_from_data
 from jointscope.tools.verdicts.judgement import Judgement, judge
+from jointscope.tools.verdicts.priors.held_values import values_from_data
 
 NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
 HELD = "Values from data, not from priors"

@@ -9,7 +9,7 @@ from html import escape
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.report.page.page import Section, table
-from jointscope.tools.verdicts.held_values import is_held, is_mounting_or_bias
+from jointscope.tools.verdicts.priors.held_values import is_held, is_mounting_or_bias
 
 BAR = 84  # [px]
 LADDER = 150  # [px]
