@@ -110,7 +110,7 @@ def test_every_check_is_there_for_machines_with_its_reason(good):
     judgement = judge(with_chi2(good, 4.0))
     content = judgement.to_json()
     assert content["verdict"] == {"level": "bad", "text": judgement.headline}
-    assert len(content["checks"]) == len(judgement.checks) == 12
+    assert len(content["checks"]) == len(judgement.checks) == 13
     (noise,) = (check for check in content["checks"] if check["name"] == NOISE)
     assert noise["verdict"] == "bad" and noise["why"].startswith(f"{CHANNEL} has χ² per sample 4")
 
