@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -219,3 +220,16 @@ def test_two_doubtful_signs_together_are_no_reservation(good):
 def test_steps_in_which_friction_stops_a_light_joint_are_told(good, shifts, expected):
     judged = judge(dataclasses.replace(good, inertia_shifts=shifts))
     assert level(judged, "Steps short enough") == expected
+
+
+def test_a_value_that_may_as_well_be_zero_has_no_share_but_is_not_determined(good):
+    lost = with_parameter(good, "joint2.stiffness", value=1e-160, sigma=0.1)
+    said = next(text for text in findings(lost) if "parameters from" in text)
+    assert said.endswith("worst joint2.stiffness, not determined") and "e+" not in said
+    near_zero = dataclasses.replace(lost.robot.parameters["joint2.stiffness"], positive=False)
+    lever = dataclasses.replace(
+        lost, robot=dataclasses.replace(lost.robot, parameters={**lost.robot.parameters, near_zero.name: near_zero})
+    )
+    assert not any("not determined" in text for text in findings(lever))  # 0.1 is far less than its prior's sigma
+    known = next(text for text in findings(good) if "parameters from" in text)
+    assert re.search(r"typically \+-[\d.]+ %, worst \S+ with \+-[\d.]+ %$", known)
