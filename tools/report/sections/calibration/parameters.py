@@ -8,7 +8,7 @@ from html import escape
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.robots.parts.relative_sigma import KNOWN
-from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.report.page.page import Section, table
 from jointscope.tools.verdicts.priors.held_values import is_held, is_mounting_or_bias
 
