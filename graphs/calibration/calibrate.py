@@ -70,6 +70,7 @@ TOLD_OF_WHITE = (
     "lacking",
     "inertia_shifts",
     "asked",
+    "torque_readings",
 )  # what torques that last would hide
 
 

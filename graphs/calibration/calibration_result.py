@@ -223,7 +223,8 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        return late or heavy or self.asked.names or any(bag.isolated for bag in self.bags)
+        pushed = any(bag.isolated for bag in self.bags)
+        return late or heavy or self.asked.names or pushed or bool(self.torque_readings)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

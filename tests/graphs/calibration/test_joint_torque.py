@@ -138,4 +138,4 @@ def test_a_scale_and_an_offset_that_the_robot_file_lacks_are_named(robot, made, 
     judgement = judge(found)
     assert judgement.level == "bad"
     assert "Torque sensors as the robot file has them" in judgement.answer
-    assert "`torque.offset_joint2: {value: 0.0, unit: N m, positive: false, prior_sigma: 3.00}`" in judgement.answer
+    assert "`torque.offset_joint2: {value: 0.0, unit: N m, positive: false, prior_sigma: 3}`" in judgement.answer
