@@ -24,9 +24,12 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import Problem, motions_only
+from jointscope.graphs.solving.stretch import RecordingStretch
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
+
+INNER_STEPS = 10  # two or three are taken where friction reverses
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,9 @@ class CalibrationGraph:
             estimate: where their calibration ended.
         """
         condensed, values = CondensedGraph.of(problems, estimate)
+        for stretch in (stretch for cuts in condensed.stretches for stretch in cuts):
+            if isinstance(stretch, RecordingStretch):  # so that an error depends on its values alone
+                stretch.inner_steps = INNER_STEPS
         keys = _keys(problems, estimate, values)
         names = ["motion" if isinstance(problem, BagProblem) else problem.kind for problem in problems]
         kinds = [name for name, cuts in zip(names, condensed.stretches, strict=True) for _ in cuts]

@@ -162,3 +162,21 @@ def test_a_variable_that_nothing_determines_is_named(calibrated):
 def test_a_name_that_is_no_variable_is_told_with_those_that_are(calibrated):
     with pytest.raises(SolveError, match=r"no variable 'imu9.bias' in the graph; it has dynamics, imu1.rotation"):
         CalibrationGraph.of(calibrated).keys["imu9.bias"]
+
+
+def test_an_error_depends_on_the_values_alone_and_not_on_what_was_asked_before(calibrated):
+    """Inner states that follow by one linear step from where they were differ where friction reverses, by 3e-4."""
+    graph, rng = CalibrationGraph.of(calibrated), np.random.default_rng(1)
+
+    def moved():
+        values, key = gtsam.Values(graph.values), graph.keys["dynamics"]
+        here = values.atVector(key)
+        values.update(key, here + 0.01 * rng.standard_normal(len(here)))
+        return values
+
+    here, there = moved(), moved()
+    at_start = graph.graph.error(graph.values)
+    first = graph.graph.error(here)
+    graph.graph.linearize(there)
+    assert graph.graph.error(here) == pytest.approx(first, rel=1e-8)
+    assert graph.graph.error(graph.values) == pytest.approx(at_start, rel=1e-8)
