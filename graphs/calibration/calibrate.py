@@ -44,6 +44,7 @@ from jointscope.graphs.scoring.drive_timing import drive_timing
 from jointscope.graphs.scoring.lacking_effects import lacking_effects
 from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.scoring.torque_readings import torque_readings
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -69,6 +70,7 @@ TOLD_OF_WHITE = (
     "lacking",
     "inertia_shifts",
     "asked",
+    "torque_readings",
 )  # what torques that last would hide
 
 
@@ -206,6 +208,7 @@ def _asked_for_causes(
         shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
     timing, masses = drive_timing(test), wrong_masses(test)
     result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
+    result = replace(result, torque_readings=torque_readings(test))
     if stage is None or result.saturated:
         return result
     return replace(

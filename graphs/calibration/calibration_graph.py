@@ -19,13 +19,17 @@ from jointscope.graphs.gtsam_solvers.reference_graph import (
     nonlinear_graph,
     unsolvable,
 )
+from jointscope.graphs.gtsam_solvers.users_factor import what_is_wrong
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.condensed_graph import CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import Problem, motions_only
+from jointscope.graphs.solving.stretch import RecordingStretch
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
+
+INNER_STEPS = 10  # two or three are taken where friction reverses
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class CalibrationGraph:
             "imu1.bias (bag 2)"), then of the states by recording and time ("x 12.000 s", "x 0.500 s (bag 2)").
         like: any calibration of the robot; gives names and kinds of the parameters.
         kinds: of the recordings of the first factors, "motion", "rests", "poses" or "frequency"; the others are priors.
+        own: how many factors are those of the calibration; those that follow are the user's.
     """
 
     graph: gtsam.NonlinearFactorGraph
@@ -46,6 +51,7 @@ class CalibrationGraph:
     keys: Mapping[str, int]
     like: Calibration
     kinds: tuple[str, ...] = ()
+    own: int = 0
 
     @staticmethod
     def of(result: CalibrationResult, per_sample: bool = False) -> CalibrationGraph:
@@ -70,8 +76,8 @@ class CalibrationGraph:
             return CalibrationGraph.of_problems(problems, estimate)
         motion = motions_only(problems, "a factor for every sample (per_sample)")
         graph, values = nonlinear_graph(motion, estimate), initial_values(estimate)
-        keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
-        return CalibrationGraph(graph, values, keys, estimate.calibrations[0])
+        keys = _keys(problems, estimate, values)
+        return CalibrationGraph(graph, values, keys, estimate.calibrations[0], own=graph.size())
 
     @staticmethod
     def of_problems(problems: Sequence[Problem], estimate: Estimate) -> CalibrationGraph:
@@ -82,10 +88,14 @@ class CalibrationGraph:
             estimate: where their calibration ended.
         """
         condensed, values = CondensedGraph.of(problems, estimate)
-        keys = _block_keys(estimate.calibrations, values) | _state_keys(problems, values)
+        for stretch in (stretch for cuts in condensed.stretches for stretch in cuts):
+            if isinstance(stretch, RecordingStretch):  # so that an error depends on its values alone
+                stretch.inner_steps = INNER_STEPS
+        keys = _keys(problems, estimate, values)
         names = ["motion" if isinstance(problem, BagProblem) else problem.kind for problem in problems]
         kinds = [name for name, cuts in zip(names, condensed.stretches, strict=True) for _ in cuts]
-        return CalibrationGraph(condensed.graph, values, keys, estimate.calibrations[0], tuple(kinds))
+        own = condensed.graph.size()
+        return CalibrationGraph(condensed.graph, values, keys, estimate.calibrations[0], tuple(kinds), own)
 
     def coordinate(self, parameter: str) -> int:
         """Place of a parameter in the block "dynamics", which holds positive ones as logarithms.
@@ -111,8 +121,8 @@ class CalibrationGraph:
         self._check(values)
         try:
             covariance = gtsam.Marginals(self.graph, values).marginalCovariance(self.keys[DYNAMICS])
-        except RuntimeError as err:
-            raise unsolvable(err) from err
+        except (RuntimeError, ValueError) as err:
+            raise unsolvable(err, self._names) from err
         slopes = extract_calibration(values, self.like, (DYNAMICS,)).value_by_coordinate
         return dict(zip(self.like.names, (np.sqrt(np.diag(covariance)) * slopes).tolist(), strict=True))
 
@@ -128,8 +138,8 @@ class CalibrationGraph:
         parameters.setOrdering(self.ordering)
         try:
             return gtsam.LevenbergMarquardtOptimizer(self.graph, self.values, parameters).optimize()
-        except RuntimeError as err:
-            raise unsolvable(err) from err
+        except (RuntimeError, ValueError) as err:
+            raise unsolvable(err, self._names) from err
 
     @property
     def ordering(self) -> gtsam.Ordering:
@@ -158,8 +168,8 @@ class CalibrationGraph:
                 states.push_back(key)
         try:
             _, rest = self.graph.linearize(values).eliminatePartialSequential(states)
-        except RuntimeError as err:
-            raise unsolvable(err) from err
+        except (RuntimeError, ValueError) as err:
+            raise unsolvable(err, self._names) from err
         shared = gtsam.Values(values)
         for i in range(states.size()):
             shared.erase(states.at(i))
@@ -167,7 +177,7 @@ class CalibrationGraph:
 
     def describe(self) -> str:
         """The factors, a line each, with the names of their variables."""
-        names = {key: name for name, key in self.keys.items()}
+        names = self._names
         lines = [f"{self.graph.size()} factors on {self.values.size()} variables"]
         for i in range(self.graph.size()):
             factor = self.graph.at(i)
@@ -176,23 +186,46 @@ class CalibrationGraph:
             lines.append(f"{i:4d}  {factor.dim()} rows{kind and f' of {kind}'}: {', '.join(touched)}")
         return "\n".join(lines)
 
+    @property
+    def _names(self) -> dict[int, str]:
+        return {key: name for name, key in self.keys.items()}
+
     def _check(self, values: gtsam.Values) -> None:
+        """Raises SolveError where a factor, as a rule one of the user's, cannot be used at some values."""
+        zero, names = values.zeroVectors(), self._names
         for i in range(self.graph.size()):
-            missing = [key for key in self.graph.at(i).keys() if not values.exists(key)]
+            factor = self.graph.at(i)
+            missing = [key for key in factor.keys() if not values.exists(key)]
             if missing:
                 raise SolveError(
                     f"factor {i} touches {gtsam.DefaultKeyFormatter(missing[0])}, which the graph's values lack; "
                     f"insert a start value for it into `values`, or use one of `keys`: {', '.join(self.keys)}"
                 )
+            if i < self.own:
+                continue
+            sizes = {key: zero.dim(key) for key in factor.keys()}
+            if wrong := what_is_wrong(
+                factor, values, sizes, lambda key: names.get(key, gtsam.DefaultKeyFormatter(key))
+            ):
+                touched = ", ".join(gtsam.DefaultKeyFormatter(key) for key in factor.keys())
+                raise SolveError(f"factor {i} on {touched} {wrong}")
         # GTSAM's optimizer returns its start as if nothing were wrong
         if not np.isfinite(self.graph.error(values)):
-            wrong = next(i for i in range(self.graph.size()) if not np.isfinite(self.graph.at(i).error(values)))
-            factor = self.graph.at(wrong)
-            touched = ", ".join(gtsam.DefaultKeyFormatter(key) for key in factor.keys())
             raise SolveError(
-                f"factor {wrong} on {touched} has the error {factor.error(values):g} at these values; expected a "
-                "finite one: correct the factor, or start from other values"
+                "the recordings have no finite error at these values; expected start values near those of the "
+                "calibration, which are in `values`"
             )
+
+
+class Keys(dict[str, int]):
+    """Keys of variables by name; an unknown name is told with those that there are."""
+
+    def __missing__(self, name: str) -> int:
+        raise SolveError(f"no variable {name!r} in the graph; it has {', '.join(self)}")
+
+
+def _keys(problems: Sequence[Problem], estimate: Estimate, values: gtsam.Values) -> Keys:
+    return Keys(_block_keys(estimate.calibrations, values) | _state_keys(problems, values))
 
 
 def _block_keys(calibrations: Sequence[Calibration], values: gtsam.Values) -> dict[str, int]:

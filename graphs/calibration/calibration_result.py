@@ -15,6 +15,7 @@ from jointscope.graphs.calibration.external_torque import ExternalTorque
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.regression.asked_by_regression import Asked
+from jointscope.graphs.scoring.torque_readings import TorqueReading
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.starts.drive_regression import Value
@@ -176,6 +177,7 @@ class CalibrationResult:
         asked: what a regression of each joint alone says.
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
+        torque_readings: scales and offsets of torque sensors that the robot file has no parameters for.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
@@ -207,6 +209,7 @@ class CalibrationResult:
     regressed: Mapping[str, Value] = field(default_factory=dict)
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
+    torque_readings: tuple[TorqueReading, ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
     saturated: str = ""
 
@@ -220,7 +223,8 @@ class CalibrationResult:
         """Whether what the model lacks has names already: pushes, a delay of the drive signal, a mass, an effect."""
         late = self.timing is not None and bool(self.timing.moved(self.found))
         heavy = any(mass.moved(self.found) for mass in self.masses)
-        return late or heavy or self.asked.names or any(bag.isolated for bag in self.bags)
+        pushed = any(bag.isolated for bag in self.bags)
+        return late or heavy or self.asked.names or pushed or bool(self.torque_readings)
 
     def _json_lasting(self) -> dict[str, Any]:
         """Standard deviation [N m] and memory of the torques that last; empty where none do."""

@@ -8,9 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.found_values import share_of_value
 from jointscope.graphs.noise.torque_memory import MEMORIES
 from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.robots.model.lasting_torques import lasting_torques
+from jointscope.robots.parts.relative_sigma import NOT_DETERMINED, relative_sigma
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice
 
@@ -90,14 +92,16 @@ def _verdict(result: CalibrationResult) -> str:
     count = len(dynamics)
     # how well a time is known shows in seconds, not in shares of a delay that may be none
     dynamics = [p for p in dynamics if p.value and p.unit not in ("s", "s^2") and not is_geometry(p.name)]
-    relative = [p.sigma / abs(p.value) for p in dynamics]
+    shares = {p.name: share for p in dynamics if (share := share_of_value(result.robot, p)) is not None}
+    relative = list(shares.values())
     if not relative:
         return "no parameter was free"
-    worst = dynamics[int(np.argmax(relative))]
+    worst = max(shares, key=lambda name: shares[name])
     typical = float(np.median(relative))
+    least = relative_sigma(max(relative))
     return (
-        f"{count} parameters from {result.samples:,} samples: typically +-{100 * typical:.2g} %, "
-        f"worst {worst.name} with +-{100 * max(relative):.2g} %"
+        f"{count} parameters from {result.samples:,} samples: typically {relative_sigma(typical)}, "
+        f"worst {worst}{', ' if least == NOT_DETERMINED else ' with '}{least}"
     )
 
 

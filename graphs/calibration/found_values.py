@@ -11,6 +11,7 @@ from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.robots.model.derived_values import derived_value
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.relative_sigma import KNOWN
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,22 @@ def _note(p: Parameter, value: float, sigma: float, of_coordinate: float) -> str
     if of_coordinate > HELD_BY_PRIOR * p.coordinate_sigma:
         return "held by its prior"
     return NEAR_BOUND if small else ""
+
+
+def share_of_value(robot: Robot, p: ParameterEstimate) -> float | None:
+    """Standard deviation over the size of a value; None of a value near zero that is known well.
+
+    A lever of 0.0 +- 0.1 mm is known, as its sign is free and its prior has a say in it no more; one with a sigma as
+    large as that of its prior is not.
+
+    Args:
+        robot: says which values have one sign.
+        p: a parameter of it.
+    """
+    share = p.sigma / max(abs(p.value), 1e-300)
+    one_sign = p.name in robot.parameters and robot.parameters[p.name].positive
+    held = p.prior_sigma > 0.0 and p.sigma > HELD_BY_PRIOR * p.prior_sigma
+    return share if share <= KNOWN or one_sign or held else None
 
 
 def derived_results(robot: Robot, calibration: Calibration, covariance: Array) -> tuple[ParameterEstimate, ...]:

@@ -16,6 +16,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, bias_block, ro
 from jointscope.graphs.calibration.calibration_result import WeakDirection
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.relative_sigma import relative_sigma
 from jointscope.robots.parts.sensors import AXES
 
 Array = NDArray[np.float64]
@@ -102,7 +103,7 @@ def _weights(names: Sequence[str], vector: Array) -> dict[str, float]:
 
 
 def _dynamics_sentence(weights: dict[str, float], relative: float) -> str:
-    spread = f"+-{100 * relative:.2g} %"
+    spread = relative_sigma(relative)
     names = list(weights)
     if len(names) == 1:
         return f"{names[0]} is weakly determined, {spread}"

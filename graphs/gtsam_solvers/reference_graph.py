@@ -7,7 +7,8 @@ number of samples. It is what the condensed graph is held against on short recor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 
 import gtsam
 import numpy as np
@@ -79,6 +80,18 @@ def marquardt_parameters() -> gtsam.LevenbergMarquardtParams:
     return parameters
 
 
-def unsolvable(err: RuntimeError) -> SolveError:
-    """What GTSAM says where a graph has no solution, in one line."""
-    return SolveError(f"GTSAM cannot solve the graph: {' '.join(str(err).split())[:200]}")
+def unsolvable(err: Exception, names: Mapping[int, str] | None = None) -> SolveError:
+    """What GTSAM says where a graph has no solution, in one line.
+
+    Args:
+        err: raised by GTSAM, or by a factor of the user.
+        names: of variables, by key.
+    """
+    text = " ".join(str(err).split())
+    if found := re.search(r"near variable (\d+) \(Symbol: (\w+)\)", text):
+        name = (names or {}).get(int(found[1]), found[2])
+        return SolveError(
+            f"GTSAM cannot solve the graph: nothing determines {name} ({found[2]}) where it was eliminated; add a "
+            f"factor on it, or correct the one that should tell it (GTSAM: {text[:60]})"
+        )
+    return SolveError(f"GTSAM cannot solve the graph: {text[:200]}")

@@ -38,10 +38,24 @@ from jointscope.robots.effect_kinds.transmission_elements import TransmissionEle
 def regressors_of(hypothesis: EffectHypothesis, segment: Segment) -> list[Column]:
     """One column for each size of a hypothesis, looked at wherever the rule of integration looks."""
     found = columns_of(hypothesis, segment.signals)
+    if follows_commands(hypothesis):
+        ends = columns_of(hypothesis, segment.ends)
+        found = [replace(column, at_ends=end.at_ticks) for column, end in zip(found, ends, strict=True)]
     if segment.middle is None or all(column.at_ticks is None for column in found):
         return found
     between = columns_of(hypothesis, segment.middle[0])
     return [replace(column, between=b.at_ticks) for column, b in zip(found, between, strict=True)]
+
+
+def follows_commands(hypothesis: EffectHypothesis) -> bool:
+    """Whether a column at the ticks contains accelerations, which jump there with the commands.
+
+    A step that ended with the acceleration of the next one was as one with a delay of half a sample: at 250 Hz 1 % of
+    the column of a mass, enough to tell what scales with the torque constant from it.
+    """
+    effect = hypothesis.here.effect
+    turned = isinstance(effect, Structure) and effect.form == "axis"
+    return turned or isinstance(effect, InertiaEffect | TransmissionElements)
 
 
 def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:

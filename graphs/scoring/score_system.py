@@ -65,6 +65,11 @@ class Segment:
         return ScoreSignals.between(self.problem, self.signals.x, self.calibration)
 
     @cached_property
+    def ends(self) -> ScoreSignals:
+        """As `ScoreSignals.at_ends`."""
+        return ScoreSignals.at_ends(self.problem, self.signals.x, self.calibration)
+
+    @cached_property
     def readings(self) -> list[SensorPart | None]:
         """What regressors of readings ask of every piece of `linearized`; None for pieces that are no channels."""
         pieces = zip(self.linearized, self.stamps, strict=True)
@@ -72,7 +77,7 @@ class Segment:
 
     def prepare(self) -> None:
         """Finds what all hypotheses need, before threads ask for it."""
-        _ = self.middle, self.readings
+        _ = self.middle, self.ends, self.readings
 
     def _reads(self, factor: Factor) -> bool:
         """Whether rows are channels of a sensor; of combinations of them, errors of channels are not known."""
@@ -171,7 +176,7 @@ def _add_dynamics(
         [i for i, c in enumerate(columns) if getattr(c, kind) is not None] for kind in ("at_ticks", "in_steps")
     )
     if at_ticks:
-        first, last = (_stacked([columns[i].at_ticks for i in at_ticks], ticks + end) for end in (0, 1))
+        first, last = (_at_ends([columns[i] for i in at_ticks], ticks, end) for end in (0, 1))
         between = _stacked([columns[i].between for i in at_ticks], ticks)
         if segment.middle is not None and between.shape[2] == len(at_ticks):
             by_size[:, :, at_ticks] = _simpson(factor.steps, first, last, between, segment.middle[1][ticks])
@@ -217,6 +222,12 @@ def _what_simpson_adds(
     simpson = SimpsonDynamics(factor.model, factor.steps, factor.joints)
     x = segment.signals.x
     return simpson.residual((x[ticks], x[ticks + 1]), segment.calibration) - linear.residual
+
+
+def _at_ends(columns: Sequence[Column], ticks: NDArray[np.intp], end: int) -> Array:
+    """Where some steps begin (end 0) or end (1), columns side by side, shape (s, r, k)."""
+    parts = [(c.at_ticks, ticks + end) if c.at_ends is None or end == 0 else (c.at_ends, ticks) for c in columns]
+    return np.stack([part[rows] for part, rows in parts if part is not None], axis=2)
 
 
 def _stacked(parts: Sequence[Array | None], ticks: NDArray[np.intp]) -> Array:

@@ -19,6 +19,7 @@ from jointscope.graphs.solving.solver_context import side_by_side
 Array = NDArray[np.float64]
 
 LONG = 20_000  # states of a recording from which memory is what is scarce
+AT_REST = 1e-9  # share of the cost, less than which inner states gain no more
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,11 @@ class RecordingStretch:
 
     Attributes:
         damping: Levenberg-Marquardt lambda of each state, relative to the diagonal, shape (m,).
+        inner_steps: at the most, after which inner states are at their minimum wherever the ends are put; with none
+            they follow by one linear step, as a solver needs, and the cost depends on where they were before.
     """
+
+    inner_steps = 0
 
     def __init__(
         self,
@@ -156,7 +161,20 @@ class RecordingStretch:
             self._trial = self._base
             x = self._following(first, last, calibration)
             self._trial = self._free_room().move(x, calibration, self.damping)
+            self._go_inside(first, last, calibration)
         return self._trial.cost
+
+    def _go_inside(self, first: Array, last: Array, calibration: Calibration) -> None:
+        """Takes the inner states to their minimum, while the ends stay."""
+        for _ in range(self.inner_steps):
+            before = self._trial
+            self._base, self._damped_with = before, self.damping
+            x = self._following(first, last, calibration)
+            self._trial = self._free_room().move(x, calibration, self.damping)
+            if not self._trial.cost < before.cost * (1.0 - AT_REST):
+                if not self._trial.cost < before.cost:
+                    self._trial = before
+                break
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""

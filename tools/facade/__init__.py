@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.robots.files.robot_writer import robot_text
     from jointscope.tools.bags.read_recording import read_recording
-    from jointscope.tools.notebook.calls import calibrate, compare, diagnose, discover, graph, read, replay, simulate
+    from jointscope.tools.notebook.calls import calibrate, compare, diagnose, discover, graph
     from jointscope.tools.notebook.models import add, export, info, remove
+    from jointscope.tools.notebook.recordings import read, replay, simulate
 
 __version__: str
 __all__ = [
@@ -43,9 +44,9 @@ __all__ = [
     "simulate",
 ]
 
-_CALLS = "tools.notebook.calls"
 _MODULES = {
-    **dict.fromkeys(("calibrate", "compare", "diagnose", "discover", "graph", "read", "replay", "simulate"), _CALLS),
+    **dict.fromkeys(("calibrate", "compare", "diagnose", "discover", "graph"), "tools.notebook.calls"),
+    **dict.fromkeys(("read", "replay", "simulate"), "tools.notebook.recordings"),
     **dict.fromkeys(("add", "export", "info", "remove"), "tools.notebook.models"),
     "CalibrationGraph": "graphs.calibration.calibration_graph",
     "FixedLagEstimator": "graphs.fixed_lag.estimator",

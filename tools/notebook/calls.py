@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from jointscope.graphs.discovery.discover import Save
 from jointscope.graphs.discovery.discover import discover as discover_motion
 from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
-from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
 from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
 from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
@@ -27,46 +25,26 @@ from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
 from jointscope.robots.errors import SolveError
-from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
-from jointscope.tools.bags.read_arrivals import ArrivalReader
-from jointscope.tools.bags.read_recording import read_recording
-from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.notebook.given import (
     AnyLimits,
     AnyRecording,
     AnyRobot,
+    AnyStretches,
     labelled,
     limits_of,
-    recording_of,
     recordings_of,
     robot_of,
     to_learn_from,
+    without_stretches,
 )
-from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered, Replayed, Simulated
-from jointscope.tools.notebook.robot_as_recorded import robot_as_recorded
-from jointscope.tools.simulator.simulation import simulate as simulate_motion
+from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
 from jointscope.tools.verb_parts.frequency_runs import read_all_shaken
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.pose_runs import weighted_poses
 from jointscope.tools.verb_parts.rest_runs import weighted_rests
 from jointscope.tools.verdicts.judgement import judge
-
-
-def read(bag: str | Path, robot: AnyRobot, *, leave_out: Sequence[tuple[float, float]] = ()) -> Recording:
-    """Reads what a robot needs from a bag, in SI units, each stream at its own times.
-
-    Args:
-        bag: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
-        robot: says which topics, fields, units and joint names.
-        leave_out: first and last second of each stretch in which something acted that does not belong to the robot.
-
-    Raises:
-        RecordingError: the bag cannot be read, or does not hold what the robot needs.
-    """
-    recording = read_recording(bag, robot_of(robot))
-    return recording.leaving_out(leave_out) if leave_out else recording
 
 
 def calibrate(
@@ -78,6 +56,7 @@ def calibrate(
     frequency: Sequence[str | Path] = (),
     sets: Sequence[SetProblem] = (),
     accept: AnyLimits = (),
+    leave_out: AnyStretches = (),
     biases_only: bool = False,
     solver: Solver = solve,
     progress: Progress | None = None,
@@ -92,6 +71,8 @@ def calibrate(
         frequency: bags in which the arm is shaken, one for each pose, for the same estimate.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
         accept: limits that the result must keep (docs/accept.md); `result.accepted` says whether it does.
+        leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
+            recording, or "BAG:T0:T1" as on the command line.
         biases_only: leave dynamics and mountings as they are.
         solver: minimises the cost of all samples.
         progress: called with a text and the share done, from 0 to 1.
@@ -101,7 +82,7 @@ def calibrate(
         SolveError: no convergence, or a value that nothing determines.
     """
     model, limits = robot_of(robot), limits_of(accept)
-    read_ones = recordings_of(recordings, model)
+    read_ones = without_stretches(recordings_of(recordings, model), leave_out)
     if rests or poses or frequency:
         model.need_link_dynamics()
     if model.free_links:
@@ -124,6 +105,7 @@ def compare(
     robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot],
     recording: AnyRecording,
     *,
+    leave_out: AnyStretches = (),
     accept: AnyLimits = (),
     progress: Progress | None = None,
 ) -> Compared:
@@ -132,6 +114,8 @@ def compare(
     Args:
         robots: one, several, or several with labels.
         recording: one that no model was fitted to.
+        leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
+            recording, or "BAG:T0:T1" as on the command line.
         accept: limits that each model must keep (docs/accept.md); `result.accepted` says whether they do.
         progress: called with a text and the share done, from 0 to 1.
 
@@ -142,7 +126,7 @@ def compare(
     models, limits = labelled(robots), limits_of(accept)
     check_same_streams(models)
     first = next(iter(models.values()))
-    (read_one,) = recordings_of([recording], first)
+    (read_one,) = without_stretches(recordings_of([recording], first), leave_out)
     found = (compare_links if first.free_links else compare_motion)(models, read_one, progress=progress)
     return Compared.of(found, acceptance=check_models(limits, found.to_json()["models"] if limits else {}))
 
@@ -152,6 +136,7 @@ def diagnose(
     recordings: AnyRecording | Sequence[AnyRecording],
     holdout: AnyRecording | None = None,
     *,
+    leave_out: AnyStretches = (),
     missing_torque: bool = True,
     accept: AnyLimits = (),
     side_by_side: SideBySide | None = None,
@@ -163,6 +148,8 @@ def diagnose(
         robot: is calibrated first.
         recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
         holdout: is scored and reported, and never chooses.
+        leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
+            recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that the model lacks, for the pictures.
         accept: limits that the model must keep (docs/accept.md); `result.accepted` says whether it does.
         side_by_side: processes that fit the candidates; this one alone if not given.
@@ -173,7 +160,7 @@ def diagnose(
         SolveError: the base model cannot be calibrated.
     """
     limits = limits_of(accept)
-    model, learnt, held = to_learn_from(robot, recordings, holdout)
+    model, learnt, held = to_learn_from(robot, recordings, holdout, leave_out)
     if model.free_links:
         found = diagnose_links(model, learnt, held, progress=progress)
     else:
@@ -189,6 +176,7 @@ def discover(
     recordings: AnyRecording | Sequence[AnyRecording],
     holdout: AnyRecording | None = None,
     *,
+    leave_out: AnyStretches = (),
     missing_torque: bool = True,
     save: Save | None = None,
     resume: Sequence[SavedStep] | None = None,
@@ -201,6 +189,8 @@ def discover(
         robot: the base model.
         recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
         holdout: is scored once per step, and never chooses.
+        leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
+            recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that each model lacks, for the pictures.
         save: called with the number of each finished step and the step; returns the robot file it wrote.
         resume: finished steps of an earlier run; the search goes on after the last.
@@ -211,32 +201,12 @@ def discover(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    model, learnt, held = to_learn_from(robot, recordings, holdout)
+    model, learnt, held = to_learn_from(robot, recordings, holdout, leave_out)
     options: dict[str, Any] = {"save": save, "resume": resume, "progress": progress}
     if model.free_links:
         return Discovered.of(discovery_of(discover_links(model, learnt, held, **options), learnt, held))
     options |= {"missing_torque": missing_torque, "side_by_side": side_by_side}
     return Discovered.of(discovery_of(discover_motion(model, learnt, held, **options), learnt, held))
-
-
-def replay(robot: AnyRobot, recording: AnyRecording, lag: float = 0.1) -> Replayed:
-    """Feeds a recording to the estimator of the control loop; a bag in the order in which it was received.
-
-    Args:
-        robot: calibrated.
-        recording: a bag, or a recording that was read.
-        lag: of the smoothed state [s].
-
-    Raises:
-        RecordingError: the recording cannot be a measurement of this robot.
-    """
-    model = robot_of(robot)
-    if not isinstance(recording, str | Path):
-        return Replayed.of(replay_messages(model, recording_of(recording, model), lag))
-    model, _ = robot_as_recorded(model, Path(recording))
-    arrivals = ArrivalReader(Path(recording), model)
-    found = replay_messages(model, arrivals, lag)
-    return Replayed.of(replace(found, source=arrivals.source(found.recording_seconds, model.name)))
 
 
 def graph(result: CalibrationResult | ArmCalibration, per_sample: bool = False) -> CalibrationGraph:
@@ -259,38 +229,6 @@ def graph(result: CalibrationResult | ArmCalibration, per_sample: bool = False) 
     if per_sample:
         raise SolveError("a factor for every sample (per_sample) takes recordings of motion only; leave it out")
     return arm_graph(result)
-
-
-def simulate(
-    robot: AnyRobot,
-    bag: str | Path | None = None,
-    *,
-    motion: str = "calibration",
-    seconds: float | None = None,
-    seed: int = 0,
-    effects: str | Iterable[str] = (),
-    **conditions: Any,
-) -> Simulated:
-    """A recording from an engine that is independent of the estimator's own model.
-
-    Args:
-        robot: the truth, where it has no published values.
-        bag: where to write the recording; nowhere if not given.
-        motion: "calibration", or "moves" to judge by.
-        seconds: duration [s]; 65 for the motion "calibration" and 30 for "moves" if not given.
-        seed: of robot, motion and noise; the same seed is the same robot.
-        effects: ID@OWNER[:param=value,...] that the robot has; one, or several.
-        conditions: everything else that `jointscope.tools.simulator.simulation.simulate` takes, as friction="smooth".
-
-    Raises:
-        SimulationError: MuJoCo is missing, or an option is impossible.
-    """
-    model = robot_of(robot)
-    hidden = [effects] if isinstance(effects, str) else effects
-    found = simulate_motion(model, motion, seconds, seed, effects=hidden, **conditions)
-    if bag is not None:
-        write_bag(Path(bag), found.recording, model)
-    return Simulated.of(found)
 
 
 def _quiet(text: str, share: float) -> None:

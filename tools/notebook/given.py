@@ -14,10 +14,12 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.limits import Limit, read_limits
 from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.presentation.left_out import leave_out as leave_out_texts
 from jointscope.tools.simulator.simulation import Simulation
 
 AnyRobot = Robot | CalibrationResult | Discovery | str | Path
 AnyRecording = Recording | Simulation | str | Path
+AnyStretches = Sequence[tuple[float, float] | str]
 AnyLimits = str | Path | Sequence[Limit]
 
 
@@ -60,7 +62,10 @@ def recordings_of(recordings: AnyRecording | Sequence[AnyRecording], robot: Robo
 
 
 def to_learn_from(
-    robot: AnyRobot, recordings: AnyRecording | Sequence[AnyRecording], holdout: AnyRecording | None
+    robot: AnyRobot,
+    recordings: AnyRecording | Sequence[AnyRecording],
+    holdout: AnyRecording | None,
+    leave_out: AnyStretches = (),
 ) -> tuple[Robot, list[Recording], Recording | None]:
     """The robot, what is learnt from, and what is held out.
 
@@ -72,7 +77,26 @@ def to_learn_from(
     held = None if holdout is None else recording_of(holdout, model)
     if held is not None and any(held.shares_samples_with(recording) for recording in learnt):
         raise RecordingError(f"{held.path} is held out and also learnt from; hold out one that the model has not seen")
-    return model, learnt, held
+    both = without_stretches([*learnt, *([] if held is None else [held])], leave_out)
+    return model, both[: len(learnt)], None if held is None else both[-1]
+
+
+def without_stretches(recordings: Sequence[Recording], leave_out: AnyStretches) -> list[Recording]:
+    """Recordings of which stretches are left out, as by --leave-out.
+
+    Args:
+        recordings: that were read.
+        leave_out: (t0, t1) [s] where there is one recording, or texts "[BAG:]T0:T1".
+
+    Raises:
+        RecordingError: a stretch is none, or is meant for none or several of the recordings.
+    """
+    texts = []
+    for stretch in leave_out:
+        if not isinstance(stretch, str) and not (isinstance(stretch, Sequence) and len(stretch) == 2):
+            raise RecordingError(f"leave_out: expected (t0, t1) [s] or 'BAG:T0:T1', got {_told(stretch)}")
+        texts.append(stretch if isinstance(stretch, str) else f"{float(stretch[0])!r}:{float(stretch[1])!r}")
+    return leave_out_texts(recordings, texts)
 
 
 def labelled(robots: AnyRobot | Sequence[AnyRobot] | Mapping[str, AnyRobot]) -> dict[str, Robot]:

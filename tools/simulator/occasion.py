@@ -220,5 +220,8 @@ def _check_seeds(*seeds: int) -> None:
 
 def _ticks(seconds: float) -> Array:
     if not 2.0 * MIN_REST <= seconds <= 24 * 3600.0:
-        raise SimulationError(f"seconds: expected {2 * MIN_REST:g} s to one day, got {seconds:g}")
+        raise SimulationError(
+            f"seconds: expected {2 * MIN_REST:g} s to one day, got {seconds:g}; it begins and ends at rest. "
+            "For less, simulate longer and cut the recording with `recording.between(t0, t1)`"
+        )
     return np.arange(round(seconds / TICK), dtype=np.float64) * TICK

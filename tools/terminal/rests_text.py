@@ -15,6 +15,7 @@ from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.robots.model.command_words import bag_arguments, robot_argument
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.relative_sigma import relative_sigma
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
@@ -85,7 +86,7 @@ def verdict(result: RestCalibration) -> str:
     told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
     loose = [p for p in told if p.sigma > LOOSE * p.value]
     if loose:
-        names = ", ".join(f"{p.name} (+-{significant(100 * p.sigma / p.value, 2)} %)" for p in loose)
+        names = ", ".join(f"{p.name} ({relative_sigma(p.sigma / abs(p.value))})" for p in loose)
         so = "No, do not rely on this yet" if len(loose) == len(told) else "Usable, with reservations"
         return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}."
     if error > AS_EXPECTED or _widened(result)[1] > WIDENED:

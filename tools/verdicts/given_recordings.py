@@ -14,6 +14,7 @@ from jointscope.robots.model.command_words import edited_argument, robot_argumen
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 
+MOST_READINGS = 4
 RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, and what it did between them is not known
 
 
@@ -25,9 +26,36 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
     if (changed := result.asked.changed) is not None:
         name, sentence = ("Nothing pushes", _push) if changed.push else ("One load throughout", _two_loads)
         found.append((name, sentence(changed, result)))
+    if result.torque_readings:
+        found.append(("Torque sensors as the robot file has them", _readings(result)))
     if rare := rare_samples(result):
         found.append(("Samples often enough", rare))
     return found
+
+
+def _readings(result: CalibrationResult) -> str:
+    """A sentence on scales and offsets of torque sensors that the robot file lacks, with the lines to add."""
+    told = result.torque_readings[:MOST_READINGS]
+    listed = ", ".join(
+        f"{one.parameter} {significant(one.value)} ± {significant(one.sigma, 1)}{'' if one.unit == '1' else ' N m'}"
+        for one in told
+    )
+    more = len(result.torque_readings) - len(told)
+    lines = " ".join(
+        f"`{one.parameter}: {{value: {1.0 if one.unit == '1' else 0.0}, unit: {_unit(one.unit)}, "
+        f"positive: {'true' if one.unit == '1' else 'false'}, "
+        f"prior_sigma: {0.1 if one.unit == '1' else significant(3.0 * max(abs(one.value), 1.0), 1)}}}`"
+        for one in told
+    )
+    return (
+        f"The recording asks for {listed}{f' and {more} more' if more else ''}, by one linear step, and "
+        f"{result.start.path.name} has no free parameter for them: springs and friction bend to such readings. Add "
+        f"under parameters: {lines}; then calibrate again."
+    )
+
+
+def _unit(unit: str) -> str:
+    return f"'{unit}'" if unit == "1" else unit
 
 
 def rare_samples(result: CalibrationResult) -> str:

@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.found_values import share_of_value
 from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.robots.geometry.error_parameters import is_geometry
+from jointscope.robots.parts.relative_sigma import NOT_DETERMINED, relative_sigma
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
-from jointscope.tools.verdicts.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
+from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
+from jointscope.tools.verdicts.priors.far_from_priors import far_from_priors
+from jointscope.tools.verdicts.priors.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.same_values import same_by_regression, same_values
 from jointscope.tools.verdicts.short_steps import short_steps
@@ -90,12 +94,14 @@ def judge(result: CalibrationResult) -> Judgement:
         _determined(result),
         Check(held[0], "Values from data, not from priors", held[1]),
     ]
+    far = far_from_priors(result)
     signs = (_noise_as_stated(result), _white(result), *([] if result.robot.free_links else [_even(result)]))
     checks = (
         *(Check("bad", name, text) for name, text in reasons),
         *signs,
         *_agreeing(signs),
         *(_consequences(about_values) if reasons else about_values),
+        Check(far[0], AS_EXPECTED_BY_PRIORS, far[1]),
         _honest_sigmas(result),
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         Check(*same_by_regression(result)),
@@ -201,11 +207,13 @@ def _determined(result: CalibrationResult) -> Check:
     name = "Every parameter determined by the motion"
     open_by = _typically_open(result)
     if open_by > UNDETERMINED:
+        spread = relative_sigma(open_by, "±")
+        known = spread if spread == NOT_DETERMINED else f"only known to {spread}"
         return Check(
             "bad",
             name,
-            f"Typical values are only known to ±{significant(100 * open_by, 2)} %: the recording tells their ratios at "
-            "best. Hold one that you know with `fixed: true` in the robot file, or record more.",
+            f"Typical values are {known}: the recording tells their ratios at best. Hold one that you know with "
+            "`fixed: true` in the robot file, or record more.",
         )
     weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]
     if weak:
@@ -219,7 +227,8 @@ def _typically_open(result: CalibrationResult) -> float:
     """Median relative sigma of the dynamic parameters."""
     free = [p for p in result.parameters if not (is_mounting_or_bias(p) or is_geometry(p.name)) and p.value]
     free = [p for p in free if p.unit not in ("s", "s^2")]
-    return float(np.median([p.sigma / abs(p.value) for p in free])) if free else 0.0
+    shares = [share for p in free if (share := share_of_value(result.robot, p)) is not None]
+    return float(np.median(shares)) if shares else 0.0
 
 
 def _honest_sigmas(result: CalibrationResult) -> Check:
@@ -258,7 +267,7 @@ def equation_names(result: CalibrationResult) -> list[str]:
 def largest_relative_sigma(result: CalibrationResult) -> tuple[str, float]:
     """The dynamic parameter with the largest sigma relative to its value, and that share; times have none."""
     told = [p for p in result.parameters if p.value and p.unit not in ("s", "s^2") and not is_mounting_or_bias(p)]
-    shares = {p.name: p.sigma / abs(p.value) for p in told}
+    shares = {p.name: share for p in told if (share := share_of_value(result.robot, p)) is not None}
     if not shares:
         return "", float("nan")
     worst = max(shares, key=lambda name: shares[name])

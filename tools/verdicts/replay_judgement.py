@@ -4,18 +4,20 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
+from jointscope.graphs.fixed_lag.replay.nis_windows import nis_bounds
+from jointscope.graphs.fixed_lag.replay.replay_result import InnovationSeries, ReplayResult
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.verdicts.judgement import LEVELS, Check, Judgement
 
 NIS = (1.25, 2.0)  # per degree of freedom: fine up to the first, bad beyond the second
 SMALL_NIS = (0.8, 0.4)  # below the first the sigmas are larger than they need be; a quantized encoder at rest is there
 ANSWERS = {
-    "good": "Yes: the estimate is as accurate as its sigmas say.",
+    "good": "Yes: the estimate is as accurate as its sigmas say.",  # or better, which is a remark
     "warn": "With reservations: the sigmas do not hold everywhere.",
     "bad": "No: model and measurements contradict each other.",
 }
@@ -96,9 +98,10 @@ def _consistent(result: ReplayResult) -> Check:
     level, nis = nis_level(result.nis_mean), significant(result.nis_mean)
     for series in result.innovations.values():
         own = nis_level(series.nis_mean)
-        level = own if series.nis_mean > 1.0 and LEVELS.index(own) > LEVELS.index(level) else level
+        worse = series.nis_mean > nis_bounds(series)[1] and LEVELS.index(own) > LEVELS.index(level)
+        level = own if worse else level
     off = suspects(result)
-    by_sensor = ", ".join(f"{n} {significant(s.nis_mean)}" for n, s in result.innovations.items())
+    by_sensor = ", ".join(f"{n} {_with_bounds(s)}" for n, s in result.innovations.items())
     text = f"NIS per degree of freedom is {nis} (1 is expected): {by_sensor}."
     if off:
         worst = off[0]
@@ -107,8 +110,30 @@ def _consistent(result: ReplayResult) -> Check:
         text += f"; {worst.sensor} raised {worst.alarms} alarm{'s' * (worst.alarms != 1)}." if worst.alarms else "."
     elif level != "good" and np.isfinite(result.nis_mean):
         larger = "The noise is larger than stated, or the model misses something."
-        text += f" {larger}" if result.nis_mean > 1.0 else " The sigmas are larger than they need be."
+        text += f" {larger}" if result.nis_mean > 1.0 else ""
+    small = [(n, s) for n, s in result.innovations.items() if s.nis_mean < min(SMALL_NIS[0], nis_bounds(s)[0])]
+    if small:
+        level = "info" if level == "good" else level
+        text += f" {_too_wide(result, small)}"
     return Check(level, name, text)
+
+
+def _with_bounds(series: InnovationSeries) -> str:
+    """NIS of a sensor beside what chance allows."""
+    low, high = nis_bounds(series)
+    return f"{significant(series.nis_mean)} ({significant(low, 2)} to {significant(high, 2)} by chance)"
+
+
+def _too_wide(result: ReplayResult, small: Sequence[tuple[str, InnovationSeries]]) -> str:
+    """What sigmas that are wider than the errors mean, and what to do about them."""
+    listed = ", ".join(
+        f"{n} are {significant(1.0 / np.sqrt(max(s.nis_mean, 1e-6)), 2)} times as wide as its errors" for n, s in small
+    )
+    return (
+        f"Sigmas of {listed}: the estimate is better than it says, and trusts that sensor less than it could. "
+        f"Calibrate with `noise: {{estimate: true}}`, or give {' and '.join(f'sensors.{n}' for n, _ in small)} in "
+        f"{result.robot.path.name} the sigma of its noise; one that is quantized and mostly at rest may stay so."
+    )
 
 
 def _samples(result: ReplayResult) -> Check:

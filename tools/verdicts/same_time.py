@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.verdicts.one_step import would_be
+from jointscope.tools.presentation.one_step import would_be
 
 FAR = 0.02  # share of a value by which a delay that is not in the model may change it
 

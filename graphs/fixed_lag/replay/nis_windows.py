@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 WINDOW = 0.25  # [s]
 FEWEST = 25  # innovations in a window
 INSIDE = 0.999  # probability of the bounds, for each window
+MOST_LAGS = 200  # samples over which neighbours are looked at
 
 
 @dataclass(frozen=True)
@@ -69,3 +70,27 @@ class NisWindows:
             channels = np.column_stack([summed(column) / count for column in squares.T])
             low, high = (chdtri(dof, 0.5 * (1.0 - s * INSIDE)) / dof for s in (-1.0, 1.0))
         return NisWindows(t[0] + (np.arange(w) + 0.5) * window, sensor, channels, low, high)
+
+
+def nis_bounds(series: InnovationSeries) -> tuple[float, float]:
+    """Between which the mean NIS of a consistent sensor lies but for one recording in a thousand.
+
+    A chi-square with as many degrees of freedom as there are independent ones: neighbours that are alike count less.
+    """
+    dof = series.dof_sum / max(_memory(series.nis[series.used] / np.maximum(series.dof[series.used], 1.0)), 1.0)
+    if not dof > 0.0:
+        return 0.0, float("inf")
+    return float(chdtri(dof, 0.5 * (1.0 + INSIDE)) / dof), float(chdtri(dof, 0.5 * (1.0 - INSIDE)) / dof)
+
+
+def _memory(values: Array) -> float:
+    """How many neighbours say the same: 1 + 2 times the sum of the autocorrelation up to where it ends."""
+    values = values[np.isfinite(values)]
+    values = values - np.mean(values) if len(values) else values
+    power, found = float(values @ values), 1.0
+    for lag in range(1, min(MOST_LAGS, len(values) // 4)):
+        correlation = float(values[lag:] @ values[:-lag]) / max(power, 1e-300)
+        if correlation < 2.0 / np.sqrt(len(values)):
+            break
+        found += 2.0 * correlation
+    return found

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.fixed_lag.window.past_tick import PastTick
 from jointscope.graphs.fixed_lag.window.smoother_window import Rows
+from jointscope.graphs.gtsam_solvers.users_factor import what_is_wrong
 from jointscope.robots.errors import EstimatorError
 
 Array = NDArray[np.float64]
@@ -68,17 +69,14 @@ def rows_of(factor: gtsam.NonlinearFactor, ticks: list[PastTick], estimate: Call
     values, states = gtsam.Values(), [estimate(tick) for tick in ticks]
     for tick, x in zip(ticks, states, strict=True):
         values.insert(tick_key(tick.number), x)
-    try:
-        linear = factor.linearize(values)
-        A, b = linear.jacobian()
-    except Exception as err:  # whatever the user's own function raises
-        reason = " ".join(str(err).split())[:160]
+    sizes = {key: len(states[0]) for key in factor.keys()}
+    if wrong := what_is_wrong(factor, values, sizes, gtsam.DefaultKeyFormatter):
         raise EstimatorError(
-            f"the factor on {', '.join(f'x{t.number}' for t in ticks)} cannot be linearised ({type(err).__name__}: "
-            f"{reason}); expected rows on states of {len(states[0])} numbers: the robot's layout, then gyro biases"
-        ) from err
-    if not (np.all(np.isfinite(A)) and np.all(np.isfinite(b))):
-        raise EstimatorError(f"the factor on x{ticks[0].number} gives numbers that are not finite; it was left out")
+            f"the factor on {', '.join(f'x{t.number}' for t in ticks)} {wrong}; it was left out (a state has "
+            f"{len(states[0])} numbers: the robot's layout, then gyro biases)"
+        )
+    linear = factor.linearize(values)
+    A, b = linear.jacobian()
     size, order = len(states[0]), [gtsam.Symbol(key).index() for key in linear.keys()]
     by_number = {tick.number: x - tick.nominal for tick, x in zip(ticks, states, strict=True)}
     parts = tuple(np.asfortranarray(A[:, i * size : (i + 1) * size]) for i in range(len(order)))

@@ -44,6 +44,7 @@ class Column:
 
     Attributes:
         at_ticks: accelerations at the ticks, shape (m + 1, r); None for none.
+        at_ends: the same where each step ends, shape (m, r); None where it is that of the next tick.
         between: the same in the middle of each step, shape (m, r); None where it was not looked at.
         in_steps: accelerations held over the steps, shape (m, r); None for none.
         reading: error of readings, shape (s, r) for a SensorPart; None for none.
@@ -51,6 +52,7 @@ class Column:
     """
 
     at_ticks: Array | None = None
+    at_ends: Array | None = None
     in_steps: Array | None = None
     reading: SensorColumn | None = field(default=None, repr=False)
     better_integrator: bool = False

@@ -68,9 +68,15 @@ class ScoreSignals:
 
     @staticmethod
     def of(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
-        """From a solved recording."""
-        u = problem.dynamics.command(calibration.values)
-        return ScoreSignals._at(problem, problem.timeline.ticks, x, u, calibration)
+        """From a solved recording, each tick with the command of the step that begins there."""
+        u, sliding = problem.dynamics.command(calibration.values), problem.dynamics.steps.at_ticks
+        return ScoreSignals._at(problem, problem.timeline.ticks, x, np.vstack([u, u[-1:]]), calibration, sliding)
+
+    @staticmethod
+    def at_ends(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
+        """The same where each of the m steps ends, with the command of that step: accelerations jump with commands."""
+        u, sliding = problem.dynamics.command(calibration.values), problem.dynamics.steps.ends
+        return ScoreSignals._at(problem, problem.timeline.ticks[1:], x[1:], u, calibration, sliding)
 
     @staticmethod
     def between(problem: BagProblem, x: Array, calibration: Calibration) -> tuple[ScoreSignals, Array]:
@@ -80,19 +86,28 @@ class ScoreSignals:
             Motion at m middles, and derivatives, shape (m, r, r).
         """
         model, ticks, dynamics = problem.dynamics.model, problem.timeline.ticks, problem.dynamics
-        u = dynamics.command(calibration.values)
-        ends = [model.accelerations(part, u, calibration.values) for part in (x[:-1], x[1:])]
+        u, steps, p = dynamics.command(calibration.values), dynamics.steps, calibration.values
+        pairs = ((x[:-1], steps.begins), (x[1:], steps.ends))
+        ends = [model.accelerations(part, u, p, sliding) for part, sliding in pairs]
         assert isinstance(dynamics, SimpsonDynamics)
-        middle = dynamics.middle(x[:-1], x[1:], *ends)
-        found = model.with_derivatives(middle, u, calibration.values).by_state[:, :, model.layout.rates]
-        return ScoreSignals._at(problem, 0.5 * (ticks[:-1] + ticks[1:]), middle, u[:-1], calibration), found
+        middle, sliding = dynamics.middle(x[:-1], x[1:], *ends), steps.throughout
+        found = model.with_derivatives(middle, u, p, None, sliding).by_state[:, :, model.layout.rates]
+        times = 0.5 * (ticks[:-1] + ticks[1:])
+        return ScoreSignals._at(problem, times, middle, u, calibration, sliding), found
 
     @staticmethod
-    def _at(problem: BagProblem, ticks: Array, x: Array, u: Array, calibration: Calibration) -> ScoreSignals:
+    def _at(
+        problem: BagProblem,
+        ticks: Array,
+        x: Array,
+        u: Array,
+        calibration: Calibration,
+        sliding: Array | None,
+    ) -> ScoreSignals:
+        """From states with the command that acts at each, shape (m + 1, n)."""
         model, parameters = problem.dynamics.model, calibration.values
         values, layout = model.named(parameters), model.layout
-        both = np.vstack([u, u[-1:]])
-        here = model.with_derivatives(x, both, parameters)
+        here = model.with_derivatives(x, u, parameters, None, sliding)
         springs, transmission = model.springs(x, values), Transmission.of(problem.robot)
         weight = CarriedWeight(problem.robot).torque(x, values)
         return ScoreSignals(
@@ -107,7 +122,7 @@ class ScoreSignals:
             rate=np.gradient(x, ticks, axis=0, edge_order=2),
             a_link=here.value[:, : layout.n_link],
             M_inverse=here.rigid.by_torque,
-            u=u,
+            u=u[:-1],
             response=model.command_response(here, parameters)[:-1],
             stiffness=springs.stiffness,
             damping=springs.damping,

@@ -103,3 +103,80 @@ def test_a_users_factor_without_a_finite_error_is_named(calibrated, value):
     for ask in (graph.optimize, graph.without_states):
         with pytest.raises(SolveError, match=rf"^factor {last} on .* expected a finite one"):
             ask()
+
+
+def _shaped(key, rows, columns, error=0.0, failing=""):
+    """A user's factor with a mistake: a Jacobian of some shape, or a function that fails."""
+
+    def work(this, values, H):
+        if failing:
+            raise ValueError(failing)
+        if H is not None:
+            H[0] = np.asfortranarray(np.ones((rows, columns)))
+        return np.full(1, error)
+
+    return gtsam.CustomFactor(gtsam.noiseModel.Isotropic.Sigma(1, 1.0), [key], work)
+
+
+@pytest.mark.parametrize(
+    ("block", "factor", "said"),
+    [
+        ("dynamics", lambda k: _shaped(k, 1, 3), r"Jacobian H\[0\] of shape \(1, 3\) by dynamics; expected \(1, 12\)"),
+        (
+            "dynamics",
+            lambda k: _shaped(k, 2, 12),
+            r"of shape \(2, 12\) by dynamics; expected \(1, 12\): a row for each",
+        ),
+        ("imu1.rotation", lambda k: _shaped(k, 1, 9), r"of shape \(1, 9\) by imu1.rotation; expected \(1, 3\)"),
+        (
+            "dynamics",
+            lambda k: _shaped(k, 1, 12, failing="my bug"),
+            r"cannot be evaluated \(ValueError: my bug\); correct",
+        ),
+        (
+            "imu1.rotation",
+            lambda k: gtsam.PriorFactorVector(k, np.zeros(3), gtsam.noiseModel.Unit.Create(3)),
+            r"cannot be evaluated \(RuntimeError: Attempting to retrieve value with key \"r0\"",
+        ),
+    ],
+)
+def test_a_users_factor_that_does_not_fit_its_variable_is_named(calibrated, block, factor, said):
+    graph = CalibrationGraph.of(calibrated)
+    graph.graph.add(factor(graph.keys[block]))
+    for ask in (graph.optimize, graph.without_states, lambda: graph.sigmas(graph.values)):
+        with pytest.raises(SolveError, match=rf"^factor {graph.own} on .*{said}"):
+            ask()
+
+
+def test_a_variable_that_nothing_determines_is_named(calibrated):
+    graph = CalibrationGraph.of(calibrated)
+    graph.values.insert(gtsam.symbol("q", 7), np.zeros(2))
+    first = gtsam.PriorFactorVector(
+        gtsam.symbol("q", 7), np.zeros(2), gtsam.noiseModel.Diagonal.Precisions(np.eye(2)[0])
+    )
+    graph.graph.add(first)
+    with pytest.raises(SolveError, match=r"nothing determines q7 \(q7\) where it was eliminated; add a factor on it"):
+        graph.sigmas(graph.values)
+
+
+def test_a_name_that_is_no_variable_is_told_with_those_that_are(calibrated):
+    with pytest.raises(SolveError, match=r"no variable 'imu9.bias' in the graph; it has dynamics, imu1.rotation"):
+        CalibrationGraph.of(calibrated).keys["imu9.bias"]
+
+
+def test_an_error_depends_on_the_values_alone_and_not_on_what_was_asked_before(calibrated):
+    """Inner states that follow by one linear step from where they were differ where friction reverses, by 3e-4."""
+    graph, rng = CalibrationGraph.of(calibrated), np.random.default_rng(1)
+
+    def moved():
+        values, key = gtsam.Values(graph.values), graph.keys["dynamics"]
+        here = values.atVector(key)
+        values.update(key, here + 0.01 * rng.standard_normal(len(here)))
+        return values
+
+    here, there = moved(), moved()
+    at_start = graph.graph.error(graph.values)
+    first = graph.graph.error(here)
+    graph.graph.linearize(there)
+    assert graph.graph.error(here) == pytest.approx(first, rel=1e-8)
+    assert graph.graph.error(graph.values) == pytest.approx(at_start, rel=1e-8)

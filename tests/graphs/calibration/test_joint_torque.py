@@ -19,6 +19,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.sensors import TorqueSensor
 from jointscope.robots.recordings.screening import screen
+from jointscope.tools.verdicts.judgement import judge
 
 TRUE = {"torque.scale_joint1": 1.08, "torque.offset_joint2": 0.7}
 SIGMA = 0.05  # [N m]
@@ -126,3 +127,15 @@ def test_a_sensor_that_says_nothing_is_refused_in_one_line(robot, made):
     dead = replace(stream, values=np.zeros_like(stream.values))
     with pytest.raises(RecordingError, match="joint_torque never changes"):
         screen(replace(made.recording, streams={**made.recording.streams, "torque": dead}), robot)
+
+
+def test_a_scale_and_an_offset_that_the_robot_file_lacks_are_named(robot, made, result):
+    assert result.torque_readings == ()
+    plain = replace(robot, parameters={n: p for n, p in robot.parameters.items() if n not in TRUE})
+    found = calibrate(plain, [made.recording])
+    told = {one.parameter: one for one in found.torque_readings}
+    assert set(told) >= set(TRUE) and abs(told["torque.offset_joint2"].value - 0.7) < 0.2
+    judgement = judge(found)
+    assert judgement.level == "bad"
+    assert "Torque sensors as the robot file has them" in judgement.answer
+    assert "`torque.offset_joint2: {value: 0.0, unit: N m, positive: false, prior_sigma: 3}`" in judgement.answer

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,8 @@ from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.findings import findings
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.robots.files.effects_at_once import add_effects
-from jointscope.tools.verdicts.held_values import values_from_data
 from jointscope.tools.verdicts.judgement import Judgement, judge
+from jointscope.tools.verdicts.priors.held_values import values_from_data
 
 NOISE, MEMORY = "Residuals as large as the sensor noise", "Residuals without memory"
 HELD = "Values from data, not from priors"
@@ -110,7 +111,7 @@ def test_every_check_is_there_for_machines_with_its_reason(good):
     judgement = judge(with_chi2(good, 4.0))
     content = judgement.to_json()
     assert content["verdict"] == {"level": "bad", "text": judgement.headline}
-    assert len(content["checks"]) == len(judgement.checks) == 12
+    assert len(content["checks"]) == len(judgement.checks) == 13
     (noise,) = (check for check in content["checks"] if check["name"] == NOISE)
     assert noise["verdict"] == "bad" and noise["why"].startswith(f"{CHANNEL} has χ² per sample 4")
 
@@ -219,3 +220,16 @@ def test_two_doubtful_signs_together_are_no_reservation(good):
 def test_steps_in_which_friction_stops_a_light_joint_are_told(good, shifts, expected):
     judged = judge(dataclasses.replace(good, inertia_shifts=shifts))
     assert level(judged, "Steps short enough") == expected
+
+
+def test_a_value_that_may_as_well_be_zero_has_no_share_but_is_not_determined(good):
+    lost = with_parameter(good, "joint2.stiffness", value=1e-160, sigma=0.1)
+    said = next(text for text in findings(lost) if "parameters from" in text)
+    assert said.endswith("worst joint2.stiffness, not determined") and "e+" not in said
+    near_zero = dataclasses.replace(lost.robot.parameters["joint2.stiffness"], positive=False)
+    lever = dataclasses.replace(
+        lost, robot=dataclasses.replace(lost.robot, parameters={**lost.robot.parameters, near_zero.name: near_zero})
+    )
+    assert not any("not determined" in text for text in findings(lever))  # 0.1 is far less than its prior's sigma
+    known = next(text for text in findings(good) if "parameters from" in text)
+    assert re.search(r"typically \+-[\d.]+ %, worst \S+ with \+-[\d.]+ %$", known)

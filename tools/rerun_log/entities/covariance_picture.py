@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.tools.presentation.numbers import percent, with_sigma
+from jointscope.graphs.calibration.found_values import share_of_value
+from jointscope.robots.parts.relative_sigma import relative_sigma
+from jointscope.tools.presentation.numbers import with_sigma
 from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 
 if TYPE_CHECKING:
@@ -80,6 +82,7 @@ def parameter_table(result: CalibrationResult) -> str:
     lines = ["| parameter | value | ± sigma | relative | unit | note |", "| --- | ---: | ---: | ---: | --- | --- |"]
     for p in result.parameters:
         value, sigma = with_sigma(p.value, p.sigma)
-        share = percent(p.sigma / abs(p.value)) if p.value and p.name in result.robot.parameters else ""
+        told = share_of_value(result.robot, p) if p.name in result.robot.parameters else None
+        share = "" if told is None else relative_sigma(told, "")
         lines.append(f"| {p.name} | {value} | {sigma} | {share} | {p.unit} | {p.note.replace('|', '/')} |")
     return "\n".join(lines)

@@ -12,7 +12,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult, 
 from jointscope.robots.parts.sensors import Gyro
 from jointscope.tools.presentation.numbers import minus, with_sigma
 from jointscope.tools.report.page.page import Section, foldable, table
-from jointscope.tools.verdicts.held_values import is_held
+from jointscope.tools.verdicts.priors.held_values import is_held
 
 
 def mounting(result: CalibrationResult) -> Section:

@@ -7,9 +7,10 @@ import math
 from html import escape
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.robots.parts.relative_sigma import KNOWN
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.report.page.page import Section, table
-from jointscope.tools.verdicts.held_values import is_held, is_mounting_or_bias
+from jointscope.tools.verdicts.priors.held_values import is_held, is_mounting_or_bias
 
 BAR = 84  # [px]
 LADDER = 150  # [px]
@@ -74,7 +75,7 @@ def _share_bar(share: float) -> str:
         f'<svg width="{BAR + 70}" height="16" class="{tone} tone">'
         f'<rect class="faint" x="0" y="4" width="{BAR}" height="8"/>'
         f'<rect class="fill" x="0" y="4" width="{length:.1f}" height="8"/>'
-        f'<text class="name" x="{BAR + 6}" y="8.5">{percent(share)}</text></svg>'
+        f'<text class="name" x="{BAR + 6}" y="8.5">{percent(share) if share <= KNOWN else "&gt; 100 %"}</text></svg>'
     )
 
 

@@ -8,7 +8,8 @@ from html import escape
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.robots.parts.relative_sigma import relative_sigma
+from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.page import Section, foldable, sentence
 from jointscope.tools.verdicts.judgement import Check, judge, largest_relative_sigma
 
@@ -47,7 +48,7 @@ def _big_numbers(result: CalibrationResult) -> str:
     start = f"cost {significant(costs[0])} → {significant(costs[-1])} in {len(costs)} steps" if costs else ""
     figures = [
         (significant(float(np.mean(chi2))) if chi2 else "—", "mean χ² per sample over all channels; 1 is expected"),
-        (f"±{percent(share)}" if name else "—", f"least certain dynamic parameter: {name}"),
+        (relative_sigma(share, "±") if name else "—", f"least certain dynamic parameter: {name}"),
         (f"{result.samples:,}".replace(",", " "), f"samples in {significant(result.recording_seconds)} s of recording"),
         (f"{significant(result.wall_seconds)} <small>s</small>", f"to calibrate; {start}"),
     ]
