@@ -18,10 +18,11 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.band_posterior import band_posterior
-from jointscope.graphs.rests.doubts import Doubt, doubts
+from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.settling import settled
+from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -53,6 +54,7 @@ class RestCalibration:
         silent: names of the parameters of which they say nothing.
         covariance: of the values of all free parameters, shape (p, p).
         doubts: what would make the rests far likelier.
+        unnoticed: how wrong masses and loads may be before they contradict; empty of robots with springs.
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.
@@ -69,6 +71,7 @@ class RestCalibration:
     silent: tuple[str, ...]
     covariance: Array
     doubts: tuple[Doubt, ...]
+    unnoticed: tuple[Unnoticed, ...]
     before: RestErrors
     errors: RestErrors
     iterations: int
@@ -137,6 +140,7 @@ def calibrate_rests(
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known
     ]  # fmt: skip
+    asked = AskedOfRests.of(whole, robot, x, likeliest)
     report("done", 1.0)
     return RestCalibration(
         robot=found,
@@ -148,7 +152,8 @@ def calibrate_rests(
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
         covariance=covariance * np.outer(scale, scale),
-        doubts=doubts(whole, robot, x, likeliest),
+        doubts=asked.doubts() if asked else (),
+        unnoticed=unnoticed(asked, robot) if asked else (),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,

@@ -74,6 +74,7 @@ def test_a_band_that_closes_at_a_rest_is_told_and_not_waited_for():
         nothing,
         np.eye(1),
         np.zeros(1),
+        np.zeros(1),
         np.zeros((0, 1)),
         np.zeros(0),
         np.eye(1),
