@@ -21,6 +21,7 @@ from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.settling import settled
 from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
@@ -79,6 +80,13 @@ class RestCalibration:
     wall_seconds: float
 
     @property
+    def seen(self) -> SeenRests:
+        """What the rests say, as a calibration with motion has it."""
+        return SeenRests(
+            self.robot, self.start, self.problems, self.parameters, self.errors, self.doubts, self.unnoticed
+        )
+
+    @property
     def sets(self) -> tuple[tuple[RestSet, Array], ...]:
         """The rests of each recording with their states, as a calibration with motion has them."""
         return tuple(zip(self.problems, self.states, strict=True))
@@ -102,6 +110,7 @@ class RestCalibration:
             "parameters": table | derived,
             "undetermined": list(self.silent),
             "doubts": [{"label": d.label, "chi2_falls_by": d.fall, "p_value": d.p_value} for d in self.doubts],
+            "unnoticed": {u.label: u.share if np.isfinite(u.share) else None for u in self.unnoticed},
             "repeatability": dict(zip(self.robot.joints, self.problems[0].repeatability.tolist(), strict=True)),
             "channels": self.errors.to_json(self.robot),
         }

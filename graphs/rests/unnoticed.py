@@ -45,7 +45,7 @@ def unnoticed(asked: AskedOfRests, robot: Robot) -> tuple[Unnoticed, ...]:
     tree, found = robot.tree.model, []
     for label, columns in asked.groups.items():
         effect, _, owner = label.partition("@")
-        if effect in ("link_mass", "load_scale"):
+        if effect == "link_mass" or (effect == "load_scale" and np.any(asked.linear.Y[:, columns])):
             whole = float(tree.inertias[tree.getJointId(owner)].mass) if effect == "link_mass" else 1.0
             if whole > 0.0:
                 share = _hidden_share(asked, columns[:1], whole)

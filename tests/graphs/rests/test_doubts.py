@@ -15,7 +15,7 @@ from scipy.stats import beta, kstest
 
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 WEIGHT = 2.0 * 9.81 * 0.3  # [N m] of the rod and what is on it, where it is level
 

@@ -3,29 +3,27 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.doubts import PLACE, Doubt
+from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.robots.model.command_words import bag_arguments, robot_argument
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.rests.not_told import from_one_side
 
 SURE = 1e-3  # probability by chance, from which a doubt is none any more
 NEAR = 10.0  # chi2 by which others may fall less and be named as well
 MOST = 3
-ONE_SIDED = 0.05  # share of the rests of a motor whose friction holds the other way
 
 
-def doubts_said(result: RestCalibration) -> str:
+def doubts_said(seen: SeenRests) -> str:
     """The verdict where rests ask for another model; empty where they do not."""
-    if not result.doubts:
+    if not seen.doubts:
         return ""
-    first = result.doubts[0]
-    named = [d for d in result.doubts if d.fall > first.fall - NEAR][:MOST]
+    first, sides = seen.doubts[0], from_one_side(seen)
+    named = [d for d in seen.doubts if d.fall > first.fall - NEAR][:MOST]
     so = "No, do not rely on this yet" if first.p_value < SURE else "Usable, with reservations"
     return (
         f"{so}: these rests are far likelier (chi2 falls by {significant(first.fall, 2)}, p = {first.p_value:.0e}) if "
-        f"{', or '.join(_said(doubt) for doubt in named)}{_one_sided(result)}; {_next(result, named)}."
+        f"{', or '.join(_said(doubt) for doubt in named)}{sides and f'; {sides}'}; {_next(seen, named)}."
     )
 
 
@@ -41,23 +39,10 @@ def _said(doubt: Doubt) -> str:
     }[effect]
 
 
-def _one_sided(result: RestCalibration) -> str:
-    """Joints that always came to rest from the same side: weight and friction are one there."""
-    found = []
-    for j, joint in enumerate(result.robot.joints):
-        held = result.errors.held[:, j]
-        held = held[np.isfinite(held)]
-        if len(held) and min(np.mean(held > 0.0), np.mean(held < 0.0)) <= ONE_SIDED:
-            found.append(joint)
-    if not found:
-        return ""
-    return f"; {', '.join(found)} held the same way at every rest: let it come to postures from both sides"
-
-
-def _next(result: RestCalibration, named: list[Doubt]) -> str:
+def _next(seen: SeenRests, named: list[Doubt]) -> str:
     """What to do about it."""
-    bags = bag_arguments(problem.rests.path for problem in result.problems)
-    command = f"`jointscope diagnose {robot_argument(result.start)} --rests {bags}`"
+    bags = bag_arguments(problem.rests.path for problem in seen.problems)
+    command = f"`jointscope diagnose {robot_argument(seen.start)} --rests {bags}`"
     if all(doubt.label.startswith(PLACE) for doubt in named):
         return "nothing in the catalogue holds that: calibrate from rests near the postures that you need"
     return f"weigh, correct, and calibrate again; {command} ranks what may be missing"
