@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from jointscope.graphs.rests.seen_rests import SeenRests
 
 Array = NDArray[np.float64]
 
@@ -179,6 +182,7 @@ class CalibrationResult:
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
+        rests: what rests in the same estimate say; None without.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -209,6 +213,7 @@ class CalibrationResult:
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
     saturated: str = ""
+    rests: SeenRests | None = None
 
     @property
     def found(self) -> dict[str, Value]:

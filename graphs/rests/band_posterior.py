@@ -24,7 +24,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.friction_band import band_cost, piled_cost
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
-from jointscope.graphs.rests.rests_by_values import RestsByValues
+from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import unsure
 from jointscope.graphs.rests.walkers import moments
 from jointscope.robots.errors import SolveError
@@ -43,7 +43,9 @@ SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
 SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
 
 
-def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Calibration, Array]:
+def band_posterior(
+    problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
+) -> tuple[Calibration, Array]:
     """Mean and covariance of the values, friction bands integrated over.
 
     Args:
@@ -51,6 +53,7 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
         robot: with the priors.
         x: states of largest likelihood, shape (m, d).
         calibration: values there.
+        elsewhere: what other recordings say, in place of priors.
 
     Returns:
         Means as calibration, covariance of its coordinates, shape (p, p).
@@ -59,7 +62,7 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
         SolveError: a band that closes at a rest.
     """
     known, count = calibration, len(calibration.names)
-    by_values = RestsByValues.of(problem, unsure(robot, problem.rests), x, calibration)
+    by_values = RestsByValues.of(problem, unsure(robot, problem.rests), x, calibration, elsewhere)
     values, size = by_values.calibration.values, by_values.size
     linear = _of_each(by_values.linear, count)
     least = np.where(by_values.straight, -values, -np.inf)[:count]

@@ -21,7 +21,7 @@ from scipy.special import betainc
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.graphs.rests.rests_by_values import RestsByValues
+from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import all_rigid, at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.robots.model.robot import Robot
@@ -64,7 +64,9 @@ class AskedOfRests:
     groups: Mapping[str, NDArray[np.intp]]
 
     @staticmethod
-    def of(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> AskedOfRests | None:
+    def of(
+        problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
+    ) -> AskedOfRests | None:
         """None of robots with springs, whose encoders are asked, and where no band says anything.
 
         Args:
@@ -72,11 +74,12 @@ class AskedOfRests:
             robot: with the priors.
             x: states of largest likelihood, shape (m, d).
             calibration: values there.
+            elsewhere: what other recordings say, in place of priors.
         """
         if not all_rigid(robot):
             return None
         tried = [h for h in hypotheses_of(robot, at_rest=True) if h.here.effect.id in ASKED]
-        by_values = RestsByValues.of(problem, at_null(robot, tried), x, calibration)
+        by_values = RestsByValues.of(problem, at_null(robot, tried), x, calibration, elsewhere)
         if not len(by_values.linear.motor):
             return None
         groups = {h.label: _columns(h, by_values.calibration.names) for h in tried}

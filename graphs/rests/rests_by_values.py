@@ -13,11 +13,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.rests.independent_states import reduced
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
+NONE = 1e-6  # of the information of all, that is none
+
+
+@dataclass(frozen=True)
+class SaidElsewhere:
+    """What other recordings and priors say of the p values of a model, as seen from where all have their solution.
+
+    Attributes:
+        information: by values, shape (p, p).
+        pull: gradient of their cost, shape (p,).
+    """
+
+    information: Array
+    pull: Array
+
+    @staticmethod
+    def of(problem: RestSet, x: Array, calibration: Calibration, covariance: Array) -> SaidElsewhere:
+        """What is left of all when that of the rests is taken away.
+
+        Args:
+            problem: the rests as they stand in the graph.
+            x: states at the solution, shape (m, d).
+            calibration: values there.
+            covariance: of the values, of all recordings, shape (p, p).
+        """
+        size, sigma = calibration.value_by_coordinate, np.sqrt(np.diag(covariance))
+        H, g = reduced(problem.linearize(x, calibration))
+        of_rests = H * np.outer(sigma / size, sigma / size)
+        kept, vectors = np.linalg.eigh(np.linalg.inv(covariance / np.outer(sigma, sigma)) - of_rests)
+        left = (vectors * np.maximum(kept, NONE)) @ vectors.T
+        return SaidElsewhere(left / np.outer(sigma, sigma), -g / size)
 
 
 @dataclass(frozen=True)
@@ -39,7 +71,9 @@ class RestsByValues:
     straight: NDArray[np.bool_]
 
     @staticmethod
-    def of(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> RestsByValues:
+    def of(
+        problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
+    ) -> RestsByValues:
         """Linearises with priors.
 
         Args:
@@ -47,6 +81,7 @@ class RestsByValues:
             robot: with the priors of all values.
             x: states of largest likelihood, shape (m, d).
             calibration: values there, those of the robot at their start where it lacks them.
+            elsewhere: what other recordings say of these values, in place of priors.
         """
         at = calibration.carried_to(Calibration.of(robot).only([DYNAMICS]))
         free = [robot.parameters[name] for name in at.names]
@@ -64,5 +99,9 @@ class RestsByValues:
         )
         off = np.where(straight, at.values - np.array([p.prior for p in free]), (at.dynamics - prior) * size)
         linear = linear.per_value(size)
-        linear = replace(linear, A=linear.A + np.diag(weight), b=linear.b + weight * off)
+        A, b = np.diag(weight), weight * off
+        if elsewhere is not None:
+            p = len(elsewhere.pull)
+            A[:p, :p], b[:p] = elsewhere.information, elsewhere.pull
+        linear = replace(linear, A=linear.A + A, b=linear.b + b)
         return RestsByValues(linear, at, size, friction, straight)

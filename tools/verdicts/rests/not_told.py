@@ -21,9 +21,9 @@ def standing(seen: SeenRests) -> str:
     if not seen.stood:
         return ""
     return (
-        f"{', '.join(seen.stood)} never moved before any of these {counted(seen.count, 'rest')}, which say nothing about "
-        "friction there nor whether what it carries weighs what the model says: move it before each rest, to postures "
-        "from above and from below"
+        f"{', '.join(seen.stood)} never moved before any of these {counted(seen.count, 'rest')}, which say nothing "
+        "about friction there nor whether what it carries weighs what the model says: move it before each rest, to "
+        "postures from above and from below"
     )
 
 
@@ -77,9 +77,9 @@ def unchecked(seen: SeenRests) -> str:
         return ""
     gains = any(p.name.rpartition(".")[2] == seen.robot.drive_gain for p in seen.parameters)
     return (
-        "Friction is told; masses and loads are those of the URDF and of /load, and these rests would not show it if one "
-        f"of them were off alone: {', '.join(parts)}{'; torque constants would be off with them' if gains else ''}. More "
-        "postures and weights, with every joint moved before each rest, show more"
+        "Friction is told; masses and loads are those of the URDF and of /load, and these rests would not show it if "
+        f"one of them were off alone: {', '.join(parts)}{'; torque constants would be off with them' if gains else ''}."
+        " More postures and weights, with every joint moved before each rest, show more"
     )
 
 

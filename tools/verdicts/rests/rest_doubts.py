@@ -14,16 +14,15 @@ NEAR = 10.0  # chi2 by which others may fall less and be named as well
 MOST = 3
 
 
-def doubts_said(seen: SeenRests) -> str:
-    """The verdict where rests ask for another model; empty where they do not."""
+def doubts_said(seen: SeenRests) -> tuple[str, str]:
+    """Level of `judgement.LEVELS` and sentence where rests ask for another model; empty where they do not."""
     if not seen.doubts:
-        return ""
+        return "good", ""
     first, sides = seen.doubts[0], from_one_side(seen)
     named = [d for d in seen.doubts if d.fall > first.fall - NEAR][:MOST]
-    so = "No, do not rely on this yet" if first.p_value < SURE else "Usable, with reservations"
-    return (
-        f"{so}: these rests are far likelier (chi2 falls by {significant(first.fall, 2)}, p = {first.p_value:.0e}) if "
-        f"{', or '.join(_said(doubt) for doubt in named)}{sides and f'; {sides}'}; {_next(seen, named)}."
+    return "bad" if first.p_value < SURE else "warn", (
+        f"these rests are far likelier (chi2 falls by {significant(first.fall, 2)}, p = {first.p_value:.0e}) if "
+        f"{', or '.join(_said(doubt) for doubt in named)}{sides and f'; {sides}'}; {_next(seen, named)}"
     )
 
 

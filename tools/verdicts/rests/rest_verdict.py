@@ -24,14 +24,16 @@ AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain,
 WIDENED, FAR = 1.5, 3.0  # times that sigmas of link encoders were widened: more than they may repeat, and no noise
 FOLLOWS, BY_CHANCE = 0.1, 1e-5  # share of what friction holds that weights explain, and how likely by chance
 NO, USABLE = "No, do not rely on this yet", "Usable, with reservations"
+SO = {"bad": NO, "warn": USABLE}
 BEYOND = 0.1  # of its band, that friction may have to hold beyond it
 
 
 def verdict(result: RestCalibration) -> str:
     """Whether the model holds at rest, and whether the rests tell its values."""
     seen = result.seen
-    if said := contradiction(seen):
-        return said
+    level, said = contradiction(seen)
+    if said:
+        return f"{SO[level]}: {said}."
     for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
@@ -55,17 +57,18 @@ def verdict(result: RestCalibration) -> str:
     return f"Yes, the model holds at these rests{f', as far as they tell. {limits}' if limits else ''}."
 
 
-def contradiction(seen: SeenRests) -> str:
-    """What rests say against the model, from which values do not help; empty where they say nothing."""
+def contradiction(seen: SeenRests) -> tuple[str, str]:
+    """Level of `judgement.LEVELS` and what rests say against the model; empty where they say nothing."""
     if seen.errors.error > DOUBTFUL:
-        return f"{NO}: links do not rest where the model says."
+        return "bad", "links do not rest where the model says"
     if doubt := _following(seen):
-        return f"{NO}: {doubt}."
-    if doubt := doubts_said(seen):
-        return doubt
+        return "bad", doubt
+    level, doubt = doubts_said(seen)
+    if doubt:
+        return level, doubt
     if doubt := _misfit(seen):
-        return f"{NO}: {doubt}; something is missing: {_diagnosis(seen)}"
-    return ""
+        return "bad", f"{doubt}; something is missing: {_diagnosis(seen)}"
+    return "good", ""
 
 
 def _more(result: RestCalibration, loose: Sequence[ParameterEstimate]) -> str:
