@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,6 @@ from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.recordings.recording import Recording
-
-if TYPE_CHECKING:
-    from jointscope.graphs.rests.seen_rests import SeenRests
 
 Array = NDArray[np.float64]
 
@@ -182,7 +179,7 @@ class CalibrationResult:
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
-        rests: what rests in the same estimate say; None without.
+        rests: what rests in the same estimate say, a `graphs.rests.seen_rests.SeenRests`; None without.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
 
@@ -213,7 +210,7 @@ class CalibrationResult:
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
     saturated: str = ""
-    rests: SeenRests | None = None
+    rests: object = None
 
     @property
     def found(self) -> dict[str, Value]:

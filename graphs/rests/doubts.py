@@ -87,16 +87,19 @@ class AskedOfRests:
         return AskedOfRests(linear, np.arange(len(calibration.names)), groups | places)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """All that is no chance, least likely first."""
-        least, found = self.linear.minimum(self.base)[1], []
+        """All that is no chance, least likely first, then what takes fewer values for it."""
+        least, found, sizes = self.linear.minimum(self.base)[1], [], dict[str, int]()
         for label, columns in self.groups.items():
             n, k = self.told(columns)
             if 0 < k < n:
                 d, cost = self.linear.minimum(np.concatenate([self.base, columns]))
+                sizes[label] = k
                 fall, size = max(2.0 * (least - cost), 0.0), float(d[len(self.base)])
                 found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), size))
         counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
-        return tuple(sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, -d.fall)))
+        return tuple(
+            sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, sizes[d.label], -d.fall))
+        )
 
     def told(self, columns: NDArray[np.intp]) -> tuple[int, int]:
         """Rests of the motor with most of them, and combinations of values that shift bands beyond chance."""

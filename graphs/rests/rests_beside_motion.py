@@ -61,3 +61,8 @@ def with_rests(result: CalibrationResult) -> CalibrationResult:
     )
     derived = derived_results(robot, at, found)
     return replace(result, robot=calibrated, parameters=parameters, derived=derived, rests=seen)
+
+
+def seen_rests(result: CalibrationResult) -> SeenRests | None:
+    """What rests in the estimate say; None without rests."""
+    return result.rests if isinstance(result.rests, SeenRests) else None

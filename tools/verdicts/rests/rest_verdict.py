@@ -38,8 +38,8 @@ def verdict(result: RestCalibration) -> str:
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
             return f"{NO}: {few}; nothing could contradict them."
-    if not result.parameters:
-        return f"{NO}: these rests tell no value; {standing(seen) or 'record more, with other weights'}."
+    if not result.parameters and len(seen.stood) == len(result.robot.joints):
+        return f"{NO}: these rests tell no value; {standing(seen)}."
     if doubt := open_gains(seen):
         return f"{USABLE}: {doubt}."
     values_of = result.robot.parameters
