@@ -63,7 +63,7 @@ def open_gains(seen: SeenRests) -> str:
 
 
 def unchecked(seen: SeenRests) -> str:
-    """Masses and loads that might be wrong by more than is usual without a contradiction; empty where none might."""
+    """Masses and loads that might be wrong by more than is usual without a contradiction, and what rests on them."""
     parts = []
     for each in seen.unnoticed:
         effect, _, owner = each.label.partition("@")
@@ -73,14 +73,15 @@ def unchecked(seen: SeenRests) -> str:
             share += "" if loads else f" ({_percent(each.share)})"
             what = "all loads" if loads else f"the mass of the link of {owner}"
             parts.append(f"{what} by {'anything' if all_of_it else share}")
-    if not parts:
-        return ""
     gains = any(p.name.rpartition(".")[2] == seen.robot.drive_gain for p in seen.parameters)
-    return (
+    said = [
         "Friction is told; masses and loads are those of the URDF and of /load, and these rests would not show it if "
-        f"one of them were off alone: {', '.join(parts)}{'; torque constants would be off with them' if gains else ''}."
-        " More postures and weights, with every joint moved before each rest, show more"
-    )
+        f"one of them were off alone: {', '.join(parts)}" * bool(parts),
+        "Torque constants are on the scale of masses and loads: all of these off by one share would not show"
+        * (gains and bool(seen.unnoticed)),
+        "More postures and weights, with every joint moved before each rest, show more" * bool(parts),
+    ]
+    return ". ".join(filter(None, said))
 
 
 def _percent(share: float) -> str:

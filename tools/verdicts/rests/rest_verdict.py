@@ -42,15 +42,15 @@ def verdict(result: RestCalibration) -> str:
         return f"{NO}: these rests tell no value; {standing(seen)}."
     if doubt := open_gains(seen):
         return f"{USABLE}: {doubt}."
-    values_of = result.robot.parameters
+    values_of, silent = result.robot.parameters, standing(seen) or from_one_side(seen)
     told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
     loose = [p for p in told if p.sigma > LOOSE * p.value]
     if loose:
         names = ", ".join(f"{p.name} (+-{significant(100 * p.sigma / p.value, 2)} %)" for p in loose)
         so = NO if len(loose) == len(told) else USABLE
-        return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}."
-    if doubt := standing(seen) or from_one_side(seen):
-        return f"{USABLE}: {doubt}."
+        return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}{silent and f'; {silent}'}."
+    if silent:
+        return f"{USABLE}: {silent}."
     if result.errors.error > AS_EXPECTED or _widened(seen)[1] > WIDENED:
         return f"{USABLE}: links rest further from where the model says than their encoders explain."
     limits = unchecked(seen)
