@@ -20,7 +20,6 @@ from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
-from jointscope.graphs.rests.unnoticed import unnoticed
 from jointscope.robots.parts.parameter import with_sigmas
 
 
@@ -57,7 +56,7 @@ def with_rests(result: CalibrationResult) -> CalibrationResult:
         parameters[:count],
         rest_errors(problems),
         asked.doubts() if asked else (),
-        unnoticed(asked, robot) if asked else (),
+        (),
     )
     derived = derived_results(robot, at, found)
     return replace(result, robot=calibrated, parameters=parameters, derived=derived, rests=seen)
