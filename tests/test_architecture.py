@@ -26,7 +26,7 @@ tools.bags.at_poses
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator.arm tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text
-tools.presentation tools.verdicts.priors tools.verdicts tools.terminal tools.terminal.searches
+tools.presentation tools.verdicts.priors tools.verdicts.rests tools.verdicts tools.terminal tools.terminal.searches
 tools.report.pdf tools.report.page
 tools.report.sections.calibration
 tools.report.sections.comparison

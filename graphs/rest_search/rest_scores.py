@@ -20,12 +20,12 @@ from scipy.special import chdtrc
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.rest_hypotheses import batches
+from jointscope.graphs.rests.independent_states import reduced
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.taken_for_granted import at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores
-from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.dynamics.at_rest import SLIPPING
 from jointscope.robots.model.robot import Robot
 
@@ -231,12 +231,3 @@ def _score_of(hypothesis: EffectHypothesis, S: Array, s: Array, c: NDArray[np.in
     covariance = np.linalg.pinv(S, rcond=1e-12, hermitian=True)
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return HypothesisScore(hypothesis, float(s @ covariance @ s), -covariance @ s, sigma, S, s)
-
-
-def reduced(system: NormalEquations) -> tuple[Array, Array]:
-    """Hessian and gradient of all rests in the shared values, states eliminated, without priors."""
-    solved = np.linalg.solve(system.D, np.concatenate([system.B, system.g_x[:, :, None]], axis=2))
-    B = system.B
-    H = system.C - np.einsum("mdp,mdq->pq", B, solved[:, :, :-1])
-    g = system.g_p - np.einsum("mdp,md->p", B, solved[:, :, -1])
-    return 0.5 * (H + H.T), g

@@ -5,11 +5,11 @@ The largest of n torques lies some s / n below the edge s of the band. The most 
 Gaussian at it says how much wider the band may be. So mean and covariance are those of the posterior itself. Each
 motor's bands tell of a few combinations z of the values; over these it is sampled,
 
-    p(z) = exp(-|z|^2 / 2 - c' z - sum of the bands' costs at  y + Y z,  half + H z),    z ~ N(0, 1) without the bands,
+    p(z) = (1 + G z)^n exp(-|z|^2 / 2 - c' z - sum of the bands' costs at  y + Y z,  half + H z),
 
-and its two moments stand in the joint Gaussian in place of the bands. What is not known of the likelihood is sampled
+z ~ N(0, 1) without the bands, (1 + G z)^n as the n commands were recorded and not the torques (linear_rests.py). The
+two moments of z stand in the joint Gaussian in place of the bands. What is not known of the likelihood is sampled
 along: which share of the motors slid to where they rest, how near to the edge they stayed, and how well edges repeat.
-Values above zero are taken as they are here, not as logarithms: friction that may be zero has none.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.friction_band import band_cost, piled_cost
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import unsure
 from jointscope.graphs.rests.walkers import moments
 from jointscope.robots.errors import SolveError
@@ -42,7 +43,9 @@ SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
 SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
 
 
-def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Calibration, Array]:
+def band_posterior(
+    problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
+) -> tuple[Calibration, Array]:
     """Mean and covariance of the values, friction bands integrated over.
 
     Args:
@@ -50,6 +53,7 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
         robot: with the priors.
         x: states of largest likelihood, shape (m, d).
         calibration: values there.
+        elsewhere: what other recordings say, in place of priors.
 
     Returns:
         Means as calibration, covariance of its coordinates, shape (p, p).
@@ -57,49 +61,36 @@ def band_posterior(problem: RestSet, robot: Robot, x: Array, calibration: Calibr
     Raises:
         SolveError: a band that closes at a rest.
     """
-    known, robot, count = calibration, unsure(robot, problem.rests), len(calibration.names)
-    calibration = known.carried_to(Calibration.of(robot).only([DYNAMICS]))
-    free = [robot.parameters[name] for name in calibration.names]
-    prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
-    weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
-    pull = weight * (calibration.dynamics - prior)
-    commands = replace(problem.of_robot(robot), per_command=True)  # what was recorded has the likelihood
-    linear = LinearRests.of(commands, x, calibration, weight, pull)
-    values, size = calibration.values, calibration.value_by_coordinate
-    friction = calibration.positive & np.any(linear.H != 0.0, axis=0)
-    loose = friction / np.array([p.prior_sigma**2 for p in free])
-    A = (linear.A - np.diag(weight * friction)) / np.outer(size, size) + np.diag(loose)
-    b = (linear.b - pull * friction) / size + loose * (values - np.array([p.prior for p in free]))
-    linear = replace(linear, A=A, b=b, Y=linear.Y / size, H=linear.H / size)
-    scaled = [j for j, joint in enumerate(robot.joints) if f"{joint}.{robot.drive_gain}" in known.names]
-    linear, least = _of_each(linear, count, scaled), np.where(friction, -values, -np.inf)[:count]
+    known, count = calibration, len(calibration.names)
+    by_values = RestsByValues.of(problem, unsure(robot, problem.rests), x, calibration, elsewhere)
+    values, size = by_values.calibration.values, by_values.size
+    linear = _of_each(by_values.linear, count)
+    least = np.where(by_values.straight, -values, -np.inf)[:count]
     d = np.zeros(len(linear.b))
     if len(d) > count:  # walkers begin where the rests are likeliest, whatever masses and loads are
         d = linear.minimum(np.arange(len(d)))[0]
         d *= min(1.0, (1.0 - SMALLEST_SHARE) / max(float(np.max(d[:count] / least)), 1e-300))  # above zero
-    linear = replace(linear, b=linear.b + linear.A @ d, y=linear.y + linear.Y @ d, half=linear.half + linear.H @ d)
+    linear = linear.moved(d)
     least = np.append(least, np.full(len(d) - count, -np.inf)) - d
     change, covariance = _moments(linear, least)
     change, covariance = (change + d)[:count], covariance[:count, :count]
-    values, size, friction = values[:count], size[:count], friction[:count]
-    moved = np.log(np.where(friction, np.maximum(values + change, SMALLEST_SHARE * values), 1.0))
-    found = known.with_points({DYNAMICS: np.where(friction, moved, known.dynamics + change / size)})
-    scale = np.where(friction, found.value_by_coordinate, size)
+    values, size, straight = values[:count], size[:count], by_values.straight[:count]
+    moved = np.log(np.where(straight, np.maximum(values + change, SMALLEST_SHARE * values), 1.0))
+    found = known.with_points({DYNAMICS: np.where(straight, moved, known.dynamics + change / size)})
+    scale = np.where(straight, found.value_by_coordinate, size)
     return found, covariance / np.outer(scale, scale)
 
 
-def _of_each(linear: LinearRests, count: int, scaled: list[int]) -> LinearRests:
+def _of_each(linear: LinearRests, count: int) -> LinearRests:
     """Masses and loads behind the first `count` values as values that each motor has for itself.
 
-    Moments of a motor's bands are joined as Gaussians, and what two bands share near their sharp edges is none. A drive
-    whose gain is asked of the rests has its scale from the masses, and none of them for itself.
+    Moments of a motor's bands are joined as Gaussians, and what two bands share near their sharp edges is none.
 
     Args:
         linear: the rests.
         count: of the values that are asked.
-        scaled: motors whose gain is one of them.
     """
-    motors = [j for j in np.unique(linear.motor).tolist() if j not in scaled]
+    motors = np.unique(linear.motor).tolist()
     own = [
         np.where((linear.motor == j)[:, None], part[:, count:], 0.0) for part in (linear.Y, linear.H) for j in motors
     ]
@@ -112,7 +103,8 @@ def _of_each(linear: LinearRests, count: int, scaled: list[int]) -> LinearRests:
     np.fill_diagonal(A[count:, count:], np.tile(np.diag(linear.A)[count:], len(motors)))
     b = np.append(linear.b[:count], np.zeros(len(A) - count))
     told = np.any(Y != 0.0, axis=0) | np.any(H != 0.0, axis=0) | (np.arange(len(A)) < count)
-    return replace(linear, A=A[np.ix_(told, told)], b=b[told], Y=Y[:, told], H=H[:, told])
+    G = np.hstack([linear.G[:, :count], np.zeros((len(linear.G), len(A) - count))])
+    return replace(linear, A=A, b=b, Y=Y, H=H, G=G).of_columns(np.flatnonzero(told))
 
 
 def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
@@ -146,6 +138,7 @@ class MotorBands:
         Y, H: slopes, shape (m, r).
         V: the combinations that they tell of, among whitened changes of the values, shape (p, r).
         slope: of the cost by these changes, shape (p,).
+        G: slopes of the logarithm of the motor's gain, shape (r,).
         T, least: change of the values that may not fall further than so by z, shape (b, r) and (b,).
         start: covariance of where to look for z, shape (r, r).
     """
@@ -158,6 +151,7 @@ class MotorBands:
     H: Array
     V: Array
     slope: Array
+    G: Array
     T: Array
     least: Array
     start: Array
@@ -167,19 +161,21 @@ class MotorBands:
         """Of motor j, over changes L z of the values, which may fall to `least`, shape (p,)."""
         own, bounded = linear.motor == j, np.isfinite(least)
         y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
-        Y, H = linear.Y[own] @ L, linear.H[own] @ L
+        Y, H, G = linear.Y[own] @ L, linear.H[own] @ L, linear.G[j] @ L
         found = band_cost(y, half, np.hypot(EDGE * scale, noise))
         told, vectors = np.linalg.eigh(
-            Y.T @ (found.torque_information[:, None] * Y) + H.T @ (found.half_information[:, None] * H)
+            Y.T @ (found.torque_information[:, None] * Y)
+            + H.T @ (found.half_information[:, None] * H)
+            + len(half) * np.outer(G, G)
         )
         V = vectors[:, told > TOLD]
-        slope, Y, H = Y.T @ found.by_torque + H.T @ found.by_half, Y @ V, H @ V
+        slope, Y, H, G = Y.T @ found.by_torque + H.T @ found.by_half - len(half) * G, Y @ V, H @ V, G @ V
         # edges of n rests lie some share r / n of the band beyond the outermost: walkers begin as far apart
         wide = half * V.shape[1] / len(half)
         yy, yh, hh = (part[:, None] for part in band_cost(y, half, np.hypot(wide, noise)).curvature)
-        curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H)
+        curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H) + len(half) * np.outer(G, G)
         start = np.linalg.inv(np.eye(V.shape[1]) + curved)
-        return MotorBands(y, half, noise, scale, Y, H, V, slope, L[bounded] @ V, least[bounded], start)
+        return MotorBands(y, half, noise, scale, Y, H, V, slope, G, L[bounded] @ V, least[bounded], start)
 
     def cost(self, z: Array, odds: Array, depth: Array, blur: Array, slope: Array) -> Array:
         """Of k points, shape (k,).
@@ -191,10 +187,9 @@ class MotorBands:
             blur: logarithm of that of the edges, of the friction, shape (k,).
             slope: of the cost without these bands, shape (r,).
         """
-        half, found = self.half + z @ self.H.T, np.full(len(z), np.inf)
-        inside = (
-            np.all(half > 0.0, axis=1) & np.all(z @ self.T.T > self.least, axis=1) & (odds < MOST_ODDS) & (odds > NONE)
-        )
+        half, gain, found = self.half + z @ self.H.T, 1.0 + z @ self.G, np.full(len(z), np.inf)
+        inside = np.all(half > 0.0, axis=1) & (gain > 0.0) & np.all(z @ self.T.T > self.least, axis=1)
+        inside &= (odds < MOST_ODDS) & (odds > NONE)
         for value, (low, high) in ((depth, DEPTHS), (blur, BLURS)):
             inside &= (value > low) & (value < high)
         if inside.any():
@@ -202,6 +197,7 @@ class MotorBands:
             sigma = np.hypot(np.exp(blur[inside])[:, None] * self.scale, self.noise)
             bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
             costs = bands + np.log(sigma)  # of densities, whose blur is not the same
+            costs -= np.log(gain[inside])[:, None]
             jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit
             jeffreys = np.where(odds[inside] < FEW, -np.log(BELIEF * np.pi / (FEW - NONE)), jeffreys)
             found[inside] = jeffreys + costs.sum(axis=1) + 0.5 * np.sum(z**2, axis=1) + z @ slope

@@ -18,10 +18,12 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.band_posterior import band_posterior
-from jointscope.graphs.rests.doubts import Doubt, doubts
+from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.settling import settled
+from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -53,6 +55,7 @@ class RestCalibration:
         silent: names of the parameters of which they say nothing.
         covariance: of the values of all free parameters, shape (p, p).
         doubts: what would make the rests far likelier.
+        unnoticed: how wrong masses and loads may be before they contradict; empty of robots with springs.
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.
@@ -69,11 +72,19 @@ class RestCalibration:
     silent: tuple[str, ...]
     covariance: Array
     doubts: tuple[Doubt, ...]
+    unnoticed: tuple[Unnoticed, ...]
     before: RestErrors
     errors: RestErrors
     iterations: int
     cost: float
     wall_seconds: float
+
+    @property
+    def seen(self) -> SeenRests:
+        """What the rests say, as a calibration with motion has it."""
+        return SeenRests(
+            self.robot, self.start, self.problems, self.parameters, self.errors, self.doubts, self.unnoticed
+        )
 
     @property
     def sets(self) -> tuple[tuple[RestSet, Array], ...]:
@@ -99,6 +110,7 @@ class RestCalibration:
             "parameters": table | derived,
             "undetermined": list(self.silent),
             "doubts": [{"label": d.label, "chi2_falls_by": d.fall, "p_value": d.p_value} for d in self.doubts],
+            "unnoticed": {u.label: u.share if np.isfinite(u.share) else None for u in self.unnoticed},
             "repeatability": dict(zip(self.robot.joints, self.problems[0].repeatability.tolist(), strict=True)),
             "channels": self.errors.to_json(self.robot),
         }
@@ -137,6 +149,7 @@ def calibrate_rests(
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known
     ]  # fmt: skip
+    asked = AskedOfRests.of(whole, robot, x, likeliest)
     report("done", 1.0)
     return RestCalibration(
         robot=found,
@@ -148,7 +161,8 @@ def calibrate_rests(
         derived=tuple(derived),
         silent=tuple(p.name for p in table if p.name not in known),
         covariance=covariance * np.outer(scale, scale),
-        doubts=doubts(whole, robot, x, likeliest),
+        doubts=asked.doubts() if asked else (),
+        unnoticed=unnoticed(asked, robot) if asked else (),
         before=rest_errors([problem.of_robot(robot) for problem in problems]),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,

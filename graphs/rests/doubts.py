@@ -11,15 +11,17 @@ exact for k = 1, a constant; the logarithm of it is half a chi2 of 2 k degrees o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.linear_rests import LinearRests
 from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import all_rigid, at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.robots.model.robot import Robot
@@ -47,43 +49,68 @@ class Doubt:
     size: float
 
 
-def doubts(problem: RestSet, robot: Robot, x: Array, calibration: Calibration) -> tuple[Doubt, ...]:
-    """All that is no chance, least likely first; none of robots with springs, whose encoders are asked.
+@dataclass(frozen=True)
+class AskedOfRests:
+    """Rests of rigid joints, linearised with every effect that they are asked for at its null value.
 
-    Args:
-        problem: all rests with their weights.
-        robot: with the priors.
-        x: states of largest likelihood, shape (m, d).
-        calibration: values there.
+    Attributes:
+        linear: about the solution, by values.
+        base: columns of the values of the model, shape (p,).
+        groups: columns of the sizes of each effect, by label.
     """
-    if not all_rigid(robot):
-        return ()
-    tried = [h for h in hypotheses_of(robot, at_rest=True) if h.here.effect.id in ASKED]
-    wide = at_null(robot, tried)
-    at = calibration.carried_to(Calibration.of(wide).only([DYNAMICS]))
-    free = [wide.parameters[name] for name in at.names]
-    prior = np.array([np.log(p.prior) if p.positive else p.prior for p in free])
-    weight = np.array([1.0 / p.coordinate_sigma**2 for p in free])
-    linear = LinearRests.of(
-        replace(problem.of_robot(wide), per_command=True), x, at, weight, weight * (at.dynamics - prior)
-    )
-    if not len(linear.motor):
-        return ()
-    base = np.arange(len(calibration.names))
-    # a gain and all masses may grow together for ever: beside other values gains stay what they are
-    beside = np.array([k for k in base if calibration.names[k].rpartition(".")[2] != robot.drive_gain], dtype=np.intp)
-    groups = {h.label: _columns(h, at.names) for h in tried}
-    linear, places = _by_angle(linear, problem, robot)
-    groups |= places
-    least, found = linear.minimum(base)[1], []
-    for label, columns in groups.items():
-        n, k = _told(linear, columns)
-        if 0 < k < n:
-            d, cost = linear.minimum(np.concatenate([beside, columns]))
-            fall = max(2.0 * (least - cost), 0.0)
-            found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), float(d[len(beside)])))
-    counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
-    return tuple(sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, -d.fall)))
+
+    linear: LinearRests
+    base: NDArray[np.intp]
+    groups: Mapping[str, NDArray[np.intp]]
+
+    @staticmethod
+    def of(
+        problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
+    ) -> AskedOfRests | None:
+        """None of robots with springs, whose encoders are asked, and where no band says anything.
+
+        Args:
+            problem: all rests with their weights.
+            robot: with the priors.
+            x: states of largest likelihood, shape (m, d).
+            calibration: values there.
+            elsewhere: what other recordings say, in place of priors.
+        """
+        if not all_rigid(robot):
+            return None
+        tried = [h for h in hypotheses_of(robot, at_rest=True) if h.here.effect.id in ASKED]
+        by_values = RestsByValues.of(problem, at_null(robot, tried), x, calibration, elsewhere)
+        if not len(by_values.linear.motor):
+            return None
+        groups = {h.label: _columns(h, by_values.calibration.names) for h in tried}
+        linear, places = _by_angle(by_values.linear, problem, robot)
+        return AskedOfRests(linear, np.arange(len(calibration.names)), groups | places)
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """All that is no chance, least likely first, then what takes fewer values for it."""
+        least, found, sizes = self.linear.minimum(self.base)[1], [], dict[str, int]()
+        for label, columns in self.groups.items():
+            n, k = self.told(columns)
+            if 0 < k < n:
+                d, cost = self.linear.minimum(np.concatenate([self.base, columns]))
+                sizes[label] = k
+                fall, size = max(2.0 * (least - cost), 0.0), float(d[len(self.base)])
+                found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), size))
+        counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
+        return tuple(
+            sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, sizes[d.label], -d.fall))
+        )
+
+    def told(self, columns: NDArray[np.intp]) -> tuple[int, int]:
+        """Rests of the motor with most of them, and combinations of values that shift bands beyond chance."""
+        linear = self.linear
+        size = 1.0 / np.sqrt(np.diag(linear.A)[columns])
+        rows = np.vstack([linear.Y[:, columns], linear.H[:, columns]]) * size / np.tile(linear.half, 2)[:, None]
+        seen = np.any(rows != 0.0, axis=1).reshape(2, -1).any(axis=0)
+        if not seen.any():
+            return 0, 0
+        n = int(np.bincount(linear.motor[seen]).max())
+        return n, int(np.sum(np.linalg.svd(rows, compute_uv=False) > n**-0.5))
 
 
 def _columns(hypothesis: EffectHypothesis, names: tuple[str, ...]) -> NDArray[np.intp]:
@@ -102,16 +129,5 @@ def _by_angle(linear: LinearRests, problem: RestSet, robot: Robot) -> tuple[Line
     more = 2 * len(places)
     A = np.eye(len(linear.b) + more)
     A[:-more, :-more] = linear.A
-    Y = np.hstack([linear.Y, np.zeros((len(linear.y), more))])
-    return replace(linear, A=A, b=np.append(linear.b, np.zeros(more)), Y=Y, H=np.hstack(H)), places
-
-
-def _told(linear: LinearRests, columns: NDArray[np.intp]) -> tuple[int, int]:
-    """Rests of the motor with most of them, and combinations of values that shift bands beyond chance."""
-    size = 1.0 / np.sqrt(np.diag(linear.A)[columns])
-    rows = np.vstack([linear.Y[:, columns], linear.H[:, columns]]) * size / np.tile(linear.half, 2)[:, None]
-    seen = np.any(rows != 0.0, axis=1).reshape(2, -1).any(axis=0)
-    if not seen.any():
-        return 0, 0
-    n = int(np.bincount(linear.motor[seen]).max())
-    return n, int(np.sum(np.linalg.svd(rows, compute_uv=False) > n**-0.5))
+    Y, G = (np.hstack([part, np.zeros((len(part), more))]) for part in (linear.Y, linear.G))
+    return replace(linear, A=A, b=np.append(linear.b, np.zeros(more)), Y=Y, H=np.hstack(H), G=G), places

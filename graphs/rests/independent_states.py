@@ -30,3 +30,12 @@ def of_independent_states(r: Array, J: Array, P: Array, costs: Array | None = No
     system.costs[:] = 0.5 * np.sum(r**2, axis=1) if costs is None else costs
     system.cost = float(np.sum(system.costs))
     return system
+
+
+def reduced(system: NormalEquations) -> tuple[Array, Array]:
+    """Hessian and gradient of all rests in the shared values, states eliminated, without priors."""
+    solved = np.linalg.solve(system.D, np.concatenate([system.B, system.g_x[:, :, None]], axis=2))
+    B = system.B
+    H = system.C - np.einsum("mdp,mdq->pq", B, solved[:, :, :-1])
+    g = system.g_p - np.einsum("mdp,md->p", B, solved[:, :, -1])
+    return 0.5 * (H + H.T), g

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rests linearised at a solution, friction bands as sharp as they are: the fall of the cost by some values together.
 
-    cost(d) = d' A d / 2 + b' d + sum of the bands' costs at  y + Y d,  half + H d
+    cost(d) = d' A d / 2 + b' d + sum of the bands' costs at  y + Y d,  half + H d  - sum of n_j log(1 + G_j d)
 
 A shift of a band pays only together with a narrower one, and by far more than a score at the solution says: a step as
 long as the edges are wide is nothing. So values are moved to the minimum of this model, which needs no equations of
-motion. States are eliminated; what they are uncertain by adds to the noise of y.
+motion. States are eliminated; what they are uncertain by adds to the noise of y. The last sum is of the n_j commands
+of each motor, whose gain grows by G_j d of itself: of gain, band and weights together only ratios show in commands.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ class LinearRests:
         y, half, Y, H: shape (M,) and (M, p) [N m].
         sigma, scale: of the M bands, noise without the blur of the edges, and what this is relative to [N m].
         motor: number of the motor of each band, shape (M,).
+        counts: bands of each of the n motors, shape (n,).
+        G: slopes of the logarithm of each motor's gain, shape (n, p).
     """
 
     A: Array
@@ -46,6 +49,8 @@ class LinearRests:
     sigma: Array
     scale: Array
     motor: Columns
+    counts: Array
+    G: Array
 
     @staticmethod
     def of(problem: RestSet, x: Array, calibration: Calibration, weight: Array, pull: Array) -> LinearRests:
@@ -69,8 +74,6 @@ class LinearRests:
         A = rows.T @ rows + np.einsum("mdp,mdq->pq", cross, x_by) + np.diag(weight)
         b = rows.T @ r.reshape(-1) + np.einsum("mdp,md->p", cross, moved[:, :, 0]) + pull
         kept, counts = bands.counts > 0.0, bands.counts.sum(axis=0)
-        A += (bands.log_gain_slopes.T * counts) @ bands.log_gain_slopes
-        b -= bands.log_gain_slopes.T @ counts
         (by_x, by_p), (half_by_x, half_by_p) = bands.y_slopes, bands.half_slopes
         y, Y = bands.y + (by_x @ moved)[:, :, 0], by_p + by_x @ x_by
         half, H = bands.half + (half_by_x @ moved)[:, :, 0], half_by_p + half_by_x @ x_by
@@ -78,7 +81,35 @@ class LinearRests:
         scale = np.broadcast_to(problem.friction_scale, y.shape)
         half = np.maximum(half, 1e-3 * scale)
         y, half, Y, H, noise, scale = (part[kept] for part in (y, half, Y, H, noise, scale))
-        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, np.nonzero(kept)[1])
+        G = bands.log_gain_slopes
+        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, np.nonzero(kept)[1], counts, G)
+
+    def moved(self, d: Array) -> LinearRests:
+        """The same about values that are d further, shape (p,)."""
+        return replace(
+            self,
+            b=self.b + self.A @ d,
+            y=self.y + self.Y @ d,
+            half=self.half + self.H @ d,
+            G=self.G / (1.0 + self.G @ d)[:, None],
+        )
+
+    def per_value(self, size: Array) -> LinearRests:
+        """The same by values of which each coordinate has `size`, shape (p,)."""
+        return replace(
+            self, A=self.A / np.outer(size, size), b=self.b / size, Y=self.Y / size, H=self.H / size, G=self.G / size
+        )
+
+    def of_columns(self, columns: Columns) -> LinearRests:
+        """Some of the values alone, the others held; columns of shape (k,)."""
+        return replace(
+            self,
+            A=self.A[np.ix_(columns, columns)],
+            b=self.b[columns],
+            Y=self.Y[:, columns],
+            H=self.H[:, columns],
+            G=self.G[:, columns],
+        )
 
     def minimum(self, columns: Columns) -> tuple[Array, float]:
         """Values and cost where it is smallest, the values of other columns held.
@@ -86,8 +117,7 @@ class LinearRests:
         Args:
             columns: of the values that move, shape (k,).
         """
-        part = replace(self, A=self.A[np.ix_(columns, columns)], b=self.b[columns], Y=self.Y[:, columns],
-                       H=self.H[:, columns])  # fmt: skip
+        part = self.of_columns(columns)
         d, cost = np.zeros(len(columns)), float("inf")
         for edge in EDGES:
             d, cost = part._descended(d, np.hypot(edge * self.scale, self.sigma))
@@ -110,18 +140,20 @@ class LinearRests:
         return d, cost
 
     def _cost(self, d: Array, sigma: Array) -> float:
-        half = self.half + self.H @ d
-        if np.any(half <= 0.0):
+        half, gain = self.half + self.H @ d, 1.0 + self.G @ d
+        if np.any(half <= 0.0) or np.any(gain <= 0.0):
             return float("inf")
         bands = band_cost(self.y + self.Y @ d, half, sigma).cost
-        return float(0.5 * d @ self.A @ d + self.b @ d + bands.sum())
+        return float(0.5 * d @ self.A @ d + self.b @ d + bands.sum() - self.counts @ np.log(gain))
 
     def _slopes(self, d: Array, sigma: Array) -> tuple[Array, Array]:
         """Gradient, and the second derivatives without those of log(half), which are negative."""
         y, half = self.y + self.Y @ d, self.half + self.H @ d
         found = band_cost(y, half, sigma)
-        g = self.A @ d + self.b + self.Y.T @ found.by_torque + self.H.T @ found.by_half
+        G = self.G / (1.0 + self.G @ d)[:, None]
+        g = self.A @ d + self.b + self.Y.T @ found.by_torque + self.H.T @ found.by_half - G.T @ self.counts
         yy, yh, hh = found.curvature
         Y, H = self.Y, self.H
         mixed = Y.T @ (yh[:, None] * H)
-        return g, self.A + Y.T @ (yy[:, None] * Y) + H.T @ (hh[:, None] * H) + mixed + mixed.T
+        A = self.A + (G.T * self.counts) @ G
+        return g, A + Y.T @ (yy[:, None] * Y) + H.T @ (hh[:, None] * H) + mixed + mixed.T

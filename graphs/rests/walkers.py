@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-BURN_IN, ROUNDS = 300, 400  # moves of all walkers, before and while moments are taken
+BURN_IN, ROUNDS = 300, 1000  # moves of all walkers, before and while moments are taken
 STRETCH = 2.0
 
 

@@ -18,6 +18,7 @@ from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
 from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
+from jointscope.graphs.rests.rests_beside_motion import with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.transmission.calibrate_links import calibrate_links
@@ -97,6 +98,7 @@ def calibrate(
             found = calibrate_beside_motion(placed, read_ones, shaken, **options)
         else:
             found = calibrate_motion(placed, read_ones, **options)
+    found = with_rests(found)
     content = {model.name: found.to_json() | judge(found).to_json()} if limits else {}
     return Calibrated.of(found, acceptance=check_models(limits, content))
 

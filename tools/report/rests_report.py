@@ -12,7 +12,7 @@ from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Section, page, table
 from jointscope.tools.report.sections.calibration.rest_pictures import rest_pictures
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
 def rests_report(result: RestCalibration, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()) -> str:

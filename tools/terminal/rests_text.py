@@ -3,29 +3,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
-
-import numpy as np
+from collections.abc import Mapping
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
-from jointscope.graphs.rests.rest_errors import SURELY, RestErrors, rest_errors
+from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.graphs.rests.taken_for_granted import all_rigid
-from jointscope.robots.model.command_words import bag_arguments, robot_argument
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.relative_sigma import relative_sigma
-from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
-from jointscope.tools.verdicts.rest_doubts import doubts_said
-
-LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
-AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
-WIDENED, FAR = 1.5, 3.0  # times that sigmas of link encoders were widened: more than they may repeat, and no noise
-FOLLOWS, BY_CHANCE = 0.1, 1e-5  # share of what friction holds that weights explain, and how likely by chance
-BEYOND = 0.1  # of its band, that friction may have to hold beyond it
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
 def rest_calibration_text(result: RestCalibration) -> str:
@@ -65,93 +52,6 @@ def rests_beside_motion(result: CalibrationResult) -> str:
         f"{count} rests in the same estimate: links rest {significant(errors.error, 2)} sigma (rms) from where motors "
         f"and loads put them.\n{_errors({result.robot.name: errors}, result.robot)}"
     )
-
-
-def verdict(result: RestCalibration) -> str:
-    """Whether the model holds at rest, and whether the rests tell its values."""
-    error = result.errors.error
-    if error > DOUBTFUL:
-        return "No, do not rely on this yet: links do not rest where the model says."
-    if doubt := _following(result):
-        return f"No, do not rely on this yet: {doubt}."
-    if doubt := doubts_said(result):
-        return doubt
-    if doubt := _misfit(result):
-        return f"No, do not rely on this yet: {doubt}; something is missing: {_diagnosis(result)}"
-    for owner, values in Counter(p.name.split(".")[0] for p in result.parameters).most_common(1):
-        if result.count <= values:
-            few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
-            return f"No, do not rely on this yet: {few}; nothing could contradict them."
-    values_of = result.robot.parameters
-    told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
-    loose = [p for p in told if p.sigma > LOOSE * p.value]
-    if loose:
-        names = ", ".join(f"{p.name} ({relative_sigma(p.sigma / abs(p.value))})" for p in loose)
-        so = "No, do not rely on this yet" if len(loose) == len(told) else "Usable, with reservations"
-        return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}."
-    if error > AS_EXPECTED or _widened(result)[1] > WIDENED:
-        return "Usable, with reservations: links rest further from where the model says than their encoders explain."
-    return "Yes, the model holds at these rests."
-
-
-def _more(result: RestCalibration, loose: Sequence[ParameterEstimate]) -> str:
-    """How many rests more would tell loose values: edges of a band are known as well as rests lie apart in it."""
-    times = max(p.sigma / p.value for p in loose) / LOOSE
-    more = int(np.ceil((times - 1.0) * result.count))
-    return f"about {counted(more, 'time')} more, in other postures or with other weights"
-
-
-def _widened(result: RestCalibration) -> tuple[str, float]:
-    """The joint whose link encoder repeats worst, and its sigma over the stated one."""
-    scale = result.problems[0].repeatability
-    j = int(scale.argmax())
-    return result.robot.joints[j], float(scale[j])
-
-
-def _misfit(result: RestCalibration) -> str:
-    """Links far from where the model has them, friction far beyond its band; empty where noise explains all."""
-    joint, widened = _widened(result)
-    if widened > FAR:
-        return (
-            f"{joint} rests {significant(widened, 2)} sigmas of its encoder away, and its sigma was widened by as much "
-            "to go on, unless other loads hung there than /load says"
-        )
-    bands, rigid = result.errors.bands, all_rigid(result.robot)
-    for j, joint in enumerate(result.robot.joints):
-        beyond = float(result.errors.certain[:, j].max(initial=0.0))
-        # friction of a rigid joint is that of any masses and loads that these might be instead, as well as it is known
-        known = sum(p.sigma for p in result.parameters if p.name.startswith(f"{joint}.")) if rigid else 0.0
-        if beyond > BEYOND * bands[j] + SURELY * known:
-            return (
-                f"friction of {joint} would have to hold {significant(1e3 * beyond, 2)} mN m beyond a band of "
-                f"{significant(1e3 * bands[j], 2)} mN m"
-            )
-        creeping = float(result.errors.off_creeping[j])
-        if creeping > BEYOND * bands[j]:
-            return (
-                f"friction of {joint} is {significant(1e3 * creeping, 2)} mN m (rms) off a band of "
-                f"{significant(1e3 * bands[j], 2)} mN m where it creeps, as if it depended on speed or place"
-            )
-    return ""
-
-
-def _following(result: RestCalibration) -> str:
-    """A rigid joint whose friction holds what loads and gravity say; empty where none does."""
-    for j, joint in enumerate(result.robot.joints):
-        share, chance = result.errors.following(j)
-        if share > FOLLOWS and chance < BY_CHANCE:
-            return (
-                f"{significant(100 * share, 2)} % of what friction of {joint} has to hold goes with loads and gravity, "
-                "of which friction knows nothing: /load has another sign, unit or frame, a mass is another, or the "
-                "joint was not moved as weights changed"
-            )
-    return ""
-
-
-def _diagnosis(result: RestCalibration) -> str:
-    """The command that looks for it."""
-    bags = bag_arguments(problem.rests.path for problem in result.problems)
-    return f"`jointscope diagnose {robot_argument(result.start)} --rests {bags}`"
 
 
 def _errors(by_label: Mapping[str, RestErrors], robot: Robot) -> str:

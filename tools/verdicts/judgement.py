@@ -21,6 +21,7 @@ from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
 from jointscope.tools.verdicts.priors.far_from_priors import far_from_priors
 from jointscope.tools.verdicts.priors.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
+from jointscope.tools.verdicts.rests.beside_motion import rests_agree
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.same_values import same_by_regression, same_values
 from jointscope.tools.verdicts.short_steps import short_steps
@@ -106,6 +107,7 @@ def judge(result: CalibrationResult) -> Judgement:
         Check(timing[0], "Drive signal and sensors at the same time", timing[1]),
         Check(*same_by_regression(result)),
         *(Check(*each) for each in same_values(result)),
+        *(Check(*each) for each in rests_agree(result)),
         _constants(result),
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
         Check(missing[0], "Values that no missing effect would change", missing[1]),

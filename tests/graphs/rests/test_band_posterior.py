@@ -12,7 +12,7 @@ from lever_bench import C0, C1, hanging, lever
 from jointscope.graphs.rests.band_posterior import MotorBands
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.robots.errors import SolveError
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 TRUTH = {"swing.coulomb_torque": C0, "swing.weight_dependent_friction.coefficient": C1}
 
@@ -73,6 +73,7 @@ def test_a_band_that_closes_at_a_rest_is_told_and_not_waited_for():
         one[:, None],
         nothing,
         np.eye(1),
+        np.zeros(1),
         np.zeros(1),
         np.zeros((0, 1)),
         np.zeros(0),

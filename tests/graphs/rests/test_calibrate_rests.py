@@ -16,7 +16,7 @@ from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
 def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path):

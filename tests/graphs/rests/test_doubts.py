@@ -14,8 +14,7 @@ from lever_bench import C0, hanging, lever
 from scipy.stats import beta, kstest
 
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
-from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 WEIGHT = 2.0 * 9.81 * 0.3  # [N m] of the rod and what is on it, where it is level
 
@@ -97,16 +96,3 @@ def test_by_chance_a_band_around_a_constant_is_narrower_as_the_p_value_says():
     y = np.random.default_rng(1).uniform(-1.0, 1.0, (4000, 9))
     narrower = 0.5 * np.ptp(y, axis=1) / np.abs(y).max(axis=1)
     assert kstest(narrower, beta(8, 1).cdf).pvalue > 0.01
-
-
-def test_motors_that_never_moved_and_gains_that_are_asked_raise_no_doubts(tmp_path):
-    robot, rests = lever(tmp_path, rigid=True), rigid(40, 3)
-    assert not calibrate_rests(robot, [replace(rests, moved=np.zeros((40, 1), dtype=bool))]).doubts
-    text = robot.path.read_text(encoding="utf-8").replace("field: effort, unit: N m}", "field: effort, unit: A}")
-    gain = "parameters:\n  swing.torque_constant: {value: 2.1, unit: N m/A, prior_sigma: 0.5}\n"
-    robot.path.write_text(text.replace("parameters:\n", gain, 1), encoding="utf-8")
-    for seed in range(4):
-        rests = rigid(40, 50 + seed)
-        result = calibrate_rests(load_robot(robot.path), [replace(rests, u=rests.u / 2.0)])
-        found = {p.name: p for p in result.parameters}["swing.torque_constant"]
-        assert not result.doubts and abs(found.value - 2.0) < 3.0 * found.sigma < 0.1

@@ -9,7 +9,7 @@ import pytest
 from lever_bench import hanging, lever
 
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
-from jointscope.tools.terminal.rests_text import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
 @pytest.mark.parametrize("factor", (-1.0, 0.5, 1.5))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rests in one estimate with motion: friction with the moments of its posterior, and what the rests ask for.
+
+The graph takes each band as its curvature at the likeliest values. Here all other recordings stand beside the bands as
+the Gaussian that is left of the estimate without them, and the bands are integrated over as where rests are alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from jointscope.factors.calibration import DYNAMICS
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.found_values import AT_BOUND, derived_results
+from jointscope.graphs.rests.band_posterior import band_posterior
+from jointscope.graphs.rests.doubts import AskedOfRests
+from jointscope.graphs.rests.rest_errors import rest_errors
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.rests_by_values import SaidElsewhere
+from jointscope.graphs.rests.seen_rests import SeenRests
+from jointscope.robots.parts.parameter import with_sigmas
+
+
+def with_rests(result: CalibrationResult) -> CalibrationResult:
+    """The result with the posterior of its rests and what they say; as it is without rests.
+
+    Raises:
+        SolveError: a band that closes at a rest.
+    """
+    own = [(problem, x, at.only([DYNAMICS])) for problem, x, at in result.sets if isinstance(problem, RestSet)]
+    if not own:
+        return result
+    robot, count = result.start, len(own[0][2].names)
+    whole, x, likeliest = RestSet.joined([problem for problem, *_ in own]), np.vstack([x for _, x, _ in own]), own[0][2]
+    sigmas = np.array([p.sigma for p in result.parameters[:count]])
+    covariance = result.correlation[:count, :count] * np.outer(sigmas, sigmas)
+    elsewhere = SaidElsewhere.of(whole, x, likeliest, covariance)
+    at, found = band_posterior(whole, robot, x, likeliest, elsewhere)
+    scale, free = at.value_by_coordinate, dict(zip(at.names, at.values.tolist(), strict=True))
+    spread = dict(zip(at.names, (np.sqrt(np.diag(found)) * scale).tolist(), strict=True))
+    parameters = tuple(
+        replace(p, value=free[p.name], sigma=spread[p.name]) if p.name in free and p.note != AT_BOUND else p
+        for p in result.parameters
+    )
+    calibrated = result.robot.with_values({p.name: p.value for p in parameters[:count]})
+    values = with_sigmas(calibrated.parameters, {p.name: p.sigma for p in parameters[:count]})
+    calibrated = replace(calibrated, parameters=values)
+    problems = [problem.of_robot(calibrated) for problem, *_ in own]
+    asked = AskedOfRests.of(whole, robot, x, likeliest, elsewhere)
+    seen = SeenRests(
+        calibrated,
+        robot,
+        problems,
+        parameters[:count],
+        rest_errors(problems),
+        asked.doubts() if asked else (),
+        (),
+    )
+    derived = derived_results(robot, at, found)
+    return replace(result, robot=calibrated, parameters=parameters, derived=derived, rests=seen)
+
+
+def seen_rests(result: CalibrationResult) -> SeenRests | None:
+    """What rests in the estimate say; None without rests."""
+    return result.rests if isinstance(result.rests, SeenRests) else None

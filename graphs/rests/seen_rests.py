@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What rests say of a model that was calibrated, from them alone or with motion beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jointscope.graphs.rests.doubts import Doubt
+from jointscope.graphs.rests.rest_errors import RestErrors
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rests.unnoticed import Unnoticed
+from jointscope.robots.model.robot import Robot
+
+if TYPE_CHECKING:
+    from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+
+
+@dataclass(frozen=True)
+class SeenRests:
+    """Rests of a calibrated robot.
+
+    Attributes:
+        robot: with the values that were found and their sigmas.
+        start: before.
+        problems: the rests of each recording, with their weights.
+        parameters: that were found.
+        errors: of each recording.
+        doubts: what would make the rests far likelier.
+        unnoticed: how wrong masses and loads may be before they contradict; empty of robots with springs, and beside
+            motion, which tells of masses itself.
+    """
+
+    robot: Robot
+    start: Robot
+    problems: Sequence[RestSet]
+    parameters: Sequence[ParameterEstimate]
+    errors: RestErrors
+    doubts: tuple[Doubt, ...]
+    unnoticed: tuple[Unnoticed, ...]
+
+    @property
+    def stood(self) -> tuple[str, ...]:
+        """Joints whose motor never moved before a rest."""
+        told = np.any(np.vstack([p.rests.moved | (p.rests.creep != 0.0) for p in self.problems]), axis=0)
+        return tuple(joint for joint, moved in zip(self.robot.joints, told, strict=True) if not moved)
+
+    @property
+    def count(self) -> int:
+        """Number of rests."""
+        return sum(len(problem.rests) for problem in self.problems)
