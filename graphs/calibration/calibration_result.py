@@ -178,6 +178,7 @@ class CalibrationResult:
         sets: recordings of other kinds with their states and the blocks that they touch.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
+        exchanged: sentence about joints that have each other's commands or positions.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
     """
@@ -208,6 +209,7 @@ class CalibrationResult:
     derived: tuple[ParameterEstimate, ...] = ()
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
+    exchanged: str = ""
     saturated: str = ""
 
     @property

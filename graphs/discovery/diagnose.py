@@ -35,9 +35,9 @@ from jointscope.graphs.discovery.verdicts import (
 from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
+from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
-from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording

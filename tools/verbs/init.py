@@ -144,6 +144,7 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
     from jointscope.robots.model.command_words import edited_file
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
+    from jointscope.tools.init.estimates.wiring_by_torques import exchange_sentence
     from jointscope.tools.init.what_is_missing import what_is_missing
 
     poor = [
@@ -153,16 +154,15 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
     ]
     if poor and not guess.free_links:
         robot = load_robot(args.output)
+        if guess.exchanged is not None:
+            again = replace(typed, output=edited_file(args.output, "exchanged"))
+            why = exchange_sentence(guess.exchanged, robot, again)
+        else:
+            why = what_is_missing(robot, read_recording(args.bag, robot), poor)
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
-            f"{', '.join(poor)} (table above): {what_is_missing(robot, read_recording(args.bag, robot), poor)}"
+            f"{', '.join(poor)} (table above): {why}"
         )
-        if guess.exchanged is not None:
-            print(
-                guess.exchanged.sentence(
-                    replace(typed, output=edited_file(args.output, "exchanged")), guess.roles.joints
-                )
-            )
     else:
         print(f"\nWrote {args.output}; the recording can be used with it")
 

@@ -22,6 +22,8 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
     delay, sigma = abs(timing.delay), timing.sigma
     if not (names := timing.moved(result.found)):
         return "good", f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+    if result.exchanged:
+        return "info", "That cannot be told as long as joints have each other's commands or positions."
     if result.asked.names and not result.asked.late:  # what is missing there looks late to one linear step
         return "info", "What the regression names explains what looks late; it can be told once that is mended."
     worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
