@@ -24,7 +24,6 @@ from jointscope.graphs.scoring.regression.regressed_causes import (
 from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, unsteady_gains
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink, tilted_base, wrong_link
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -70,7 +69,7 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
         return Asked()
     paths = [recording.path for recording in recordings]
     found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
-    if found.link and not asked_for({f"{EFFECT}@{found.link.joint}": {}}, test):
+    if found.link and not asked_for({found.link.label: {}}, test):
         return Asked(late=found.late)
     return found if found.names else replace(found, load_frictions=load_frictions(rows))
 

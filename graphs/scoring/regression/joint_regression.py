@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
+from jointscope.graphs.scoring.regression.torque_columns import ANGLE, TURN, TorqueColumns, has_columns
 from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, MOST_NOISE, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
 from jointscope.graphs.starts.motion_cells import motion_cells
@@ -270,4 +270,6 @@ def _as_it_is(robot: Robot, here: EffectAt) -> EffectHypothesis:
     """An effect that the robot has, with its shapes."""
     parameters = here.effect.parameters_at(robot, here.owner)
     shapes = {p.name: robot.parameter(here.parameter(p.name)).value for p in parameters if p.is_shape}
+    if here.effect.id == TURN:
+        shapes = {ANGLE: robot.parameter(here.parameter(parameters[0].name)).value}
     return EffectHypothesis(here, tuple(p for p in parameters if not p.is_shape), shapes)
