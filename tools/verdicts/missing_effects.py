@@ -25,6 +25,7 @@ from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.one_step import would_be
+from jointscope.tools.verdicts.same_time import same_time
 
 MEASURED = "Record the effort that the drives report, measured currents or torques, instead of commands"
 FALLS_WITH = {  # how a gain falls, with what reason, and what helps
@@ -41,6 +42,7 @@ FALLS_WITH = {  # how a gain falls, with what reason, and what helps
 }
 MOST_ALIKE = 2
 MOST_CHANGES = 3
+LATE = ("command_delay", "motor_lag")  # effects that are said of the stamps, too
 MATTERS = 0.01  # of the rms torque of a drive that an effect explains, from which values cannot be relied on
 
 
@@ -64,6 +66,11 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     if not within:
         return "good", "None of the catalogue, as far as one step with each can tell."
     first, shares = (asked or within)[0]
+    if first.effect in LATE and same_time(result)[0] in ("warn", "bad"):
+        return (
+            "info",
+            "What looks like a late drive signal here is said above; the rest can be told once that is mended.",
+        )
     worst = max(shares, key=lambda name: abs(first.with_it[name] - found[name].value) / found[name].sigma)
     others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
     alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
