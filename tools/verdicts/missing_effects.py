@@ -11,6 +11,7 @@ from jointscope.graphs.scoring.regression.load_friction import LoadFriction
 from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
 from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
 from jointscope.graphs.scoring.regression.unsteady_gains import (
+    BEYOND,
     COMMAND,
     COMMANDS,
     FRICTION,
@@ -38,6 +39,7 @@ FALLS_WITH = {  # how a gain falls, with what reason, and what helps
         "a motor that warms, or a battery that runs down",
         "Record when it is warm, or calibrate shorter recordings one by one",
     ),
+    BEYOND: ("the more is commanded beyond a level", "a motor that saturates", MEASURED),
     FRICTION: ("as time goes by", "a lubricant that warms", "Record when it is warm, or shorter recordings one by one"),
 }
 MOST_ALIKE = 2
@@ -108,15 +110,21 @@ def _falling_gains(result: CalibrationResult) -> str:
     """Gains that fall, which no effect of the catalogue knows: what it does to the values, and what is left to do."""
     told = result.asked.gains
     listed = ", ".join(
-        f"{one.joint} ({significant(100.0 * one.lost, 2)} ± {significant(100.0 * one.sigma, 1)} % at the most)"
+        f"{one.joint} ({_beyond(result, one)}{significant(100.0 * one.lost, 2)} ± "
+        f"{significant(100.0 * one.sigma, 1)} % at the most)"
         for one in told
     )
     what, reason, cure = FALLS_WITH[told[0].form]
     loses = "friction falls" if told[0].form == FRICTION else "a unit of the command makes less torque"
     return (
-        f"By regression {loses} {what}, at {listed}: {reason}. With it "
+        f"By regression {loses} {what}, at {listed}: {reason}. With it about "
         f"{_factors(result, told)}. No effect of the catalogue knows this. {cure}, then calibrate again."
     )
+
+
+def _beyond(result: CalibrationResult, one: UnsteadyGain) -> str:
+    """The level from which a gain falls, in words; nothing where there is none."""
+    return f"beyond {significant(one.level)} {result.robot.command.unit}, " if one.level else ""
 
 
 def _factors(result: CalibrationResult, told: Sequence[UnsteadyGain] | Sequence[LoadFriction]) -> str:
