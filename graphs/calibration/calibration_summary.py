@@ -153,8 +153,8 @@ def summarize(
         unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
     )
     said = {notice.kind: notice.text for notice in reversed(notices)}
-    given = {"exchanged": said.get(EXCHANGED, ""), "saturated": said.get(SATURATION, "")}
-    return replace(result, findings=findings(result, notices), **given)
+    exchanged, saturated = said.get(EXCHANGED, ""), said.get(SATURATION, "")
+    return replace(result, exchanged=exchanged, saturated=saturated, findings=findings(result, notices))
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:
