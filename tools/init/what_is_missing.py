@@ -47,10 +47,10 @@ def what_is_missing(robot: Robot, recording: Recording, poor: Sequence[str]) -> 
         )
     if (link := found.link) is not None:
         if link.turn:
-            tilt = " (or the base is not level)" if link.tilted else ""
+            tilt = f", or the base seems not to be level ({TILT}@robot instead)" if link.tilted else ""
             return (
-                f"the encoder of {link.joint} seems to read {link.turn:.2g} rad too much{tilt}: jointscope add "
-                f"{robot_argument(robot)} {link.label} -o {edited_argument(robot, 'encoder_offset')}"
+                f"the encoder of {link.joint} seems to read {link.turn:.2g} rad too much: jointscope add "
+                f"{robot_argument(robot)} {link.label} -o {edited_argument(robot, 'encoder_offset')}{tilt}"
             )
         carries = "weighs" if not link.moments else "has its centre of mass elsewhere and weighs"
         return f"the link that {link.joint} moves {carries} {link.mass:+.2g} kg more than in the URDF: correct it"

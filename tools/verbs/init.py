@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
             text = robot_text(guess, urdf, find_targets(args.bag, robot, targets))
             unfinished.write_text(text, encoding="utf-8")
             robot = load_robot(unfinished)
-        description = describe_bag(args.bag, robot)
+        description = describe_bag(args.bag, replace(robot, path=args.output))
     if args.json is not None:
         content: dict[str, Any] = {
             "robot": str(args.output),
@@ -114,7 +114,9 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(drive_table(guess)))
     lines = [*([locked_line(guess.held)] if held else []), *guess.following]
     lines += [f"not used: {text}" for text in guess.left_out]
-    for line in (*(f"  {line}" for line in lines), *(f"note: {notice}" for notice in description.notices)):
+    said = "" if guess.exchanged is None else guess.exchanged.seen  # below, with what mends it
+    notes = [f"note: {notice}" for notice in description.notices if not said or said not in notice]
+    for line in (*(f"  {line}" for line in lines), *notes):
         print(line)
     if not description.usable:
         print(f"\nWrote {args.output}; the recording cannot be used with it: {description.problem}")

@@ -101,7 +101,8 @@ def _other_zero(result: CalibrationResult, link: WrongLink) -> str:
     """What a joint moves seems to be turned about its axis: the zero of its encoder, most likely."""
     joint, output = link.joint, edited_argument(result.start, "encoder_offset")
     turned = f"in the URDF all behind {joint} is turned about its axis"
-    others = [f"that of {other}" for other in link.alike] + ["the base is not level"] * link.tilted
+    others = [f"that of {other}" for other in link.alike]
+    others += ["the base is not level: gravity_direction@robot"] * link.tilted
     return (
         f"By regression of all joints the encoder of {joint} reads {significant(link.turn, 2)} ± "
         f"{significant(link.sigma, 1)} rad too much for the URDF (or {' or '.join([*others, turned])}, which looks the "
