@@ -16,7 +16,8 @@ from tables import Section, Table
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import compare_model
-from jointscope.graphs.starts.saturated_drives import SATURATION, screen_all
+from jointscope.graphs.screening.saturated_drives import SATURATION
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot

@@ -46,13 +46,13 @@ from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_re
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.torque_readings import torque_readings
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
-from jointscope.graphs.starts.saturated_drives import screen_all
 from jointscope.graphs.starts.second_opinion import on_their_word, regressed_values
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
@@ -209,7 +209,7 @@ def _asked_for_causes(
     timing, masses = drive_timing(test), wrong_masses(test)
     result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
     result = replace(result, torque_readings=torque_readings(test))
-    if stage is None or result.saturated:
+    if stage is None or result.saturated or result.exchanged:
         return result
     return replace(
         result, asked=asked_by_regression(replace(result.robot, sensors=result.start.sensors), recordings, test)

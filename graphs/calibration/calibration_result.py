@@ -180,6 +180,7 @@ class CalibrationResult:
         torque_readings: scales and offsets of torque sensors that the robot file has no parameters for.
         inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
             `graphs.problem.step_errors`; None where it was not asked.
+        exchanged: sentence about joints that have each other's commands or positions.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
         rests: what rests in the same estimate say, a `graphs.rests.seen_rests.SeenRests`; None without.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
@@ -212,6 +213,7 @@ class CalibrationResult:
     sets: tuple[tuple[SetProblem, Array, Calibration], ...] = ()
     torque_readings: tuple[TorqueReading, ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
+    exchanged: str = ""
     saturated: str = ""
     rests: object = None
 

@@ -27,12 +27,13 @@ from jointscope.graphs.calibration.residual_collection import BagResiduals, coll
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence
 from jointscope.graphs.noise.robust_sigma import inflation
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.screening.exchanged_joints import EXCHANGED
+from jointscope.graphs.screening.saturated_drives import SATURATION
 from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StateSpread, posteriors
 from jointscope.graphs.solving.set_problem import Problem, SetProblem
 from jointscope.graphs.solving.shared_layout import SharedLayout
-from jointscope.graphs.starts.saturated_drives import SATURATION
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
@@ -151,8 +152,9 @@ def summarize(
         converged=not solution.flat,
         unsettled=0.0 if solution.converged or solution.flat else solution.iterations[-1].step_in_sigmas,
     )
-    saturated = next((notice.text for notice in notices if notice.kind == SATURATION), "")
-    return replace(result, saturated=saturated, findings=findings(result, notices))
+    said = {notice.kind: notice.text for notice in reversed(notices)}
+    exchanged, saturated = said.get(EXCHANGED, ""), said.get(SATURATION, "")
+    return replace(result, exchanged=exchanged, saturated=saturated, findings=findings(result, notices))
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
-from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
+from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
 from jointscope.robots.model.robot import Robot

@@ -30,14 +30,16 @@ from jointscope.graphs.discovery.verdicts import (
     excess_share,
     judge,
     ranked,
+    slowest_seen,
+    standing_in,
     worth_a_refit,
 )
 from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
+from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
-from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import JointscopeError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
@@ -245,6 +247,8 @@ def _by_predictions(
     validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
     seconds = judged_seconds(base, spans[1])
     judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
+    slowest = slowest_seen(base.robot, base.recordings[0], base.states[0])
+    judged = [standing_in(c, slowest) for c in judged]
     return ranked(judged), {label: t.refit.robot for label, t in validated.items()}
 
 

@@ -21,6 +21,7 @@ def paragraphs_of(diagnosis: Diagnosis) -> tuple[str, ...]:
         found.append(". ".join(sentence.rstrip(".") for sentence in diagnosis.failure.sentences[:3]) + ".")
     missing = [c for c in diagnosis.candidates if c.verdict == "missing"]
     found += [_explains(c, diagnosis) for c in missing[:3]]
+    found += [_stands_in(c) for c in diagnosis.candidates if c.verdict == "stand_in" and c.refitted][:1]
     if diagnosis.small:
         found.append(there_but_small(diagnosis.small))
     untestable = [c for c in diagnosis.candidates if c.verdict == "untestable"]
@@ -87,6 +88,10 @@ def _explains(c: Candidate, d: Diagnosis) -> str:
     if c.look_alikes:
         text += f" In this recording it cannot be told apart from {', '.join(c.look_alikes)}."
     return text
+
+
+def _stands_in(c: Candidate) -> str:
+    return f"{title(c)} stands in for something else: {', '.join(c.reasons)}."
 
 
 def _untestable(candidates: list[Candidate]) -> str:

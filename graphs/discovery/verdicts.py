@@ -12,12 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
 
 MATTERS = 0.02  # share of the squared validation error that an effect must explain
 MOST = 0.6  # share of the validation blocks on which it must help
@@ -25,6 +28,8 @@ SURE = 3.0  # [sigma] a refitted size must be away from null
 HORIZON = 0.1  # [s] predictions of this length that do not overlap count as independent
 SENSOR_FLOOR = 1.0  # [sigma] no prediction is better than its sensor
 HARM = 3.0  # times the error on a block from which an effect is said to harm there
+STRIBECK = "motor_stribeck"
+PASSED = 0.1  # part of a sample period in which a joint passes speeds that samples cannot see
 SAME = 0.02  # relative difference of errors that decides nothing
 
 
@@ -170,9 +175,47 @@ def _bic(before: float, after: float, parameters: int, seconds: float) -> float:
     return float(samples * np.log(after**2 / before**2) + parameters * np.log(samples))
 
 
+def slowest_seen(robot: Robot, recording: Recording, states: NDArray[np.float64]) -> dict[str, float]:
+    """Speed of each joint below which samples see nothing of a curve of friction [rad/s].
+
+    It is passed within a part of a sample period at the usual acceleration, or lost in the noise of two positions.
+
+    Args:
+        robot: the model.
+        recording: of it.
+        states: estimated, shape (k, d), in the order of time.
+    """
+    encoder, layout = robot.motor_encoder, robot.layout
+    stream = recording.streams[encoder.name]
+    v = states[:, layout.velocities]
+    step = float(np.ptp(stream.times)) / max(len(states) - 1, 1)
+    found = {}
+    for joint, period, sigma in zip(robot.joints, stream.periods, encoder.sigmas, strict=True):
+        rush = float(np.sqrt(np.mean((np.diff(v[:, layout.links.index(joint)]) / step) ** 2)))
+        found[joint] = max(PASSED * rush * float(period), float(np.sqrt(2.0) * sigma / period))
+    return found
+
+
+def standing_in(candidate: Candidate, slowest: Mapping[str, float]) -> Candidate:
+    """A candidate that is a curve of friction at speeds of which nothing is seen: there, joints stick or creep.
+
+    Args:
+        candidate: judged.
+        slowest: of `slowest_seen`.
+    """
+    velocity, seen = candidate.parameters.get("velocity"), slowest.get(candidate.owner.removesuffix(".link"), 0.0)
+    if candidate.effect != STRIBECK or candidate.verdict != "missing" or velocity is None or velocity.value >= seen:
+        return candidate
+    reason = (
+        f"but only below {velocity.value:.2g} {velocity.unit}, where samples see nothing (from {seen:.2g} on they do): "
+        "dry friction that holds the joint until it breaks away does the same; its size is not to be believed"
+    )
+    return replace(candidate, verdict="stand_in", reasons=(*candidate.reasons, reason))
+
+
 def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
-    order = {"missing": 0, "possible": 1, "absent": 2, "untestable": 3}
+    order = {"missing": 0, "stand_in": 1, "possible": 2, "absent": 3, "untestable": 4}
     missing = [c for c in candidates if c.verdict == "missing"]
     best = min(missing, key=lambda c: c.validation_error, default=None)
     if best is not None:

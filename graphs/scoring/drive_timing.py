@@ -65,15 +65,20 @@ class DriveTiming:
             return late if self.delay > 0.0 else f"drive signal of {self.joint} seems to act"
         return "drive signal seems to act"
 
-    def cure(self, robot: Robot) -> str:
-        """What to do about it, in words, with a robot of a file."""
+    def cure(self, robot: Robot, effect: str = EFFECT) -> str:
+        """What to do about it, in words.
+
+        Args:
+            robot: of a file.
+            effect: id of what makes the drive signal late.
+        """
         if self.joint:
             return f"correct its stamps where they are made, or record {self.joint} with the others' clock and filter"
-        output = edited_argument(robot, EFFECT)
+        output = edited_argument(robot, effect)
         alike = " (a low-pass of the positions, encoder_filter, or of the drive, motor_lag, is late, too)"
         return (
-            f"`jointscope add {robot_argument(robot)} {EFFECT}@{OWNER} -o {output}`, then calibrate again"
-            f"{alike if self.delay > FILTERED else ''}"
+            f"`jointscope add {robot_argument(robot)} {effect}@{OWNER} -o {output}`, then calibrate again"
+            f"{alike if self.delay > FILTERED and effect == EFFECT else ''}"
         )
 
     def moved(self, found: Mapping[str, Value]) -> list[str]:

@@ -34,6 +34,7 @@ PLACES = {VISCOUS: 2, DRY: 3, INERTIA: 4}  # among the signals
 FEWEST_BLOCKS = 5  # one more than there are values
 LUCK = 1.5  # [sigma] by which a doubt that few blocks tell may be too small
 SEPARATE = 1e-7  # share of the load that is not like the other signals, below which k cannot be told from them
+IMPOSSIBLE = 3.5  # [sigma] below zero from which a value cannot be
 MOST_NOISE = 0.5  # of a signal's mean square that may be taken off as noise of the encoder
 
 
@@ -42,6 +43,11 @@ class Value(NamedTuple):
 
     value: float
     sigma: float
+
+
+def is_impossible(found: Mapping[str, Value]) -> bool:
+    """Whether an inertia or a friction among the values of a drive is surely below zero."""
+    return any(v.value < -IMPOSSIBLE * v.sigma for law, v in found.items() if law in PLACES)
 
 
 class Links(NamedTuple):

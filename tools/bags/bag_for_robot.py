@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from jointscope.graphs.starts.saturated_drives import screen_all
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot

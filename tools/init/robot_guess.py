@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.screening.exchanged_joints import Exchange, Wiring
 from jointscope.graphs.starts.command_limits import limited
 from jointscope.graphs.starts.drive_regression import Driven, Links
 from jointscope.graphs.starts.drive_signal import acts_until_the_next
@@ -29,7 +30,7 @@ from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobo
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
 from jointscope.tools.init.estimates.soft_joints import giving_joints
-from jointscope.tools.init.estimates.wiring_by_torques import Exchange, wiring_by_torques
+from jointscope.tools.init.estimates.wiring_by_torques import wiring_by_torques
 from jointscope.tools.init.streams.other_joints import HeldJoint, Typed
 from jointscope.tools.init.streams.roles import Roles
 from jointscope.tools.init.streams.sample_times import guess_sample_times
@@ -220,7 +221,7 @@ def _by_torques(robot: MeasuredRobot, encoder: Stream, drive: Drives) -> tuple[S
     if drive.gravity_reason and min(joint.explained for joint in drive.joints) > EXPLAINED:
         return None, None  # a base that hangs or stands otherwise explains it
     command = limited(role_stream(robot.roles.command, robot.roles.joints), [joint.limit for joint in drive.joints])
-    return wiring_by_torques(robot.tree, encoder, command, held=drive.held)
+    return wiring_by_torques(Wiring(robot.tree, encoder, command, drive.held))
 
 
 def _in_si(robot: MeasuredRobot, noises: Sequence[NoiseGuess]) -> Array:

@@ -16,7 +16,6 @@ from jointscope.graphs.scoring.regression.changed_load import LEFT
 from jointscope.graphs.scoring.regression.joint_regression import JointRows, fit, joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
-from jointscope.graphs.scoring.regression.turned_link import turn_instead
 from jointscope.graphs.starts.windowed_sums import WIDTHS
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
@@ -47,11 +46,11 @@ def what_is_missing(robot: Robot, recording: Recording, poor: Sequence[str]) -> 
             f"{changed.joint}; `jointscope calibrate` says how to leave that out"
         )
     if (link := found.link) is not None:
-        if (turn := turn_instead(robot.tree, link)) is not None:
-            label, output = f"encoder_offset@{link.joint}", edited_argument(robot, "encoder_offset")
+        if link.turn:
+            tilt = f", or the base seems not to be level ({TILT}@robot instead)" if link.tilted else ""
             return (
-                f"the encoder of {link.joint} seems to read {turn:.2g} rad too much: jointscope add "
-                f"{robot_argument(robot)} {label} -o {output}"
+                f"the encoder of {link.joint} seems to read {link.turn:.2g} rad too much: jointscope add "
+                f"{robot_argument(robot)} {link.label} -o {edited_argument(robot, 'encoder_offset')}{tilt}"
             )
         carries = "weighs" if not link.moments else "has its centre of mass elsewhere and weighs"
         return f"the link that {link.joint} moves {carries} {link.mass:+.2g} kg more than in the URDF: correct it"

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from jointscope.graphs.starts.saturated_drives import PLAIN_MISTAKES, screen_all
+from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording

@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
             text = robot_text(guess, urdf, find_targets(args.bag, robot, targets))
             unfinished.write_text(text, encoding="utf-8")
             robot = load_robot(unfinished)
-        description = describe_bag(args.bag, robot)
+        description = describe_bag(args.bag, replace(robot, path=args.output))
     if args.json is not None:
         content: dict[str, Any] = {
             "robot": str(args.output),
@@ -114,7 +114,9 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(drive_table(guess)))
     lines = [*([locked_line(guess.held)] if held else []), *guess.following]
     lines += [f"not used: {text}" for text in guess.left_out]
-    for line in (*(f"  {line}" for line in lines), *(f"note: {notice}" for notice in description.notices)):
+    said = "" if guess.exchanged is None else guess.exchanged.seen  # below, with what mends it
+    notes = [f"note: {notice}" for notice in description.notices if not said or said not in notice]
+    for line in (*(f"  {line}" for line in lines), *notes):
         print(line)
     if not description.usable:
         print(f"\nWrote {args.output}; the recording cannot be used with it: {description.problem}")
@@ -144,6 +146,7 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
     from jointscope.robots.model.command_words import edited_file
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.init.estimates.drive_values import EXPLAINED
+    from jointscope.tools.init.estimates.wiring_by_torques import exchange_sentence
     from jointscope.tools.init.what_is_missing import what_is_missing
 
     poor = [
@@ -153,16 +156,15 @@ def _say_whether_usable(args: argparse.Namespace, guess: RobotGuess, typed: Type
     ]
     if poor and not guess.free_links:
         robot = load_robot(args.output)
+        if guess.exchanged is not None:
+            again = replace(typed, output=edited_file(args.output, "exchanged"))
+            why = exchange_sentence(guess.exchanged, robot, again)
+        else:
+            why = what_is_missing(robot, read_recording(args.bag, robot), poor)
         print(
             f"\nWrote {args.output}; the recording can be read with it, but the regression does not explain "
-            f"{', '.join(poor)} (table above): {what_is_missing(robot, read_recording(args.bag, robot), poor)}"
+            f"{', '.join(poor)} (table above): {why}"
         )
-        if guess.exchanged is not None:
-            print(
-                guess.exchanged.sentence(
-                    replace(typed, output=edited_file(args.output, "exchanged")), guess.roles.joints
-                )
-            )
     else:
         print(f"\nWrote {args.output}; the recording can be used with it")
 

@@ -21,6 +21,8 @@ RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, a
 def given(result: CalibrationResult) -> list[tuple[str, str]]:
     """Names of checks that fail, with a sentence each; what they say comes before all that steps with effects say."""
     found = []
+    if result.exchanged:
+        found.append(("Each joint with its own commands and positions", _sentence(result.exchanged)))
     if result.saturated:
         found.append(("Drives that give what is commanded", result.saturated))
     if (changed := result.asked.changed) is not None:
@@ -56,6 +58,10 @@ def _readings(result: CalibrationResult) -> str:
 
 def _unit(unit: str) -> str:
     return f"'{unit}'" if unit == "1" else unit
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def rare_samples(result: CalibrationResult) -> str:

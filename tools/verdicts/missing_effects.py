@@ -11,6 +11,7 @@ from jointscope.graphs.scoring.regression.load_friction import LoadFriction
 from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
 from jointscope.graphs.scoring.regression.ripples import EFFECT as RIPPLE
 from jointscope.graphs.scoring.regression.unsteady_gains import (
+    BEYOND,
     COMMAND,
     COMMANDS,
     FRICTION,
@@ -25,6 +26,7 @@ from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.one_step import would_be
 from jointscope.tools.verdicts.given_recordings import given
+from jointscope.tools.verdicts.same_time import same_time
 
 MEASURED = "Record the effort that the drives report, measured currents or torques, instead of commands"
 FALLS_WITH = {  # how a gain falls, with what reason, and what helps
@@ -37,10 +39,12 @@ FALLS_WITH = {  # how a gain falls, with what reason, and what helps
         "a motor that warms, or a battery that runs down",
         "Record when it is warm, or calibrate shorter recordings one by one",
     ),
+    BEYOND: ("the more is commanded beyond a level", "a motor that saturates", MEASURED),
     FRICTION: ("as time goes by", "a lubricant that warms", "Record when it is warm, or shorter recordings one by one"),
 }
 MOST_ALIKE = 2
 MOST_CHANGES = 3
+LATE = ("command_delay", "motor_lag")  # effects that are said of the stamps, too
 MATTERS = 0.01  # of the rms torque of a drive that an effect explains, from which values cannot be relied on
 
 
@@ -64,6 +68,11 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     if not within:
         return "good", "None of the catalogue, as far as one step with each can tell."
     first, shares = (asked or within)[0]
+    if first.effect in LATE and same_time(result)[0] in ("warn", "bad"):
+        return (
+            "info",
+            "What looks like a late drive signal here is said above; the rest can be told once that is mended.",
+        )
     worst = max(shares, key=lambda name: abs(first.with_it[name] - found[name].value) / found[name].sigma)
     others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
     alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
@@ -101,15 +110,21 @@ def _falling_gains(result: CalibrationResult) -> str:
     """Gains that fall, which no effect of the catalogue knows: what it does to the values, and what is left to do."""
     told = result.asked.gains
     listed = ", ".join(
-        f"{one.joint} ({significant(100.0 * one.lost, 2)} ± {significant(100.0 * one.sigma, 1)} % at the most)"
+        f"{one.joint} ({_beyond(result, one)}{significant(100.0 * one.lost, 2)} ± "
+        f"{significant(100.0 * one.sigma, 1)} % at the most)"
         for one in told
     )
     what, reason, cure = FALLS_WITH[told[0].form]
     loses = "friction falls" if told[0].form == FRICTION else "a unit of the command makes less torque"
     return (
-        f"By regression {loses} {what}, at {listed}: {reason}. With it "
+        f"By regression {loses} {what}, at {listed}: {reason}. With it about "
         f"{_factors(result, told)}. No effect of the catalogue knows this. {cure}, then calibrate again."
     )
+
+
+def _beyond(result: CalibrationResult, one: UnsteadyGain) -> str:
+    """The level from which a gain falls, in words; nothing where there is none."""
+    return f"beyond {significant(one.level)} {result.robot.command.unit}, " if one.level else ""
 
 
 def _factors(result: CalibrationResult, told: Sequence[UnsteadyGain] | Sequence[LoadFriction]) -> str:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
-from jointscope.graphs.scoring.regression.turned_link import turn_instead
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
@@ -74,9 +73,8 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     """A link that weighs something else by regression: by how much, what that changes, and what to do."""
     robot, urdf = result.robot, result.robot.tree.urdf.name
     body = robot.tree.model.inertias[robot.tree.model.getJointId(link.joint)].mass
-    turn = turn_instead(robot.tree, link)
-    if turn is not None:
-        return _other_zero(result, link, turn)
+    if link.turn:
+        return _other_zero(result, link)
     alike = f" (or one that {' or '.join(link.alike)} moves, which looks alike here)" if link.alike else ""
     by = f"{link.mass:+.3g} ± {significant(link.sigma, 1)} kg"
     which = f"the link that {link.joint} moves{alike}"
@@ -99,14 +97,16 @@ def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:
     )
 
 
-def _other_zero(result: CalibrationResult, link: WrongLink, turn: float) -> str:
-    """The centre of mass of the last link seems to be turned about its axis: the zero of its encoder, most likely."""
-    effect, joint = "encoder_offset", link.joint
-    output = edited_argument(result.start, effect)
+def _other_zero(result: CalibrationResult, link: WrongLink) -> str:
+    """What a joint moves seems to be turned about its axis: the zero of its encoder, most likely."""
+    joint, output = link.joint, edited_argument(result.start, "encoder_offset")
+    turned = f"in the URDF all behind {joint} is turned about its axis"
+    others = [f"that of {other}" for other in link.alike]
+    others += ["the base is not level: gravity_direction@robot"] * link.tilted
     return (
-        f"By regression of all joints the encoder of {joint} reads {significant(turn, 2)} rad too much for the URDF "
-        f"(or the centre of mass behind {joint} is turned about its axis, which looks the same): "
-        f"{_seen(link)}. Add it: `jointscope add {robot_argument(result.start)} {effect}@{joint} -o {output}`, "
+        f"By regression of all joints the encoder of {joint} reads {significant(link.turn, 2)} ± "
+        f"{significant(link.sigma, 1)} rad too much for the URDF (or {' or '.join([*others, turned])}, which looks the "
+        f"same): {_seen(link)}. Add it: `jointscope add {robot_argument(result.start)} {link.label} -o {output}`, "
         f"then calibrate again; or correct the URDF, then {_again(result)}."
     )
 

@@ -7,7 +7,10 @@ A delay of a fraction of a millisecond is friction that is not there, and no res
 
 from __future__ import annotations
 
+import numpy as np
+
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.scoring.regression.late_drives import LAG
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.one_step import would_be
 
@@ -22,14 +25,25 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
     delay, sigma = abs(timing.delay), timing.sigma
     if not (names := timing.moved(result.found)):
         return "good", f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
+    if result.exchanged:
+        return "info", "That cannot be told as long as joints have each other's commands or positions."
     if result.asked.names and not result.asked.late:  # what is missing there looks late to one linear step
         return "info", "What the regression names explains what looks late; it can be told once that is mended."
     worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
     other = worst.value + timing.changes[worst.name]
-    side = "after" if timing.delay > 0.0 and not timing.joint else "before"
+    lag = result.asked.lag
+    if lag is not None and lag.clearly and lag.effect == LAG and not timing.joint:
+        what = (
+            f"By regression torques follow the drive signal through a low-pass of first order, with a time constant of "
+            f"about {significant(1e3 * lag.size, 2)} ms ({significant(0.5 / np.pi / lag.size, 2)} Hz), and not after a "
+            "delay"
+        )
+        cure = timing.cure(result.start, LAG)
+    else:
+        side = "after" if timing.delay > 0.0 and not timing.joint else "before"
+        what = f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp"
+        cure = timing.cure(result.start)
     return (
         "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
-        f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp, "
-        f"with which {would_be(worst.name, worst.value, other, worst.unit)}: "
-        f"{timing.cure(result.start)}.",
+        f"{what}, with which {would_be(worst.name, worst.value, other, worst.unit)}: {cure}.",
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from jointscope.graphs.scoring.regression.changed_load import ChangedLoad, changed_load
 from jointscope.graphs.scoring.regression.joint_regression import JointRows, joint_rows
+from jointscope.graphs.scoring.regression.late_drives import LateDrives, late_drives
 from jointscope.graphs.scoring.regression.load_friction import LoadFriction, load_frictions
 from jointscope.graphs.scoring.regression.regressed_causes import (
     RegressedCause,
@@ -24,10 +25,10 @@ from jointscope.graphs.scoring.regression.regressed_causes import (
 from jointscope.graphs.scoring.regression.unsteady_gains import UnsteadyGain, unsteady_gains
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink, tilted_base, wrong_link
 from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.wrong_masses import EFFECT
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
+SURELY = 9.2  # evidence from which late commands are no chance: one recording in ten thousand
 COMPARABLE = 0.5  # of the evidence for a reason, from which late commands may be another one beside it
 
 
@@ -41,6 +42,7 @@ class Asked:
         changed: when the robot takes up or sets down a load, or is pushed; None where nothing tells of it.
         gains: drives whose constant falls with speed, command or time, which no effect of the catalogue knows.
         load_frictions: joints whose friction grows with the torque they pass on, which no effect of rigid joints knows.
+        lag: how torques follow their commands, where that is all that is missing.
         late: whether commands that act later, or earlier, than stamped would explain as much, if roughly.
     """
 
@@ -49,12 +51,13 @@ class Asked:
     changed: ChangedLoad | None = None
     gains: tuple[UnsteadyGain, ...] = ()
     load_frictions: tuple[LoadFriction, ...] = ()
+    lag: LateDrives | None = None
     late: bool = True
 
     @property
     def names(self) -> bool:
         """Whether there is a reason."""
-        return replace(self, late=True) != Asked()
+        return replace(self, lag=None, late=True) != Asked()
 
 
 def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: ScoreTest) -> Asked:
@@ -70,7 +73,7 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
         return Asked()
     paths = [recording.path for recording in recordings]
     found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
-    if found.link and not asked_for({f"{EFFECT}@{found.link.joint}": {}}, test):
+    if found.link and not asked_for({found.link.label: {}}, test):
         return Asked(late=found.late)
     return found if found.names else replace(found, load_frictions=load_frictions(rows))
 
@@ -83,14 +86,15 @@ def most_plausible(rows: JointRows, paths: Sequence[str], causes: tuple[Regresse
         paths: of its recordings.
         causes: effects that may be named.
     """
-    tilted, late = tilted_base(rows), late_commands(rows)
+    tilted, late, lag = tilted_base(rows), late_commands(rows), late_drives(rows)
+    late = max(late, lag.evidence if lag else 0.0)
     gains, link, changed = unsteady_gains(rows), wrong_link(rows, tilted), changed_load(rows, paths)
     options = [
         (sum(cause.evidence for cause in causes), Asked(causes=causes)),
         (sum(gain.evidence for gain in gains), Asked(gains=gains)),
         (link.evidence if link else 0.0, Asked(link=link)),
         (changed.evidence if changed else 0.0, Asked(changed=changed)),
-        (late, Asked()),
+        (late, Asked(lag=lag if late > SURELY else None)),
         (tilted, Asked()),
     ]
     worth, best = max(options, key=lambda option: option[0])

@@ -10,21 +10,22 @@ regressed on, too, each by its columns at nothing of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
-from jointscope.graphs.scoring.regression.torque_columns import TorqueColumns, has_columns
+from jointscope.graphs.scoring.regression.torque_columns import ANGLE, TURN, TorqueColumns, has_columns
 from jointscope.graphs.starts.drive_regression import GAIN, INERTIA, MOST_NOISE, PLACES, VISCOUS, load_of
 from jointscope.graphs.starts.drive_starts import LIMIT, PLAIN, driven_joints, parts_of
-from jointscope.graphs.starts.motion_cells import motion_cells
+from jointscope.graphs.starts.motion_cells import mean_commands, motion_cells
 from jointscope.graphs.starts.windowed_sums import PER_WINDOW, joint_signals, noise_gains, window_cells, windowed_rows
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 
@@ -71,12 +72,26 @@ class JointRows:
     def __init__(self, robot: Robot, recordings: Sequence[Recording]):
         self.robot, sigmas = robot, robot.motor_encoder.sigmas
         delay = robot.parameter(DELAY_NAME).value if any(h.label == DELAY for h in robot.effects) else 0.0
-        driven = driven_joints(robot, recordings, delay)
+        self._driven = driven = driven_joints(robot, recordings, delay)
         more = [h for h in of_drives(robot) if h.label != DELAY and h.effect.id not in (PLAIN, LIMIT)]
         self._own = [_as_it_is(robot, here) for here in more]
         cells = [motion_cells(d.encoder, d.command, sigmas, robot.command_held, d.left_out) for d in driven]
         self._plain = [joint_signals(c, load_of(robot.tree, c), robot.friction_sharpness()) for c in cells]
         self._columns = [TorqueColumns(robot, c) for c in cells]
+
+    def with_commands(self, change: Callable[[Stream], Stream]) -> JointRows:
+        """The same motion, driven by commands that are changed; which cells are known stays.
+
+        Args:
+            change: from the commands of a recording to others.
+        """
+        other, held = copy(self), self.robot.command_held
+        other._plain, other._columns = [], []
+        for driven, plain, columns in zip(self._driven, self._plain, self._columns, strict=True):
+            u = mean_commands(change(driven.command), columns.cells.edges, held)
+            other._plain.append(np.concatenate([u[:, :, None], plain[:, :, 1:]], axis=2))
+            other._columns.append(TorqueColumns(self.robot, replace(columns.cells, u=u)))
+        return other
 
     def of(self, joint: int, width: float, hypothesis: EffectHypothesis | None = None) -> Array | None:
         """Signals, columns of the robot's own effects and of another one under all windows, shape (w, 5 + e + k).
@@ -270,4 +285,6 @@ def _as_it_is(robot: Robot, here: EffectAt) -> EffectHypothesis:
     """An effect that the robot has, with its shapes."""
     parameters = here.effect.parameters_at(robot, here.owner)
     shapes = {p.name: robot.parameter(here.parameter(p.name)).value for p in parameters if p.is_shape}
+    if here.effect.id == TURN:
+        shapes = {ANGLE: robot.parameter(here.parameter(parameters[0].name)).value}
     return EffectHypothesis(here, tuple(p for p in parameters if not p.is_shape), shapes)

@@ -27,6 +27,10 @@ from jointscope.robots.model.structured_tree import InertiaChange, inertia_torqu
 
 Array = NDArray[np.float64]
 
+TURN = "encoder_offset"  # the effect of readings that columns tell: all torques are those of another posture
+ANGLE = "angle"  # shape of its hypothesis: where its secant is taken [rad]
+SLOPE = 1e-3  # [rad] of the angle where none is given
+
 
 @dataclass(frozen=True)
 class TorqueColumns:
@@ -62,6 +66,9 @@ class TorqueColumns:
             return parts if any(part.any() for part in parts) else None
         if isinstance(effect, Structure) and effect.form == "gravity":
             return [tilt[:, joint] for tilt in self._tilts]
+        if effect.id == TURN and owner in self.robot.joints:
+            secant = self._secant(self.robot.joints.index(owner), hypothesis.shapes.get(ANGLE, 0.0) or SLOPE)[:, joint]
+            return [secant] if secant.any() else None
         return None
 
     def _torques(self, hypothesis: EffectHypothesis, joint: int) -> list[Array]:
@@ -94,6 +101,16 @@ class TorqueColumns:
             self._by_label[label] = inertia_torques(tree, changes, self.cells.q, self._v, self.cells.a, 1.0)
         return self._by_label[label]
 
+    def _secant(self, turned: int, angle: float) -> Array:
+        """Change of all torques with a joint's encoder that reads an angle [rad] too much, over it, shape (m, n)."""
+        key = f"{turned} {angle!r}"
+        if key not in self._by_label:
+            q, v, a, tree = self.cells.q, self._v, self.cells.a, self.robot.tree
+            changed = tree.torque(q - angle * np.eye(q.shape[1])[turned], v, a) - tree.torque(q, v, a)
+            some = np.abs(changed) > np.finfo(float).eps * 1e3 * np.max(np.abs(changed), initial=1.0)
+            self._by_label[key] = np.where(some, changed, 0.0) / angle
+        return self._by_label[key]
+
     @cached_property
     def _tilts(self) -> list[Array]:
         return tilt_torques(self.robot.tree, self.robot.tree, self.cells.q, np.zeros(2))
@@ -104,7 +121,7 @@ def has_columns(effect: Effect) -> bool:
     if isinstance(effect, JointTorque):
         return _is_plain(effect)
     gravity = isinstance(effect, Structure) and effect.form == "gravity"
-    return gravity or isinstance(effect, CommandEffect | InertiaEffect)
+    return gravity or effect.id == TURN or isinstance(effect, CommandEffect | InertiaEffect)
 
 
 def _is_plain(effect: JointTorque) -> bool:

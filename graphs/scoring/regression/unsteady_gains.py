@@ -4,15 +4,16 @@ r"""Drives whose constant is none: it falls with speed, with what they give, or 
     k (1 - c s) u = M a + c + g + b a + d v + mu sign(v),      s >= 0
     k u = M a + c + g + b a + (1 - c t) (d v + mu sign(v))
 
-with s the speed of the joint, the speed of all (a supply that sags), |u| of the drive (magnetic saturation), |u| of
-all, or time (a motor that warms); lubricants that warm take friction with them. The mean of such a gain is what a
-calibration takes for the constant, and it leaves so little open that residuals hardly tell. Beside the motion, s u or
-t (d v + mu sign(v)) is a column of the regression; its factor is c. No effect of the catalogue is like this.
+with s the speed of the joint, the speed of all (a supply that sags), |u| of the drive (magnetic saturation), max(1 -
+level / |u|, 0) (with a knee), |u| of all, or time (a motor that warms); lubricants that warm take friction with them.
+The mean of such a gain is what a calibration takes for the constant, and it leaves so little open that residuals hardly
+tell. Beside the motion, s u or t (d v + mu sign(v)) is a column of the regression; its factor is c. No effect of the
+catalogue is like this.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,22 @@ Array = NDArray[np.float64]
 
 SPEED, SPEEDS, COMMAND, COMMANDS, TIME = "speed", "speeds", "command", "commands", "time"
 FRICTION = "friction"  # that falls with time
-FORMS = (SPEED, COMMAND, TIME, FRICTION, SPEEDS, COMMANDS)  # simplest first
+BEYOND = "beyond"  # a level of the command
+FORMS = (SPEED, COMMAND, TIME, FRICTION, SPEEDS, COMMANDS, BEYOND)  # simplest first
+LEVELS = (
+    0.15,
+    0.3,
+    0.4,
+    0.5,
+    0.6,
+    0.7,
+    0.78,
+    0.85,
+    0.9,
+    0.94,
+    0.97,
+)  # quantiles of |u| tried as the level ...
+FINER, NEARER = 5, 3  # ... levels between the neighbours of the best of them, and how often in all
 LEFT = 0.25  # of the mean square that the plain regression leaves, which may be left where it is most clear ...
 ALSO = 0.5  # ... and at the other drives; friction or loads that change leave 0.33 or more
 BY_CHANCE = 1e-4  # probability that it need not be more plausible than
@@ -50,6 +66,7 @@ class UnsteadyGain:
         with_it: parameters of the joint with it over those without, by name; the constant is that without loss.
         evidence: for it, at its joint.
         nearly: how much less of it another cause there may have that is as good.
+        level: beyond which it falls, in the unit of the command; zero where it falls from nothing on.
     """
 
     joint: str
@@ -60,6 +77,7 @@ class UnsteadyGain:
     with_it: dict[str, float]
     evidence: float
     nearly: float
+    level: float = 0.0
 
 
 def unsteady_gains(rows: JointRows) -> tuple[UnsteadyGain, ...]:
@@ -85,10 +103,28 @@ def _is_clear(one: UnsteadyGain) -> bool:
 
 
 def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
-    """What the windows in which it is clearest say of one drive; None where they say nothing."""
+    """What is clearest of one drive; None where nothing is."""
     if form in (SPEEDS, COMMANDS) and rows.robot.n == 1:  # the same as those of one
         return None
-    scales = [_scale(rows, i, joint, form) for i in range(len(rows.motions(joint)))]
+    if form != BEYOND:
+        return _with(rows, joint, form, 0.0, 1)
+    sizes = np.concatenate([np.abs(signals[:, SIGNALS.index("command")]) for signals, _ in rows.motions(joint)])
+    levels, found = np.quantile(sizes, LEVELS), list[UnsteadyGain]()
+    for _ in range(NEARER):
+        told = [(level, _with(rows, joint, form, float(level), 2)) for level in levels if level > 0.0]
+        found += [one for _, one in told if one is not None]
+        best = max(found, key=lambda one: one.evidence, default=None)
+        if best is None:
+            return None
+        k = int(np.argmin(np.abs(levels - best.level)))
+        levels = np.linspace(levels[max(k - 1, 0)], levels[min(k + 1, len(levels) - 1)], FINER + 2)[1:-1]
+    assert best is not None
+    return replace(best, evidence=best.evidence - float(np.log(len(LEVELS))))
+
+
+def _with(rows: JointRows, joint: int, form: str, level: float, sizes: int) -> UnsteadyGain | None:
+    """What the windows in which it is clearest say of one drive; None where they say nothing."""
+    scales = [_scale(rows, i, joint, form, level) for i in range(len(rows.motions(joint)))]
     most = max(float(np.max(scale)) for scale in scales)
     told = [one for width in WIDTHS if (one := _under(rows, joint, width, form, scales)) is not None]
     if not told or most <= 0.0:
@@ -104,16 +140,18 @@ def _of(rows: JointRows, joint: int, form: str) -> UnsteadyGain | None:
     changes = changes_between(rows.robot, name, plain, best)
     if min(changes.values(), default=1.0) <= 0.0:  # a constant of that sign is none
         return None
-    worth = evidence(plain.left, best.left, clearest.seconds, 1)
-    return UnsteadyGain(name, form, lost, sigma * most, 1.0 - left, changes, worth, nearly(clearest.seconds))
+    worth, near = evidence(plain.left, best.left, clearest.seconds, sizes), nearly(clearest.seconds)
+    return UnsteadyGain(name, form, lost, sigma * most, 1.0 - left, changes, worth, near, level)
 
 
-def _scale(rows: JointRows, recording: int, joint: int, form: str) -> Array:
+def _scale(rows: JointRows, recording: int, joint: int, form: str, level: float) -> Array:
     """What a gain may fall with, shape (m,)."""
     signals = [rows.motions(j)[recording][0] for j in range(rows.robot.n)]
     of = SIGNALS.index("viscous" if form in (SPEED, SPEEDS) else "command")
     if form in (TIME, FRICTION):
         return np.linspace(0.0, 1.0, len(signals[joint]))
+    if form == BEYOND:
+        return np.asarray(np.maximum(1.0 - level / np.maximum(np.abs(signals[joint][:, of]), 1e-300), 0.0))
     if form in (SPEED, COMMAND):
         return np.abs(signals[joint][:, of])
     sizes = [np.abs(one[:, of]) for one in signals]

@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.diagnosis_words import part_in_words
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
-from jointscope.graphs.discovery.verdicts import excess_share, judge, worth_a_refit
+from jointscope.graphs.discovery.verdicts import excess_share, judge, standing_in, worth_a_refit
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
@@ -199,3 +200,12 @@ def test_one_weak_size_of_two_does_not_make_an_effect_untestable():
 def test_a_share_that_is_no_number_is_not_printed_as_one():
     assert part_in_words(0.896) == "90 %"
     assert part_in_words(float("nan")) == part_in_words(float("inf")) == "a part that cannot be told"
+
+
+@pytest.mark.parametrize(("velocity", "verdict"), [(0.004, "stand_in"), (0.1, "missing")])
+def test_friction_that_falls_only_where_samples_see_nothing_is_a_stand_in(velocity, verdict):
+    sizes = {"torque": EffectEstimate(2.0, 0.1, "N m"), "velocity": EffectEstimate(velocity, 1e-3, "rad/s")}
+    candidate = Candidate("motor_stribeck", "joint2", 400.0, 1, 1e-9, sizes, "missing")
+    found = standing_in(candidate, {"joint2": 0.016})
+    assert found.verdict == verdict
+    assert any("holds the joint until it breaks away" in reason for reason in found.reasons) == (verdict == "stand_in")

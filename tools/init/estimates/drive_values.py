@@ -23,6 +23,7 @@ from jointscope.graphs.starts.drive_regression import (
     Value,
     best_width,
     equations_by_width,
+    is_impossible,
     load_of,
 )
 from jointscope.graphs.starts.encoder_motion import slope_noise
@@ -37,7 +38,6 @@ from jointscope.tools.init.estimates.turning_over import turning_over
 Array = NDArray[np.float64]
 
 OPPOSITE = 10.0  # [sigma] from which a motor turns against its command
-IMPOSSIBLE = 3.5  # [sigma] below zero from which a value cannot be
 TOLD = 2.0  # [sigma] above zero from which a value is one
 SMALLEST = 0.02  # of the rms torque that a start value explains at least: it must be above zero
 MATCHED = 0.3  # of the link's inertia that a motor behind a gear has at least where springs hide it, or nothing tells
@@ -90,11 +90,6 @@ class DriveValues:
         """Whether the regression cannot tell a value from zero."""
         value = self.found.get(name)
         return value is None or self.unknown_scale or value.value <= TOLD * value.sigma
-
-
-def is_impossible(found: Mapping[str, Value]) -> bool:
-    """Whether an inertia or a friction among the values of a drive is surely below zero."""
-    return any(v.value < -IMPOSSIBLE * v.sigma for law, v in found.items() if law in PLACES)
 
 
 @dataclass(frozen=True)

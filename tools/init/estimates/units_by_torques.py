@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.screening.open_share import equations_of, open_share
 from jointscope.graphs.starts.drive_regression import GAIN
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
-from jointscope.tools.init.estimates.open_share import equations_of, open_share
 from jointscope.tools.init.estimates.position_units import COUNTS, LARGEST, UnitGuess
 
 Array = NDArray[np.float64]

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.graphs.starts.drive_regression import PLACES, Value
+from jointscope.graphs.starts.drive_regression import IMPOSSIBLE, PLACES, Value
 from jointscope.robots.units import joined, of_slide
-from jointscope.tools.init.estimates.drive_values import IMPOSSIBLE
 from jointscope.tools.init.robot_guess import RobotGuess
 
 GAIN_UNIT = {"N m": "1", "A": "N m/A", "V": "N m/V", "duty": "N m"}  # of torque per unit of the command

@@ -11,6 +11,7 @@ from jointscope.graphs.scoring.regression.asked_by_regression import most_plausi
 from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
 from jointscope.graphs.scoring.regression.unsteady_gains import (
+    BEYOND,
     COMMAND,
     FRICTION,
     SPEED,
@@ -22,6 +23,7 @@ from jointscope.robots.recordings.recording import Recording
 
 ARM, SECONDS = Arm(), 10.0
 CONSTANTS = (8.0, 5.0, 2.0)  # [N m/A]
+KNEE = np.array([1e3, 5.0, 1e3])  # [N m]
 HOW = {"seconds": SECONDS, "encoder_rate": 250.0, "command_rate": 250.0}
 
 
@@ -68,6 +70,18 @@ def test_what_a_gain_falls_with_is_told_and_the_constant_without_loss(robots, un
             assert one.with_it[f"{one.joint}.torque_constant"] > 1.005, "the plain one has a mean loss"
     if form == TIME:
         assert [one.lost for one in found] == pytest.approx([0.06] * 3, abs=0.01)
+
+
+def with_a_knee(_, u, __, ___):
+    return np.where(np.abs(u) > KNEE, np.sign(u) * (KNEE + 0.6 * (np.abs(u) - KNEE)), u)
+
+
+@pytest.mark.parametrize("unit", ["N m", "A"])
+def test_a_drive_that_gives_less_beyond_a_level_has_its_level_told(robots, unit):
+    rows = rows_of(robots, unit, drive=with_a_knee)
+    (found,) = most_plausible(rows, ["here"], regressed_causes(rows)).gains
+    assert found.form == BEYOND and found.joint == "j1"
+    assert found.level == pytest.approx(KNEE[1] / (CONSTANTS[1] if unit == "A" else 1.0), rel=0.03)
 
 
 @pytest.mark.parametrize("seed", [2, 4])

@@ -12,7 +12,6 @@ from simulated_arm import SHARP, Arm, divided, moved
 from jointscope.graphs.scoring.regression.asked_by_regression import most_plausible
 from jointscope.graphs.scoring.regression.joint_regression import joint_rows
 from jointscope.graphs.scoring.regression.regressed_causes import regressed_causes
-from jointscope.graphs.scoring.regression.turned_link import turn_instead
 from jointscope.robots.recordings.recording import Recording
 
 ARM, SECONDS = Arm(), 10.0
@@ -140,20 +139,18 @@ def test_links_that_weigh_what_they_should_are_not_blamed(robots, how):
     assert asked(robots, **how).link is None
 
 
-@pytest.mark.parametrize("offset", [0.04, -0.07])
-def test_a_link_that_seems_turned_about_its_axis_has_an_encoder_with_another_zero(robots, offset):
-    robot = robots["N m"]
+@pytest.mark.parametrize(("joint", "offset"), [(2, 0.04), (2, -0.07), (1, 0.05), (1, -0.2)])
+@pytest.mark.parametrize("unit", ["N m", "A"])
+def test_an_encoder_with_another_zero_is_not_taken_for_a_mass(robots, unit, joint, offset):
+    robot = robots[unit]
     encoder, command = moved(ARM, **HOW)
-    encoder = replace(encoder, values=encoder.values + np.array([0.0, 0.0, offset]))
+    encoder = replace(encoder, values=encoder.values + offset * np.eye(3)[joint])
     rows = joint_rows(robot, [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
     link = most_plausible(rows, ["arm.mcap"], regressed_causes(rows)).link
-    assert link.joint == ARM.joints[-1]
-    assert turn_instead(robot.tree, link) == pytest.approx(offset, abs=0.005)  # the calibration finds its size
+    assert link.label == f"encoder_offset@{ARM.joints[joint]}" and not link.tilted
+    assert link.turn == pytest.approx(offset, abs=0.005)  # the calibration finds its size
 
 
-def test_a_tool_at_the_tip_and_a_link_with_others_behind_it_are_not_turned(robots):
-    robot = robots["N m"]
+def test_a_tool_at_the_tip_is_not_another_zero(robots):
     link = asked(robots, drive=tool(0.5, (0.3, 0.0, 0.1))).link
-    assert link.moments
-    assert turn_instead(robot.tree, link) is None
-    assert turn_instead(robot.tree, replace(link, joint=ARM.joints[0])) is None
+    assert link.moments and not link.turn

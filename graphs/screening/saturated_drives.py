@@ -14,31 +14,14 @@ from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_li
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
-from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import si_unit
 
 SATURATION = "saturation"  # kind of its notices
-PLAIN_MISTAKES = ("unit", "axes", MIRRORED, SATURATION)  # kinds of notices that say what is wrong in a robot file
 FALLS = 0.1  # of a level that is gone at the largest speed, from which it falls with speed
 MARGIN = 0.02  # [s] before and after commands beyond a limit
 NEAR = 0.15  # [s] between moments that are left out as one
 MOST_LEFT_OUT, MOST_STRETCHES = 0.5, 30  # share of the recording, and how often
-
-
-def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
-    """What `screen` says of a recording, and drives that saturate.
-
-    Args:
-        recording: what was measured.
-        robot: what it was measured on.
-        every_joint: demand that every joint moves.
-
-    Raises:
-        RecordingError: as the screening says.
-    """
-    return [*screen(recording, robot, every_joint), *saturated_drives(robot, [recording])]
 
 
 def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Notice]:

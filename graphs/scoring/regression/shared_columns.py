@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+r"""Regression of all joints together on columns that they share: one body, one zero, one direction of gravity.
+
+    k u = M a + c + g + (columns x sizes: the same sizes at all joints) + b a + d v + mu sign(v)
+
+Each joint keeps its own constant, rotor and friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
+from jointscope.graphs.scoring.regression.evidence import evidence
+from jointscope.graphs.scoring.regression.joint_regression import JointRows, design_of, fit
+
+Array = NDArray[np.float64]
+
+ROUNDS = 3  # in which constants of drives are found with the sizes
+
+
+class SharedRows(NamedTuple):
+    """One joint's regression beside the columns of a link.
+
+    Attributes:
+        joint: index.
+        rows: of the joint alone, of the effects that the robot has, and of the link, shape (w, 5 + e + k).
+        blocks: of each window, shape (w,).
+        width: how many columns the link has, k.
+        plain: mean square that is left without the link.
+        seconds: of motion that the windows tell of.
+    """
+
+    joint: int
+    rows: Array
+    blocks: NDArray[np.intp]
+    width: int
+    plain: float
+    seconds: float
+
+    def without(self, block: int) -> SharedRows:
+        """The same where a block of time is left out."""
+        kept = self.blocks != block
+        return self._replace(rows=self.rows[kept], blocks=self.blocks[kept])
+
+
+class Told(NamedTuple):
+    """What windows of one width say of one link; sizes is one for the mass alone."""
+
+    here: EffectHypothesis
+    sizes: int
+    some: list[SharedRows]
+    found: Array
+    left: list[float]
+    evidence: float
+
+
+def told_of(rows: JointRows, link: EffectHypothesis, width: float, counts: tuple[int, ...]) -> list[Told]:
+    """What windows of one width [s] say of a link, by so many of its sizes: of its mass, and of its first moments."""
+    all_columns = {joint: rows.columns(joint, link) for joint in range(rows.robot.n)}
+    some = []
+    for joint, columns in all_columns.items():
+        if columns is not None:
+            beside = rows.beside(joint, width, rows.with_own(joint, columns))
+            if beside is not None:
+                count = len(columns[0])
+                plain = fit(rows.robot, joint, beside[0][:, :-count]).left
+                some.append(SharedRows(joint, *beside, count, max(plain, 1e-300), rows.seconds(width, len(beside[0]))))
+    if not some:
+        return []
+    told = []
+    for sizes in counts:
+        kept = [one._replace(rows=one.rows[:, : one.rows.shape[1] - one.width + sizes], width=sizes) for one in some]
+        found, left = solved(rows, link, kept)
+        worth = [evidence(one.plain, share, one.seconds, 0) for one, share in zip(kept, left, strict=True)]
+        cost = evidence(1.0, 1.0, max(one.seconds for one in kept), sizes)
+        told.append(Told(link, sizes, kept, found, left, sum(worth) + cost))
+    return told
+
+
+def solved(rows: JointRows, link: EffectHypothesis, some: Sequence[SharedRows]) -> tuple[Array, list[float]]:
+    """Sizes that all joints agree on, shape (k,), and the mean square that each joint leaves with them."""
+    robot, count = rows.robot, some[0].width
+    gains = [fit(robot, one.joint, one.rows[:, :-count]).gain for one in some]
+    free = [fit(robot, one.joint, one.rows).left for one in some]
+    prior = np.array([size.prior_sigma for size in link.sizes[:count]])
+    sizes: Array = np.zeros(count)
+    left = list[float]()
+    for _ in range(ROUNDS):
+        H, h = np.diag(1.0 / prior**2), np.zeros(count)
+        for one, gain, square in zip(some, gains, free, strict=True):
+            _, X, target = design_of(robot, one.joint, one.rows)
+            own, columns = _unit(X[:, :-count]), X[:, -count:] / gain
+            columns, target = columns - own @ (own.T @ columns), target - own @ (own.T @ target)
+            H += columns.T @ columns / max(square, 1e-300)
+            h += columns.T @ target / max(square, 1e-300)
+        sizes, left, gains = np.asarray(np.linalg.solve(H, h)), [], list(gains)
+        for i, one in enumerate(some):
+            with_it = fit(robot, one.joint, with_sizes(one, sizes))
+            left.append(with_it.left)
+            gains[i] = with_it.gain
+    return sizes, left
+
+
+def _unit(columns: Array) -> Array:
+    """An orthonormal basis of some columns."""
+    size = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+    basis, values, _ = np.linalg.svd(columns / size, full_matrices=False)
+    return np.asarray(basis[:, values > 1e-10 * values[0]]) if values.size else columns
+
+
+def with_sizes(one: SharedRows, sizes: Array) -> Array:
+    """Rows of a joint whose link weighs what is found: its torque is a part of the load."""
+    rows = one.rows[:, : -one.width].copy()
+    rows[:, 1] += one.rows[:, -one.width :] @ sizes
+    return rows

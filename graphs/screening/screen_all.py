@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All that looks odd in a recording of a robot, and which of it is a plain mistake in the robot's file."""
+
+from __future__ import annotations
+
+from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
+from jointscope.graphs.screening.saturated_drives import SATURATION, saturated_drives
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.imu_plausibility import MIRRORED
+from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.screening import screen
+
+PLAIN_MISTAKES = ("unit", "axes", MIRRORED, EXCHANGED, SATURATION)  # kinds of notices that say what is wrong in a file
+
+
+def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
+    """What `screen` says of a recording, joints that are exchanged, and else drives that saturate.
+
+    Args:
+        recording: what was measured.
+        robot: what it was measured on.
+        every_joint: demand that every joint moves.
+
+    Raises:
+        RecordingError: as the screening says.
+    """
+    odd = screen(recording, robot, every_joint)
+    return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]
