@@ -37,6 +37,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "spring_cubic": ("elastic joint", "stiffness"),
     "spring_curve": ("elastic joint", "quadratic cubic"),
     "backlash": ("elastic joint", "half_gap"),
+    "spring_slack": ("elastic joint", "forward backward"),
     "hysteresis": ("elastic joint", "torque deflection"),
     "kinematic_coupling": ("elastic joint", "from_joint2 from_joint3"),
     "link_viscous": ("joint", "coefficient"),
@@ -231,6 +232,10 @@ def test_help_lists_every_effect_once(capsys):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "spring_slack@joint1:forward=3,backward=9",
+            r"a gap of 12 rad, the slack of both ropes, is as wide as all that",
+        ),
         ("backlash@joint1:half_gap=50", r"a gap of 100 rad, twice half_gap, is as wide as all that the motor turns"),
         ("axis_misalignment@joint3:x=9", r"x: expected below 0.785 rad, got 9"),
     ],
