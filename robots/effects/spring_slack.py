@@ -39,6 +39,7 @@ EFFECT = JointTorque(
         excitation="deflections both ways that pass through zero, many of them; rests with loads of either sign",
         look_alikes={
             "backlash": "the same where both ropes are slack by as much, or where zeros of encoders are unknown",
+            "encoder_offset": "slack of one rope moves the middle of the spring, as a wrong zero does",
             "spring_curve": "an even term makes one direction soft, as slack of one rope does",
             "spring_cubic": "where both ropes are slack, both make the spring soft at small deflections",
             "torque_offset": "while the spring is loaded one way, slack of its rope takes a constant torque",

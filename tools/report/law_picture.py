@@ -90,7 +90,7 @@ def _of_unit(effect: JointTorque, example: Mapping[str, float], unit: str, other
     return next((abs(example[p.name]) for p in effect.parameters if p.unit == unit and p.name in example), otherwise)
 
 
-def _signals(**given: Array) -> JointSignals:
+def _signals(**given: Any) -> JointSignals:
     zero = np.zeros_like(next(iter(given.values())))
     return JointSignals(stiffness=STIFFNESS, **{name: given.get(name, zero) for name in MOTION})
 
