@@ -10,6 +10,7 @@ import numpy as np
 
 from jointscope.graphs.starts.command_limits import CommandLimit, limits_in, windows_of_drives
 from jointscope.graphs.starts.drive_starts import LIMIT, driven_joints
+from jointscope.graphs.starts.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.starts.uneven_limits import WIDTH, UnevenLimit, uneven_limit
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
@@ -20,7 +21,8 @@ from jointscope.robots.recordings.screening import screen
 from jointscope.robots.units import si_unit
 
 SATURATION = "saturation"  # kind of its notices
-PLAIN_MISTAKES = ("unit", "axes", MIRRORED, SATURATION)  # kinds of notices that say what is wrong in a robot file
+PLAIN_MISTAKES = ("unit", "axes", MIRRORED, SATURATION, JUMP)
+"""Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 FALLS = 0.1  # of a level that is gone at the largest speed, from which it falls with speed
 MARGIN = 0.02  # [s] before and after commands beyond a limit
 NEAR = 0.15  # [s] between moments that are left out as one
@@ -28,7 +30,7 @@ MOST_LEFT_OUT, MOST_STRETCHES = 0.5, 30  # share of the recording, and how often
 
 
 def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
-    """What `screen` says of a recording, and drives that saturate.
+    """What `screen` says of a recording, encoders on links that jump, and drives that saturate.
 
     Args:
         recording: what was measured.
@@ -38,7 +40,8 @@ def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) ->
     Raises:
         RecordingError: as the screening says.
     """
-    return [*screen(recording, robot, every_joint), *saturated_drives(robot, [recording])]
+    screened = screen(recording, robot, every_joint)
+    return [*screened, *jump_notices(recording, robot), *saturated_drives(robot, [recording])]
 
 
 def saturated_drives(robot: Robot, recordings: Sequence[Recording]) -> list[Notice]:
