@@ -56,7 +56,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "axis_misalignment": ("joint", "x y"),
     "encoder_delay": ("joint, robot, target, link encoders", "delay"),
     "encoder_filter": ("joint, robot", "variance"),
-    "encoder_offset": ("joint", "offset"),
+    "encoder_offset": ("joint, joint seen on the link", "offset"),
     "torque_constant_error": ("joint", "share"),
     "link_mass": ("joint", "mass x y z"),
     "gyro_delay": ("imu", "delay"),
