@@ -15,7 +15,7 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
-ORDERS = (3.0, 4.0, 5.0, 6.0, 8.0, 12.0)
+ORDERS = (3.0, 4.0, 6.0, 8.0)
 OF_MOTOR = (2.0, 3.0, 4.0)  # times the gear's ratio
 
 
@@ -51,7 +51,7 @@ EFFECT = EncoderHarmonics(
     ),
     example={"cos": 0.002, "sin": 0.003, "order": 4.0},
     card=Card(
-        title="error of an encoder several times per turn",
+        title="higher harmonics of an encoder",
         law="reading = q_motor + A cos(N q_motor) + B sin(N q_motor), with A = cos, B = sin, N = order: periods per "
         "turn of the joint; q_link for an encoder on the link, JOINT.link",
         explanation="What is read are the sine and the cosine of N times the angle: teeth of a gear rim, pole pairs of "
