@@ -15,7 +15,7 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
-ORDERS = (3.0, 4.0, 6.0, 8.0)
+ORDERS = (3.0, 4.0, 5.0, 6.0, 8.0)
 OF_MOTOR = (2.0, 3.0, 4.0)  # times the gear's ratio
 
 
