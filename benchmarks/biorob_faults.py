@@ -43,6 +43,8 @@ FAULTS: tuple[tuple[str, tuple[dict[str, float], dict[str, float]]], ...] = (  #
     ("encoder_delay@link_encoder", ({"delay": 0.001}, {"delay": 0.004})),
     ("encoder_offset@joint2.link", ({"offset": 0.01}, {"offset": 0.05})),
     ("spring_cubic@joint3", ({"stiffness": 0.3}, {"stiffness": 1.5})),
+    ("spring_slack@joint2", ({"forward": 0.05, "backward": 0.0}, {"forward": 0.3, "backward": 0.0})),
+    ("encoder_harmonics@joint1.link", ({"cos": 0.003, "sin": 0.0}, {"cos": 0.01, "sin": 0.01})),
 )
 
 

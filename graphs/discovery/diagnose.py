@@ -32,6 +32,7 @@ from jointscope.graphs.discovery.verdicts import (
     ranked,
     slowest_seen,
     standing_in,
+    with_best_held_out,
     worth_a_refit,
 )
 from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
@@ -82,6 +83,7 @@ def diagnose(
     missing_torque: bool = True,
     side_by_side: SideBySide | None = None,
     barred: Collection[str] = (),
+    each_held_out: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Ranks the effects that a model lacks.
@@ -97,6 +99,7 @@ def diagnose(
         missing_torque: estimate the missing torque, too; pictures need it, no verdict does.
         side_by_side: who fits the candidates, if not this process alone.
         barred: ID@OWNER of candidates that did not hold when calibrated; those after them by torque take their place.
+        each_held_out: score the held-out recording with every refit, not with the best one alone.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -122,7 +125,7 @@ def diagnose(
     clock.stage("missing torque")
     percent: Mapping[str, float] = {}
     if torques is None:
-        candidates, refits = _by_predictions(base, scored, before, (fit, spans), holdout, leaders, report, pool)
+        candidates, refits = _by_predictions(trials, scored, leaders, report, pool, each_held_out)
     else:
         candidates, refits, percent = torques.candidates, torques.refits, torques.percent
     clock.stage("refits")
@@ -234,22 +237,23 @@ def _elsewhere(base: BaseModel, holdout: Recording | None, torques: TorqueVerdic
 
 
 def _by_predictions(
-    base: BaseModel,
+    trials: SpringTrials,
     scored: ScoredCandidates,
-    before: ValidationError,
-    spans: tuple[Sequence[Span], Sequence[Span]],
-    holdout: Recording | None,
     leaders: int,
     report: Progress,
     side_by_side: SideBySide,
+    each_held_out: bool,
 ) -> tuple[list[Candidate], Mapping[str, Robot]]:
     """Candidates judged by predictions after their refits, best first, and the robots refitted."""
+    base, before, spans = trials.base, trials.before, trials.spans
+    holdout = trials.holdout if each_held_out else None
     validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
     seconds = judged_seconds(base, spans[1])
     judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     slowest = slowest_seen(base.robot, base.recordings[0], base.states[0])
-    judged = [standing_in(c, slowest) for c in judged]
-    return ranked(judged), {label: t.refit.robot for label, t in validated.items()}
+    judged = ranked([standing_in(c, slowest) for c in judged])
+    refits = {label: t.refit.robot for label, t in validated.items()}
+    return judged if each_held_out else with_best_held_out(judged, refits, trials.holdout), refits
 
 
 def _refit_leaders(

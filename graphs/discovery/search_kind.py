@@ -98,5 +98,6 @@ class Motion:
             missing_torque=self.missing_torque,
             side_by_side=self.side_by_side,
             barred=barred,
+            each_held_out=False,
             progress=report,
         )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
-from jointscope.graphs.refits.validation import ValidationError
+from jointscope.graphs.refits.validation import ValidationError, reported_heldout_error
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
@@ -236,3 +236,14 @@ def yielding(candidate: Candidate, best: Candidate) -> Candidate:
         return candidate
     reason = f"but {best.label} explains more of it; look again once that is in the model"
     return replace(candidate, verdict="possible", reasons=(*candidate.reasons, reason))
+
+
+def with_best_held_out(
+    candidates: Sequence[Candidate], refits: Mapping[str, Robot], holdout: Recording | None
+) -> list[Candidate]:
+    """The candidates, the best missing one with its error on the held-out recording."""
+    best = next((c for c in candidates if c.verdict == "missing"), None)
+    if best is None:
+        return list(candidates)
+    held_out = replace(best, heldout_error=reported_heldout_error(refits[best.label], holdout))
+    return [held_out if c is best else c for c in candidates]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.calibration.base_model import BaseModel
-from jointscope.graphs.scoring.columns.gap import BEYOND, curves_of
+from jointscope.graphs.scoring.columns.gap import BEYOND, curves_of, tried_gap
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.robots.dynamics.transmission import Transmission
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -31,33 +31,33 @@ def with_hidden_gap(robot: Robot, base: BaseModel, score: HypothesisScore | None
         score: the hypothesis.
     """
     effect = None if score is None else score.hypothesis.here.effect
-    if score is None or not isinstance(effect, JointTorque) or effect.gap not in score.hypothesis.shapes:
+    if score is None or not isinstance(effect, JointTorque) or not (gap := tried_gap(effect, score.hypothesis)):
         return robot
     here, sizes = score.hypothesis.here, [size.name for size in score.hypothesis.sizes]
     stiffness, damping = (f"{here.owner}.{name}" for name in BEYOND)
-    values = _curve_beyond(base, here, score.hypothesis.shapes[effect.gap])
+    values = _curve_beyond(base, here, gap)
     found = dict(zip(sizes, score.estimate.tolist(), strict=True))
     values[stiffness] = max(values[stiffness], SOFTEST * robot.parameters[stiffness].prior)
     values[damping] = max(found[BEYOND[1]], SOFTEST * robot.parameters[damping].prior)
     return robot.with_values({name: value for name, value in values.items() if not robot.parameters[name].fixed})
 
 
-def _curve_beyond(base: BaseModel, gap: EffectAt, half: float) -> dict[str, float]:
+def _curve_beyond(base: BaseModel, here: EffectAt, gap: tuple[float, ...]) -> dict[str, float]:
     """Stiffness and terms of the curve that give the base model's torques from the deflection beyond a gap."""
     robot = base.robot
     values = {name: parameter.value for name, parameter in robot.parameters.items()}
-    d = np.concatenate([_deflection(robot, values, x, gap.owner) for x in base.states])
-    stiffness, curves = f"{gap.owner}.{BEYOND[0]}", curves_of(robot, gap)
+    d = np.concatenate([_deflection(robot, values, x, here.owner) for x in base.states])
+    stiffness, curves = f"{here.owner}.{BEYOND[0]}", curves_of(robot, here)
     names, before = [stiffness], values[stiffness] * d
-    columns, sigmas = [beyond_gap(d, half)], [robot.parameters[stiffness].prior_sigma]
-    for here in curves:
-        assert isinstance(here.effect, JointTorque)
-        law, own = here.effect.law, here.own(values)
+    columns, sigmas = [beyond_gap(d, *gap)], [robot.parameters[stiffness].prior_sigma]
+    for curve in curves:
+        assert isinstance(curve.effect, JointTorque)
+        law, own = curve.effect.law, curve.own(values)
         before = before + np.real(law(_signals(d), own))
         nothing = dict.fromkeys(own, 0.0)
         for name in own:
-            slope = law(replace(_signals(d), gap=half), {**nothing, name: 1j * STEP})
-            names.append(here.parameter(name))
+            slope = law(replace(_signals(d), gap=gap), {**nothing, name: 1j * STEP})
+            names.append(curve.parameter(name))
             columns.append(np.imag(slope) / STEP)
             sigmas.append(robot.parameters[names[-1]].prior_sigma)
     A = np.column_stack(columns)

@@ -115,9 +115,11 @@ def start_of(score: HypothesisScore, robot: Robot) -> dict[str, float]:
     """Where the refit starts: the predicted sizes, kept positive where the law needs it, and the best shapes."""
     here, start = score.hypothesis.here, {}
     for size, value in zip(score.hypothesis.sizes, score.estimate, strict=True):
-        start[size.name] = max(float(value), SMALLEST_START * size.start) if size.logarithmic else float(value)
-    known = {p.name for p in here.effect.parameters_at(robot, here.owner)}
-    start = {name: value for name, value in (start | dict(score.hypothesis.shapes)).items() if name in known}
+        start[size.name] = float(value)
+    start |= score.hypothesis.shapes
+    known = [p for p in here.effect.parameters_at(robot, here.owner) if p.name in start]
+    least = {p.name: SMALLEST_START * p.start if p.logarithmic else -np.inf for p in known}
+    start = {name: max(start[name], smallest) for name, smallest in least.items()}
     if isinstance(here.effect, Structure) and here.effect.form == "bearing":
         start |= _bearing_start(score, robot)
     return start

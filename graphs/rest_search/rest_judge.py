@@ -18,6 +18,7 @@ from jointscope.graphs.rest_search.rest_fits import Mask, RestFit
 from jointscope.graphs.rest_search.rest_hypotheses import tried_and_silent
 from jointscope.graphs.rest_search.rest_race import ALIKE, Race, Tried, race, significant
 from jointscope.graphs.rest_search.rest_scores import RestScore, RestScores, score_rests
+from jointscope.robots.effect_kinds.effect import EffectParameter
 
 Array = NDArray[np.float64]
 MOST = 0.6  # share of the groups that must be likelier
@@ -199,9 +200,16 @@ def _possible(tried: Tried) -> bool:
     found = tried.sizes
     for size in tried.score.score.hypothesis.sizes:
         beyond = found[size.name] - size.null
-        if abs(beyond) > size.prior_sigma or (size.sign == "+" and beyond < 0.0):
+        if abs(beyond) > _largest(size) or (size.sign == "+" and beyond < 0.0):
             return False
     return True
+
+
+def _largest(size: EffectParameter) -> float:
+    """The largest size that its prior leaves plausible; a logarithm's may be off by two of its own sigmas."""
+    if not size.logarithmic:
+        return size.prior_sigma
+    return float(size.start * np.exp(2.0 * size.prior_sigma / size.start))
 
 
 def _sizes(score: RestScore, tried: Tried | None) -> dict[str, tuple[float, float, str]]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All that looks odd in a recording of a robot, and which of it is a plain mistake in the robot's file."""
+"""All that looks odd in a recording of a robot, and what of it must be mended before anything is computed."""
 
 from __future__ import annotations
 
+from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
 from jointscope.graphs.screening.saturated_drives import SATURATION, saturated_drives
 from jointscope.robots.model.robot import Robot
@@ -10,11 +11,12 @@ from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
 
-PLAIN_MISTAKES = ("unit", "axes", MIRRORED, EXCHANGED, SATURATION)  # kinds of notices that say what is wrong in a file
+PLAIN_MISTAKES = ("unit", "axes", MIRRORED, EXCHANGED, SATURATION, JUMP)
+"""Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
 
 def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
-    """What `screen` says of a recording, joints that are exchanged, and else drives that saturate.
+    """What `screen` says, encoders on links that jump, joints that are exchanged, and else drives that saturate.
 
     Args:
         recording: what was measured.
@@ -24,5 +26,5 @@ def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) ->
     Raises:
         RecordingError: as the screening says.
     """
-    odd = screen(recording, robot, every_joint)
+    odd = [*screen(recording, robot, every_joint), *jump_notices(recording, robot)]
     return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]

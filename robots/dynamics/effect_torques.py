@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -180,7 +181,7 @@ class _LocalLaw:
         layout: StateLayout,
         names: tuple[str, ...],
         weight: CarriedWeight,
-        gap: str,
+        gap: tuple[str, ...],
     ):
         assert isinstance(here.effect, JointTorque)
         self.here, self.effect, self._gap = here, here.effect, gap
@@ -190,21 +191,18 @@ class _LocalLaw:
         laws = [here.effect.law] if here.effect.memory is None else [here.effect.law, here.effect.memory.rate]
         self._used = {law: signals_used(law, some) for law in laws}
         self._q_link = layout.q_link
-        self._columns = {
-            **{"q_link": int(layout.joint_q[j]), "v_link": int(layout.joint_v[j])},
-            **{"q_motor": int(layout.motor_q[j]), "v_motor": int(layout.motor_v[j])},
-        }
+        at = {"q_link": layout.joint_q, "v_link": layout.joint_v, "q_motor": layout.motor_q, "v_motor": layout.motor_v}
+        self._columns = {signal: int(columns[j]) for signal, columns in at.items()}
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
-        self._rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}[
-            here.effect.side
-        ]
+        rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}
+        self._rows = rows[here.effect.side]
         self._memory_row = -1
         if here.effect.memory is not None:
             index = layout.memories.index(here.label)
             self._columns["memory"] = layout.memory.start + index
             self._memory_row = layout.n_link + layout.n_motor + index
-        shared = {"sharpness": f"{here.owner}.{SHARPNESS}", "gap": gap}  # signals that may be free parameters
-        self._shared = [(signal, names.index(name)) for signal, name in shared.items() if name in names]
+        self._sharpness = next((k for k, name in enumerate(names) if name == f"{here.owner}.{SHARPNESS}"), None)
+        self._ends = [(end, names.index(name)) for end, name in enumerate(gap) if name in names]
         self._own: dict[str, str] = {}  # names are the same whenever values come
         self._names = {name.rsplit(".", 1)[1]: k for k, name in enumerate(names) if name.startswith(here.parameter(""))}
 
@@ -223,7 +221,7 @@ class _LocalLaw:
         carried = carried if self.on_weight else None
         load = springs.torque[:, j] if carried is None else carried.torque[:, j]
         signals |= {"tau_spring": load, "stiffness": springs.stiffness[j]}
-        signals |= {"sharpness": sharpness, "gap": values[self._gap] if self._gap else None}
+        signals |= {"sharpness": sharpness, "gap": tuple(values[name] for name in self._gap) or None}
         self._own = self._own or self.here.own_names(values)
         p = {name: values[full] for name, full in self._own.items()}
         self._add_law(terms, self.effect.law, self._rows, signals, p, springs, carried)
@@ -261,12 +259,14 @@ class _LocalLaw:
                 continue
             for row, sign in rows:
                 self._chain(terms, row, name, sign * slope, springs, j)
-        slopes = [(index, self._slope(law, signals, name, p)) for name, index in self._shared]
+        slopes = [] if self._sharpness is None else [(self._sharpness, self._slope(law, signals, "sharpness", p))]
+        for end, index in self._ends:
+            moved = tuple(value + 1j * STEP * (k == end) for k, value in enumerate(signals["gap"]))
+            slopes.append((index, np.imag(law(JointSignals(**{**signals, "gap": moved}), p)) / STEP))
         for name, index in self._names.items():
             slopes.append((index, np.imag(law(here, {**p, name: p[name] + 1j * STEP})) / STEP))
-        for index, slope in slopes:
-            for row, sign in rows:
-                terms.by_parameter[:, row, index] += sign * slope
+        for (index, slope), (row, sign) in product(slopes, rows):
+            terms.by_parameter[:, row, index] += sign * slope
 
     @staticmethod
     def _slope(law: Law, signals: dict[str, Any], name: str, p: dict[str, float]) -> Array:

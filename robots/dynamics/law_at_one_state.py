@@ -52,7 +52,7 @@ class JointLawAtOneState:
         layout, j = robot.layout, robot.joints.index(here.owner)
         self._p, self._sharpness = here.own(values), robot.sharpness_of(here.owner, values)
         gap = here.effect.behind(robot.effects, here.owner)
-        self._gap = values[gap] if gap else None
+        self._gap = tuple(values[name] for name in gap) or None
         columns = [layout.joint_q[j], layout.joint_v[j], layout.motor_q[j], layout.motor_v[j]]
         link, motor = int(layout.joint_link[j]), int(layout.motor_row[j])
         rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}

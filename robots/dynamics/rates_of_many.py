@@ -158,7 +158,7 @@ class _LawOfMany:
             self._rows = rows[effect.side]
             self._memory = layout.memories.index(here.label) if effect.memory is not None else -1
             gap = effect.behind(robot.effects, here.owner)
-            self._gap = values[gap] if gap else None
+            self._gap = tuple(values[name] for name in gap) or None
             self.needs_weight = weight.on(here.owner, effect, self._p) is not None
             if sharpness is not None and effect.side == "motor":
                 self._compare(sharpness)

@@ -37,7 +37,7 @@ class JointSignals:
         stiffness: K [N m/rad].
         sharpness: k of the base model's friction law [s/rad]; complex while a derivative by it is wanted.
         memory: the effect's own state, if its kind has one.
-        gap: half of the dead zone in front of the spring, which its laws do not see [rad]; None for none.
+        gap: dead zone in front of the spring, which its laws do not see, as `beyond_gap` takes it [rad]; None for none.
     """
 
     q_link: Any
@@ -48,13 +48,13 @@ class JointSignals:
     stiffness: Any
     sharpness: Any = SHARPNESS
     memory: Any = 0.0
-    gap: Any = None
+    gap: tuple[Any, ...] | None = None
 
     @cached_property
     def deflection(self) -> Any:
         """q_link - q_motor, what the spring feels of it [rad]."""
         whole = self.q_link - self.q_motor
-        return whole if self.gap is None else beyond_gap(whole, self.gap)
+        return whole if self.gap is None else beyond_gap(whole, *self.gap)
 
     @property
     def deflection_rate(self) -> Any:
@@ -91,24 +91,24 @@ class JointTorque(Effect):
         load: what `tau_spring` of an elastic joint is: the torque that the spring transmits, or the weight behind it,
             in motor coordinates; a law on the weight does not depend on the link.
         memory: the effect's own state; None for a law without memory.
-        gap: name of the size that is half of a dead zone in front of the spring: other laws of the spring feel the
-            deflection beyond it; empty for none.
+        gap: names of the sizes of a dead zone in front of the spring, as `beyond_gap` takes them: other laws of the
+            spring feel the deflection beyond it; empty for none.
     """
 
     side: str
     law: Law = field(repr=False)
     load: str = "transmitted"
     memory: Memory | None = None
-    gap: str = ""
+    gap: tuple[str, ...] = ()
 
-    def behind(self, effects: Sequence[EffectAt], owner: str) -> str:
-        """Full name of the size of the dead zone that lies before this law at an owner; empty for none."""
+    def behind(self, effects: Sequence[EffectAt], owner: str) -> tuple[str, ...]:
+        """Full names of the sizes of the dead zone that lies before this law at an owner; empty for none."""
         if self.side != "spring" or self.gap:
-            return ""
+            return ()
         for here in effects:
             if here.owner == owner and isinstance(here.effect, JointTorque) and here.effect.gap:
-                return here.parameter(here.effect.gap)
-        return ""
+                return tuple(here.parameter(name) for name in here.effect.gap)
+        return ()
 
 
 SIGNALS = ("q_link", "v_link", "q_motor", "v_motor", "tau_spring", "stiffness", "memory")
@@ -146,12 +146,27 @@ def log_cosh(x: Any) -> Any:
     return y + np.log1p(np.exp(-2.0 * y)) - np.log(2.0)
 
 
-def beyond_gap(x: Any, half: Any) -> Any:
-    """What is left of x beyond a dead zone from -half to half, corners rounded; exactly x at half = 0."""
-    outer, inner = (x + half) / GAP_CORNER, (x - half) / GAP_CORNER
-    return x - 0.5 * GAP_CORNER * (log_cosh(outer) - log_cosh(inner))
+def beyond_gap(x: Any, below: Any, above: Any = None) -> Any:
+    """What is left of x beyond a dead zone from -below to above, corners rounded; exactly x where both are 0.
+
+    Args:
+        x: shape (m,).
+        below: how far it reaches below zero, shape () or (m,).
+        above: how far above; None for as far.
+    """
+    above = below if above is None else above
+    outer, inner = (x + below) / GAP_CORNER, (x - above) / GAP_CORNER
+    return x - 0.5 * GAP_CORNER * (log_cosh(outer) - log_cosh(inner)) + 0.5 * (below - above)
 
 
-def within_gap(x: Any, half: Any) -> Any:
+def within_gap(x: Any, below: Any, above: Any = None) -> Any:
     """1 within such a dead zone, 0 beyond it, corners rounded."""
-    return 0.5 * (np.tanh((x + half) / GAP_CORNER) - np.tanh((x - half) / GAP_CORNER))
+    above = below if above is None else above
+    return 0.5 * (np.tanh((x + below) / GAP_CORNER) - np.tanh((x - above) / GAP_CORNER))
+
+
+def loosened(s: JointSignals, *gap: Any) -> Any:
+    """What a spring and its damper lose to a dead zone, as `beyond_gap` takes it, shape (m,) [N m]."""
+    d = s.deflection
+    damper = s.tau_spring - s.stiffness * d
+    return s.stiffness * (beyond_gap(d, *gap) - d) - damper * within_gap(d, *gap)

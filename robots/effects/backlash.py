@@ -7,21 +7,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from jointscope.robots.effect_kinds.effect import Card, EffectParameter
-from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, beyond_gap, within_gap
+from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque, loosened
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:
     """K (dz(deflection, g) - deflection) - D rate within the gap [N m], corners rounded; exactly zero at g = 0."""
-    d, half = s.deflection, p["half_gap"]
-    damper = s.tau_spring - s.stiffness * d
-    return s.stiffness * (beyond_gap(d, half) - d) - damper * within_gap(d, half)
+    return loosened(s, p["half_gap"])
 
 
 EFFECT = JointTorque(
     id="backlash",
     side="spring",
     law=law,
-    gap="half_gap",
+    gap=("half_gap",),
     parameters=(EffectParameter("half_gap", "rad", start=0.005, prior_sigma=0.015, sign="+", logarithmic=True),),
     example={"half_gap": 0.01},
     card=Card(
@@ -37,6 +35,7 @@ EFFECT = JointTorque(
         look_alikes={
             "spring_cubic": "both make the spring soft at small and hard at large deflections",
             "hysteresis": "both lag behind after a reversal; hysteresis takes energy, a gap does not",
+            "spring_slack": "the same where both ropes are slack by as much, or where zeros of encoders are unknown",
         },
     ),
 )

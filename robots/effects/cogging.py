@@ -62,6 +62,7 @@ EFFECT = Cogging(
         excitation="slow motion over more than one period of the ripple, better over the whole range",
         look_alikes={
             "encoder_eccentricity": "an error of the reading that repeats with the position bends the estimated motion",
+            "encoder_harmonics": "an error of the reading that repeats with the position bends the estimated motion",
             "gravity_imbalance": "at order 1 both are a sine of the position",
         },
     ),

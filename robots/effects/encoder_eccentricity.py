@@ -63,6 +63,7 @@ EFFECT = EncoderEccentricity(
         typical="1e-4 to 5e-3 rad, 0.05 rad for Hall sensors",
         excitation="motion over a good part of a turn of the encoder, with a gyro that sees the joint",
         look_alikes={
+            "encoder_harmonics": "over a part of a turn low harmonics bend the reading alike",
             "cogging": "an error of the reading that repeats with the position bends the estimated motion",
             "encoder_scale": "over a small part of a turn the slope of the error is a scale",
             "gyro_scale": "over a small part of a turn the slope of the error is a scale between encoder and gyro",

@@ -37,6 +37,7 @@ EFFECT = ReadingEffect(
         look_alikes={
             "gravity_direction": "at a joint with a level axis a turned base and a turned zero are the same",
             "gravity_imbalance": "weight in another posture differs by a sine of the angle",
+            "spring_slack": "slack of one rope moves the middle of the spring, as a wrong zero does",
             "axis_misalignment": "where axes are nearly parallel, a zero of one is a turn about the other",
         },
     ),

@@ -51,6 +51,7 @@ EFFECT = SpringCubic(
         excitation="large and small deflections: hard stops and chirps beside gentle motion",
         look_alikes={
             "backlash": "both make the spring soft at small and hard at large deflections",
+            "spring_slack": "where both ropes are slack, both make the spring soft at small deflections",
             "spring_curve": "the same where the curve is alike in both directions",
             "hysteresis": "both change the apparent stiffness with the size of the deflection",
         },

@@ -57,6 +57,7 @@ EFFECT = SpringCurve(
         excitation="large deflections both ways: weights that pull up and down, hard stops, fast reversals",
         look_alikes={
             "spring_cubic": "the same where the curve is alike in both directions",
+            "spring_slack": "an even term makes one direction soft, as slack of one rope does",
         },
     ),
 )

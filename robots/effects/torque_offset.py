@@ -33,6 +33,7 @@ EFFECT = JointTorque(
         typical="0 to 5 % of the rated torque",
         excitation="rests and slow motion in both directions at several positions",
         look_alikes={
+            "spring_slack": "while the spring is loaded one way, slack of its rope takes a constant torque",
             "asymmetric_friction": "while the motor moves both are a constant torque",
             "parallel_spring": "near one position the spring is a constant torque",
             "gravity_imbalance": "near one position the weight is a constant torque, too",

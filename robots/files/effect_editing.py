@@ -11,6 +11,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.effect_at import EffectAt
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_catalogue import catalogue, parse_effect, without_alias
@@ -136,7 +137,15 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
     spring = needed_spring(robot, here)
     if spring:
         return f"{owner} is rigid and has no spring; add {spring} first"
+    gap = next((other for other in robot.effects if other.owner == owner and _leaves_gap(other)), None)
+    if gap is not None and _leaves_gap(here) and gap.effect.id != effect.id:
+        return f"{gap.label} is the dead zone of its spring already; remove that first"
     return ""
+
+
+def _leaves_gap(here: EffectAt) -> bool:
+    """Whether an effect is a dead zone in front of a spring."""
+    return isinstance(here.effect, JointTorque) and bool(here.effect.gap)
 
 
 def parameter_of(here: EffectAt, p: EffectParameter, value: float) -> Parameter:

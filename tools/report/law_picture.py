@@ -58,7 +58,7 @@ def law_picture(effect: Effect) -> str | None:
 def _is_size(effect: JointTorque, name: str) -> bool:
     """Whether a parameter scales the torque; others say where on the way something happens."""
     unit = next((p.unit for p in effect.parameters if p.name == name), "")
-    return unit.startswith("N m") or name in ("coefficient", "quadratic", "half_gap")
+    return unit.startswith("N m") or name in ("coefficient", "quadratic", "half_gap", "forward", "backward")
 
 
 def _motions(effect: JointTorque, example: Mapping[str, float]) -> tuple[str, Array, dict[str, JointSignals]]:
@@ -90,7 +90,7 @@ def _of_unit(effect: JointTorque, example: Mapping[str, float], unit: str, other
     return next((abs(example[p.name]) for p in effect.parameters if p.unit == unit and p.name in example), otherwise)
 
 
-def _signals(**given: Array) -> JointSignals:
+def _signals(**given: Any) -> JointSignals:
     zero = np.zeros_like(next(iter(given.values())))
     return JointSignals(stiffness=STIFFNESS, **{name: given.get(name, zero) for name in MOTION})
 

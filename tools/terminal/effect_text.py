@@ -100,7 +100,7 @@ def remark_text(p: EffectParameter) -> str:
     if len(p.grid) > 1:
         remarks.append(f"a diagnosis tries {len(p.grid)} values, {p.grid[0]:g} to {p.grid[-1]:g}")
     if p.weak:
-        remarks.append("often weak, held by its prior")
+        remarks.append("often weak" if len(p.grid) > 1 else "often weak, held by its prior")
     return "; ".join(remarks)
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
+from jointscope.graphs.screening.encoder_jumps import JUMP
 from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -21,6 +22,7 @@ CONTRADICTED = (
 BEYOND_LIMITS = (
     "Look at this first: a limit of the URDF may be wrong, or a unit; the calibration goes on without limits.\n"
 )
+JUMPED = "Look at this first: values of a recording in which an encoder jumps are those of no robot.\n"
 
 
 def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | None = None) -> None:
@@ -47,7 +49,7 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     lead = ERASE_LINE if stream.isatty() else ""
     for text, path in seen.items():
         stream.write(f"{lead}{path}: {text}\n")
-    stream.write(BEYOND_LIMITS if kinds == {LIMIT} else CONTRADICTED)
+    stream.write({frozenset({LIMIT}): BEYOND_LIMITS, frozenset({JUMP}): JUMPED}.get(frozenset(kinds), CONTRADICTED))
     stream.flush()
 
 

@@ -47,15 +47,22 @@ def gap_hypotheses(segments: Sequence[ScoreSignals]) -> list[EffectHypothesis]:
                 EffectParameter(name, p.unit, p.prior, p.prior_sigma or p.prior, sign="+")
                 for name, p in zip(BEYOND, known, strict=True)
             )
-            found += [EffectHypothesis(here, sizes, {effect.gap: share * largest}) for share in TRIED]
+            none = dict.fromkeys(effect.gap, 0.0)
+            tried = [none | {end: share * largest} for end in effect.gap for share in TRIED]
+            found += [EffectHypothesis(here, sizes, gap) for gap in tried]
     return found
 
 
-def torque_beyond(signals: JointSignals, name: str, half: float) -> Array:
+def tried_gap(effect: JointTorque, hypothesis: EffectHypothesis) -> tuple[float, ...]:
+    """The dead zone that a hypothesis tries, as `beyond_gap` takes it; empty for one that is scored at null."""
+    return tuple(hypothesis.shapes[name] for name in effect.gap if name in hypothesis.shapes)
+
+
+def torque_beyond(signals: JointSignals, name: str, gap: Sequence[float]) -> Array:
     """Torque of a spring or a damper that begins beyond a gap, by its stiffness or its damping, shape (m + 1,)."""
     if name == BEYOND[0]:
-        return np.asarray(beyond_gap(signals.deflection, half))
-    return np.asarray(signals.deflection_rate * (1.0 - within_gap(signals.deflection, half)))
+        return np.asarray(beyond_gap(signals.deflection, *gap))
+    return np.asarray(signals.deflection_rate * (1.0 - within_gap(signals.deflection, *gap)))
 
 
 def curves_of(robot: Robot, gap: EffectAt) -> list[EffectAt]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.columns.column import STEP, Column, null_values
-from jointscope.graphs.scoring.columns.gap import curves_of, torque_beyond
+from jointscope.graphs.scoring.columns.gap import curves_of, torque_beyond, tried_gap
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.robots.dynamics.transmission import is_behind
@@ -26,7 +26,7 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     x = s.seen if is_behind(hypothesis.here, s.robot) else s.x
     signals = joint_signals(s, j, x)
     gap = effect.behind(s.robot.effects, hypothesis.here.owner)
-    signals = replace(signals, gap=s.values[gap]) if gap else signals
+    signals = replace(signals, gap=tuple(s.values[name] for name in gap)) if gap else signals
     if effect.load == "weight":
         signals = replace(signals, tau_spring=s.weight[:, j])
     p = null_values(hypothesis)
@@ -37,12 +37,13 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
     rows = {"link": ((link, 1.0),), "motor": ((motor, 1.0),), "spring": ((link, -1.0), (motor, 1.0))}[effect.side]
     found = []
     for size in hypothesis.sizes:
-        if effect.gap in hypothesis.shapes:
-            slope = torque_beyond(signals, size.name, hypothesis.shapes[effect.gap])
+        if tried := tried_gap(effect, hypothesis):
+            slope = torque_beyond(signals, size.name, tried)
         else:
             slope = np.imag(effect.law(signals, {**p, size.name: p[size.name] + 1j * STEP})) / STEP
-        if size.name == effect.gap:
-            slope = slope + _of_curves(hypothesis, s, signals)
+        if size.name in effect.gap:
+            moved = tuple(1j * STEP * (name == size.name) for name in effect.gap)
+            slope = slope + _of_curves(hypothesis, s, replace(signals, gap=moved))
         tau = np.zeros((len(s.ticks), layout.n_rates))
         for row, sign in rows:
             tau[:, row] = sign * slope
@@ -51,11 +52,11 @@ def joint_torque_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[
 
 
 def _of_curves(hypothesis: EffectHypothesis, s: ScoreSignals, signals: JointSignals) -> Array:
-    """What a gap does to laws that would lie beyond it, shape (m + 1,)."""
+    """What a gap, moved by an imaginary step, does to laws that would lie beyond it, shape (m + 1,)."""
     change = np.zeros(len(s.ticks))
     for here in curves_of(s.robot, hypothesis.here):
         assert isinstance(here.effect, JointTorque)
-        change += np.imag(here.effect.law(replace(signals, gap=1j * STEP), here.own(s.values))) / STEP
+        change += np.imag(here.effect.law(signals, here.own(s.values))) / STEP
     return change
 
 

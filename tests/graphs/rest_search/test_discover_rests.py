@@ -44,13 +44,15 @@ K, C0 = 40.0, 0.3
 
 @dataclass(frozen=True)
 class Lever:
-    """The true lever: hardening of its spring, mass at the hook, offsets, friction both ways, gain of the drive."""
+    """The true lever: hardening and slack of its spring, mass at the hook, offsets, friction both ways, gain."""
 
     hardening: float = 0.0  # [N m/rad^3]
+    slack: float = 0.0  # [rad] before the spring pulls the link back from ahead of the motor
     payload: float = 0.0  # [kg]
     offset: float = 0.0  # [N m]
     zero: float = 0.0  # [rad] of the link encoder
     wave: float = 0.0  # [rad] of the same, twice per turn
+    ripple: float = 0.0  # [rad] of the same, four times per turn
     slope: float = 0.0  # [N m] more friction forwards, less backwards
     gain: float = 1.0
 
@@ -64,11 +66,12 @@ class Lever:
             # torque about the joint that gravity and rope exert, which the spring must balance
             tau = -9.81 * (2.0 * 0.3 + self.payload * 0.5) * np.sin(q) - pull[k] * 0.5 * np.cos(q)
             d = brentq(lambda d, tau=tau: K * d + self.hardening * d**3 - tau, -1.0, 1.0)
+            d += self.slack * (tau > 0.0)
             share = rng.uniform(-1.0, 1.0)
             # what friction can hold when the motor is about to move one way or the other
             friction = share * (C0 + self.slope if share > 0.0 else C0 - self.slope)
             motor[k] = q - d + 1e-5 * rng.normal()
-            link[k] = q + self.zero + self.wave * np.sin(2.0 * q) + 2e-4 * rng.normal()
+            link[k] = q + self.zero + self.wave * np.sin(2.0 * q) + self.ripple * np.sin(4.0 * q) + 2e-4 * rng.normal()
             u[k] = (friction - tau - self.offset) / self.gain
         zero = np.zeros((count, 1))
         forces = np.column_stack([pull, 0.0 * pull, 0.0 * pull])
@@ -86,6 +89,8 @@ HIDDEN = {
     "offset": (Lever(offset=0.2), ("asymmetric_friction@swing", "torque_offset@swing"), {"torque": -0.2}),
     "zero": (Lever(zero=0.01), ("encoder_offset@swing.link",), {"offset": 0.01}),
     "wave": (Lever(wave=0.01), ("encoder_eccentricity@swing.link",), {"sin2": 0.01}),
+    "slack": (Lever(slack=0.03), ("spring_slack@swing",), {"forward": 0.03}),
+    "ripple": (Lever(ripple=0.005), ("encoder_harmonics@swing.link",), {"sin": 0.005}),
     "friction": (Lever(slope=0.15), ("asymmetric_friction@swing", "torque_offset@swing"), {"torque": 0.15}),
     "gain": (Lever(gain=1.15), ("torque_constant_error@swing",), {"share": 0.15}),
 }

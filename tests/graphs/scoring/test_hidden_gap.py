@@ -41,8 +41,10 @@ def test_gaps_are_tried_where_a_curve_may_hide_them_and_over_the_deflections_tha
     signals.seen = seen
     found = gap_hypotheses([signals])
     assert {h.here.owner for h in found} == {"joint1", "joint2"}  # springs 3 and 4 are straight
-    gaps = [h.shapes["half_gap"] for h in found if h.here.owner == "joint1"]
+    gaps = [h.shapes["half_gap"] for h in found if h.here.label == "backlash@joint1"]
     assert min(gaps) < 0.1 < HALF < max(gaps) < 1.2
+    slack = [(h.shapes["backward"], h.shapes["forward"]) for h in found if h.here.label == "spring_slack@joint1"]
+    assert slack == [(gap, 0.0) for gap in gaps] + [(0.0, gap) for gap in gaps]  # of either rope alone
     doggy = load_robot("doggy")
     assert curves_of(doggy, EffectAt(catalogue()["backlash"], "joint1")) == []
 

@@ -15,6 +15,7 @@ from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_check import null_values
+from jointscope.robots.files.effect_editing import add_effect, cannot_be_added
 from jointscope.robots.files.robot_file import load_robot
 
 DOGGY = load_robot("doggy")
@@ -103,16 +104,36 @@ def test_backlash_leaves_the_gap_free_and_spring_and_damper_beyond_it():
     np.testing.assert_allclose(total, beyond, atol=1e-6)
 
 
+def test_a_slack_rope_leaves_the_spring_free_on_its_own_side_only():
+    q, rate = np.array([-0.05, -0.004, 0.004, 0.05]), np.array([0.3, -0.4, 0.5, -0.6])
+    base = 150.0 * q + 2.0 * rate
+    s = JointSignals(q_link=q, v_link=rate, q_motor=np.zeros(4), v_motor=np.zeros(4), tau_spring=base, stiffness=150.0)
+    law = catalogue()["spring_slack"].law
+    forward = 150.0 * np.array([-0.05, -0.004, 0.0, 0.03]) + 2.0 * rate * [1.0, 1.0, 0.0, 1.0]
+    np.testing.assert_allclose(base + law(s, {"forward": 0.02, "backward": 0.0}), forward, atol=1e-4)
+    both = 150.0 * np.array([-0.04, 0.0, 0.0, 0.03]) + 2.0 * rate * [1.0, 0.0, 0.0, 1.0]
+    np.testing.assert_allclose(base + law(s, {"forward": 0.02, "backward": 0.01}), both, atol=1e-4)
+    same = catalogue()["backlash"].law(s, {"half_gap": 0.02})
+    np.testing.assert_allclose(law(s, {"forward": 0.02, "backward": 0.02}), same, atol=1e-12)
+
+
+def test_a_spring_has_one_dead_zone():
+    arm = add_effect(load_robot("biorob"), "spring_slack@joint1")
+    play = EffectAt(catalogue()["backlash"], "joint1")
+    assert cannot_be_added(arm, play) == "spring_slack@joint1 is the dead zone of its spring already; remove that first"
+    assert cannot_be_added(arm, replace(play, owner="joint2")) == ""
+
+
 def test_a_curve_of_the_spring_begins_beyond_the_gap_and_is_asked_for_by_the_size_of_the_gap():
     q, gap = np.array([-0.3, -0.05, 0.0, 0.05, 0.3]), 0.1
     still = np.zeros(5)
     s = JointSignals(q_link=q, v_link=still, q_motor=still, v_motor=still, tau_spring=150.0 * q, stiffness=150.0)
     play, curve = catalogue()["backlash"], catalogue()["spring_curve"]
     effects = [EffectAt(curve, "joint1"), EffectAt(play, "joint1"), EffectAt(play, "joint2")]
-    assert curve.behind(effects, "joint1") == "joint1.backlash.half_gap"
-    assert curve.behind(effects, "joint3") == play.behind(effects, "joint1") == ""
+    assert curve.behind(effects, "joint1") == ("joint1.backlash.half_gap",)
+    assert curve.behind(effects, "joint3") == play.behind(effects, "joint1") == ()
     p = {"quadratic": 40.0, "cubic": 900.0}
-    total = 150.0 * q + play.law(s, {"half_gap": gap}) + curve.law(replace(s, gap=gap), p)
+    total = 150.0 * q + play.law(s, {"half_gap": gap}) + curve.law(replace(s, gap=(gap,)), p)
     z = np.array([-0.2, 0.0, 0.0, 0.0, 0.2])
     np.testing.assert_allclose(total, 150.0 * z + 40.0 * z**2 + 900.0 * z**3, atol=1e-6)
 

@@ -37,6 +37,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "spring_cubic": ("elastic joint", "stiffness"),
     "spring_curve": ("elastic joint", "quadratic cubic"),
     "backlash": ("elastic joint", "half_gap"),
+    "spring_slack": ("elastic joint", "forward backward"),
     "hysteresis": ("elastic joint", "torque deflection"),
     "kinematic_coupling": ("elastic joint", "from_joint2 from_joint3"),
     "link_viscous": ("joint", "coefficient"),
@@ -51,10 +52,11 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     ),
     "encoder_scale": ("joint", "scale"),
     "encoder_eccentricity": ("joint, joint seen on the link", "cos sin order"),
+    "encoder_harmonics": ("joint, joint seen on the link", "cos sin order"),
     "axis_misalignment": ("joint", "x y"),
     "encoder_delay": ("joint, robot, target, link encoders", "delay"),
     "encoder_filter": ("joint, robot", "variance"),
-    "encoder_offset": ("joint", "offset"),
+    "encoder_offset": ("joint, joint seen on the link", "offset"),
     "torque_constant_error": ("joint", "share"),
     "link_mass": ("joint", "mass x y z"),
     "gyro_delay": ("imu", "delay"),
@@ -231,6 +233,11 @@ def test_help_lists_every_effect_once(capsys):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            "spring_slack@joint1:forward=3,backward=9",
+            r"a gap of 12 rad, the slack of both ropes, is as wide as all that",
+        ),
+        ("encoder_harmonics@joint3.link:cos=0.1,sin=0.1", r"the offsets would be 0.566 of the signals, order times"),
         ("backlash@joint1:half_gap=50", r"a gap of 100 rad, twice half_gap, is as wide as all that the motor turns"),
         ("axis_misalignment@joint3:x=9", r"x: expected below 0.785 rad, got 9"),
     ],

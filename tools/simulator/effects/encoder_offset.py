@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 class EncoderOffset(SimulatedEffect):
-    """Angles plus an offset, in the bag and for the controller alike."""
+    """Angles plus an offset, in the bag and for the controller alike; of an encoder on the link in the bag."""
 
     id = "encoder_offset"
-    acts_on = ("joint",)
+    acts_on = ("joint", "joint seen on the link")
     defaults: ClassVar[Mapping[str, float]] = {"offset": 0.05}  # [rad]
 
     def reading(self, sensor: Sensor, stamps: Array, values: Array) -> Array:

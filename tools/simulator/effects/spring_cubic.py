@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import add_tendon, set_curve
+from jointscope.tools.simulator.world.specification import add_curve
 
 
 class SpringCubic(SimulatedEffect):
@@ -20,5 +20,4 @@ class SpringCubic(SimulatedEffect):
 
     def edit(self, spec: Any) -> None:
         """Adds a tendon between link and rotor whose stiffness is cubic only."""
-        tendon = add_tendon(spec, f"{self.owner}.cubic_spring", self.owner, self.shares[self.owner])
-        set_curve(tendon, self.id, 0.0, self.parameters["stiffness"])
+        add_curve(spec, self.id, self.owner, self.shares[self.owner], (0.0, self.parameters["stiffness"]))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from jointscope.tools.simulator.world.effect import SimulatedEffect
-from jointscope.tools.simulator.world.specification import add_tendon, set_curve
+from jointscope.tools.simulator.world.specification import add_curve
 
 
 class SpringCurve(SimulatedEffect):
@@ -20,5 +20,5 @@ class SpringCurve(SimulatedEffect):
 
     def edit(self, spec: Any) -> None:
         """Adds a tendon between link and rotor that has no linear part."""
-        tendon = add_tendon(spec, f"{self.owner}.curved_spring", self.owner, self.shares[self.owner])
-        set_curve(tendon, self.id, self.parameters["quadratic"], self.parameters["cubic"])
+        terms = self.parameters["quadratic"], self.parameters["cubic"]
+        add_curve(spec, self.id, self.owner, self.shares[self.owner], terms)

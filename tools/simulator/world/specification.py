@@ -28,6 +28,7 @@ Shares = Mapping[str, Mapping[str, float]]  # of links in the deflection of each
 
 DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
 STIFF = (4e-4, 1.0)  # [s] time constant and damping ratio with which a mimic joint is pulled back; two steps at 5 kHz
+CURVES = ("spring_cubic", "spring_curve")  # effects that bend a spring
 DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # almost rigid
 
 
@@ -235,15 +236,26 @@ def set_linear(element: Any, name: str, value: float) -> None:
         setattr(element, name, value)
 
 
-def set_curve(tendon: Any, effect: str, quadratic: float, cubic: float) -> None:
-    """Gives a tendon the torque quadratic d^2 + cubic d^3.
+def add_curve(spec: Any, effect: str, joint: str, shares: Mapping[str, float], terms: tuple[float, float]) -> None:
+    """Adds a tendon beside a joint's spring with the torque quadratic d^2 + cubic d^3 of the two terms.
+
+    d is what is stretched: where the spring is slack, this one is.
 
     Raises:
         SimulationError: an engine that knows linear springs only.
     """
+    tendon = add_tendon(spec, curve_tendon(joint, effect), joint, shares)
     if np.size(tendon.stiffness) != 3:
         raise SimulationError(f"effect {effect} needs MuJoCo 4: pip install --upgrade 'jointscope[sim]'")
-    tendon.stiffness[:] = [0.0, quadratic, cubic]
+    tendon.stiffness[:] = [0.0, *terms]
+    tendon.springlength = spec.tendon(spring_tendon(joint)).springlength
+
+
+def set_slack(spec: Any, joint: str, low: float, high: float) -> None:
+    """Sets the deflections between which a joint's spring, and what `add_curve` puts beside it, are slack."""
+    names = (spring_tendon(joint), *(curve_tendon(joint, effect) for effect in CURVES))
+    for tendon in filter(None, map(spec.tendon, names)):
+        tendon.springlength = [low, high]
 
 
 def add_linear(element: Any, name: str, value: float) -> None:
@@ -264,6 +276,11 @@ def add_dry_friction(hinge: Any, torque: float) -> None:
 def spring_tendon(joint: str) -> str:
     """Name of the tendon whose length is the deflection of a joint's spring."""
     return f"{joint}.spring"
+
+
+def curve_tendon(joint: str, effect: str) -> str:
+    """Name of the tendon of an effect that bends a joint's spring."""
+    return f"{joint}.{effect}"
 
 
 def drive(joint: str) -> str:
