@@ -246,13 +246,11 @@ def _by_predictions(
 ) -> tuple[list[Candidate], Mapping[str, Robot]]:
     """Candidates judged by predictions after their refits, best first, and the robots refitted."""
     base, before, spans = trials.base, trials.before, trials.spans
-    holdout = trials.holdout if each_held_out else None
+    holdout, seconds = trials.holdout if each_held_out else None, judged_seconds(base, spans[1])
     validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
-    seconds = judged_seconds(base, spans[1])
     judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
     slowest = slowest_seen(base.robot, base.recordings[0], base.states[0])
-    judged = ranked([standing_in(c, slowest) for c in judged])
-    refits = {label: t.refit.robot for label, t in validated.items()}
+    judged, refits = ranked([standing_in(c, slowest) for c in judged]), {n: t.refit.robot for n, t in validated.items()}
     return judged if each_held_out else with_best_held_out(judged, refits, trials.holdout), refits
 
 
