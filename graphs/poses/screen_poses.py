@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import contact_distances
 from jointscope.graphs.poses.tracker_start import tracker_and_target
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
@@ -20,6 +21,8 @@ FEWEST = 6
 FULL_TURN = 2.0 * np.pi
 LARGEST_ERROR = 0.05  # [m] that geometric errors of an arm can make
 ALIKE = 1e-3  # [rad]
+FEW = 0.2  # share of the poses that may be wrong by themselves
+ROUNDS = 10
 
 
 def screen_poses(problems: Sequence[PoseSet]) -> None:
@@ -32,6 +35,7 @@ def screen_poses(problems: Sequence[PoseSet]) -> None:
         _check_angles(problem)
         if problem.poses.target is not None:
             _check_targets(problem, problem.poses.target)
+        _check_contacts(problem)
     _check_number(problems)
 
 
@@ -86,6 +90,7 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
             f"of the "
             "target are exchanged; expected right-handed x, y, z"
         )
+    _check_single_poses(problem, predicted, target)
     joints = _exchanged(problem, target, left)
     if joints:
         raise RecordingError(
@@ -112,6 +117,38 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         f"with a tracker "
         "anywhere; check names, signs and units of the joints, and the link that carries the target"
     )
+
+
+def _check_single_poses(problem: PoseSet, predicted: Array, target: Array) -> None:
+    """A few poses may be wrong where all others fit."""
+    kept, away = np.ones(len(target), bool), np.zeros(len(target))
+    for _ in range(ROUNDS):
+        T = base_from_tracker(predicted[kept], target[kept])[0]
+        away = np.linalg.norm(target @ T[:3, :3].T + T[:3, 3] - predicted, axis=1)
+        kept = away <= 3.0 * float(np.median(away))
+    far, fits = np.flatnonzero(away > LARGEST_ERROR), float(np.median(away))
+    if 0 < len(far) <= FEW * len(target) and fits < LARGEST_ERROR / 5.0:
+        names = ", ".join(problem.poses.names[i] for i in far[:5])
+        raise RecordingError(
+            f"{problem.poses.path}: {names}{' and more' * (len(far) > 5)}: these poses are off the target "
+            f"by up to {1e3 * away.max():.3g} mm, half of all fit to {1e3 * fits:.2g} mm: rows were exchanged, or "
+            "another target was seen; correct or remove them"
+        )
+
+
+def _check_contacts(problem: PoseSet) -> None:
+    """Contacts of a place are about as far apart as the robot file says."""
+    said = None if problem.robot.poses is None else problem.robot.poses.contact_distance
+    if said is None or not problem.contacts:
+        return
+    start = problem.start(Calibration.of(problem.robot))[1]
+    for place, found in contact_distances(problem, start).items():
+        if abs(found - said) > LARGEST_ERROR:
+            raise RecordingError(
+                f"{problem.poses.path}: the contacts of place {place} are {found:.3g} m apart as the arm has them, but "
+                f"`contact_distance` in {problem.robot.path.name} is {said:.4g} m; expected metres, and two contacts "
+                "that are that far apart"
+            )
 
 
 def _exchanged(problem: PoseSet, target: Array, left: float) -> tuple[str, str] | None:

@@ -22,6 +22,9 @@ SIGMAS = 4.0  # and in sigmas of the scatter of lines
 REACH = 0.25  # of its frequency to both sides: the lines that are fitted
 FEWEST = 10  # lines
 MOST_DAMPING = 0.7
+MISFIT = 2.0  # chi-square per degree of freedom from which modes farther away count: more of the other polynomial
+WIDER = 4  # its degree then
+FEWEST_PER_VALUE = 2  # equations
 BESIDE = 0.1  # of its frequency: how far roots may be from the peak
 TOLD = 0.05  # of its frequency: the largest sigma of one that is reported
 
@@ -85,37 +88,50 @@ def _fitted(f: Array, G: Complex, sigma: Array, peak: int, anti: bool) -> tuple[
     s = 1j * f[near] / f[peak]
     scale = float(np.abs(G[near]).mean())
     g, weight = G[near] / scale, scale / np.maximum(sigma[near], 1e-12 * scale)
-    powers = np.stack([np.ones_like(s), s, s**2], axis=1)
+    fit = _fraction(s, g, weight, 2, 2)
+    if fit is not None and fit[2] > MISFIT and 2 * len(near) >= FEWEST_PER_VALUE * (WIDER + 3):
+        wider = _fraction(s, g, weight, *((2, WIDER) if anti else (WIDER, 2)))
+        fit = wider if wider is not None and wider[2] < fit[2] else fit
+    if fit is None:
+        return None
+    x, covariance, _ = fit
+    own = slice(0, 3) if anti else slice(len(x) - 2, len(x))
+    return _root(x[own], covariance[own, own], anti, float(f[peak]))
+
+
+def _fraction(s: Complex, g: Complex, weight: Array, above: int, below: int) -> tuple[Array, Array, float] | None:
+    """Coefficients of a fraction of polynomials, the last one below one; covariance; chi-square per degree."""
+    powers = np.stack([s**k for k in range(max(above, below) + 1)], axis=1)
+    n = above + 1
 
     def residual(x: Array) -> Array:
-        r = weight * ((powers @ x[:3]) / (powers @ np.append(x[3:], 1.0)) - g)
+        r = weight * ((powers[:, :n] @ x[:n]) / (powers[:, : below + 1] @ np.append(x[n:], 1.0)) - g)
         return np.concatenate([r.real, r.imag]) * np.sqrt(2.0)
 
-    start = _linear_start(powers, g, weight)
+    start = _linear_start(powers, g, weight, n, below)
     x_scale = np.maximum(np.abs(start), 1e-3 * np.abs(start).max())
     fit = least_squares(residual, start, x_scale=x_scale, max_nfev=200)
-    freedom = max(len(fit.fun) - len(start), 1)
+    chi2 = 2.0 * fit.cost / max(len(fit.fun) - len(start), 1)
     try:
-        covariance = np.linalg.inv(fit.jac.T @ fit.jac) * max(2.0 * fit.cost / freedom, 1.0)
+        return fit.x, np.linalg.inv(fit.jac.T @ fit.jac) * max(chi2, 1.0), chi2
     except np.linalg.LinAlgError:
         return None
-    return _root(fit.x, covariance, anti, float(f[peak]))
 
 
-def _linear_start(powers: Complex, g: Complex, weight: Array) -> Array:
+def _linear_start(powers: Complex, g: Complex, weight: Array, n: int, below: int) -> Array:
     """Levy's linear fit, weighted anew by its own denominator (Sanathanan and Koerner, 1963)."""
-    x, under = np.zeros(5), np.ones_like(g)
+    x, under = np.zeros(n + below), np.ones_like(g)
     for _ in range(10):
         w = (weight / np.abs(under))[:, None]
-        A = w * np.hstack([powers, -g[:, None] * powers[:, :2]])
-        b = w[:, 0] * g * powers[:, 2]
+        A = w * np.hstack([powers[:, :n], -g[:, None] * powers[:, :below]])
+        b = w[:, 0] * g * powers[:, below]
         x = np.linalg.lstsq(np.vstack([A.real, A.imag]), np.concatenate([b.real, b.imag]), rcond=None)[0]
-        under = powers @ np.append(x[3:], 1.0)
+        under = powers[:, : below + 1] @ np.append(x[n:], 1.0)
     return x
 
 
 def _root(x: Array, covariance: Array, anti: bool, f: float) -> tuple[float, float, float, float] | None:
-    c = x[:3] if anti else np.append(x[3:], 1.0)
+    c = x if anti else np.append(x, 1.0)
     if c[0] * c[2] <= 0.0:
         return None
     w = float(np.sqrt(c[0] / c[2]))
@@ -125,6 +141,6 @@ def _root(x: Array, covariance: Array, anti: bool, f: float) -> tuple[float, flo
     by_w = np.array([w / (2.0 * c[0]), 0.0, -w / (2.0 * c[2])])
     by_zeta = np.array([0.0, 1.0 / (2.0 * w * c[2]), -zeta / c[2]]) - zeta / w * by_w
     J = np.stack([by_w, by_zeta])
-    own = covariance[:3, :3] if anti else np.pad(covariance[3:, 3:], ((0, 1), (0, 1)))
+    own = covariance if anti else np.pad(covariance, ((0, 1), (0, 1)))
     sigma_w, sigma_zeta = np.sqrt(np.maximum(np.diag(J @ own @ J.T), 0.0))
     return f * w, f * float(sigma_w), zeta, float(sigma_zeta)

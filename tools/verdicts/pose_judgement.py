@@ -6,7 +6,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaincc
 
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
+from jointscope.graphs.poses.elsewhere import sigma_elsewhere
+from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
@@ -18,12 +21,14 @@ SURE = 3.0  # [sigma]
 FEWEST = 4  # poses on each side of a step
 CHANCE = 1e-4  # of a step where there is none
 SHOWN = 4
+OUT = 0.1  # share of the poses that may be left out
+ELSEWHERE = (10.0, 100.0)  # times what is left at the poses that the target may be uncertain in other postures
 BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach
 
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    makers = (_enough, _repeatability, _still, _within, _backlash, _worth)
+    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _backlash, _worth)
     checks = tuple(make(result) for make in makers)
     return Judgement.of(checks)
 
@@ -47,6 +52,36 @@ def _kept(result: PoseCalibration, name: str) -> float:
     """Share of a prior's sigma that the poses have left."""
     p = result.robot.parameters[name]
     return (p.sigma or 0.0) / p.prior_sigma
+
+
+def _elsewhere(result: PoseCalibration) -> Check:
+    """Whether priors decide where the target is in postures that are unlike the poses."""
+    sigma, left = sigma_elsewhere(result), float(np.median(summary(result.errors).distances))
+    ratio = sigma / max(left, 1e-12)
+    level = "good" if ratio <= ELSEWHERE[0] else "warn" if ratio <= ELSEWHERE[1] else "bad"
+    text = (
+        f"Within the joints' limits the target is known to {significant(1e3 * sigma, 2)} mm (sigma, 90 % of postures)"
+    )
+    if level != "good":
+        scaled = all(p.poses.target is not None or p.distances(c)[0].size for p, c in _solved(result))
+        wanted = "record poses all over the workspace"
+        if not scaled:
+            wanted = "nothing tells how large the arm is: give contacts places, and the robot file `contact_distance`"
+        text += f", {significant(ratio, 2)} times what is left at these poses: priors decide the rest; " + wanted
+    return Check(level, "Poses all over the workspace", f"{text}.")
+
+
+def _solved(result: PoseCalibration) -> list[tuple[PoseSet, Calibration]]:
+    return list(zip(result.problems, result.calibrations, strict=True))
+
+
+def _outliers(result: PoseCalibration) -> Check:
+    name, out = "Poses that fit", len(result.left_out)
+    total = result.count + out
+    if out <= OUT * total:
+        return Check("good", name, f"{total - out} of {total} poses fit.")
+    text = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
+    return Check("warn", name, f"{out} of {total} poses were left out; {text}.")
 
 
 def _still(result: PoseCalibration) -> Check:

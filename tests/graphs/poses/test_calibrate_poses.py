@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from measured_poses import TX90L, table
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses, placed
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.pose_set import PoseSet
@@ -169,6 +169,10 @@ def changed(poses, **what):
         ({"target": lambda x: x + np.array([0.5, 0, 0])}, "the tracker does not stand where tx90l.yaml says"),
         ({"target": lambda x: np.where(np.arange(len(x))[:, None] == 4, 0.0, x)}, "exactly zero in pose 4"),
         ({"q": lambda q: q[:1].repeat(len(q), 0)}, "all 40 poses are alike"),
+        (
+            {"target": lambda x: x[[1, 0, *range(2, len(x))]]},
+            "0, 1: these poses are off the target by up to .* rows were exchanged",
+        ),
         ({"q": lambda q: -q}, "check names, signs and units of the joints"),
     ],
 )
@@ -204,6 +208,35 @@ def test_few_poses_are_judged_with_how_many_more_and_which_values_wait_for_them(
     judged = judge_poses(calibrate_poses(tx90l, [table("poses_calibration").only(np.arange(40) < 9)]))
     (check,) = (check for check in judged.checks if check.name == "Enough poses")
     assert judged.level == "bad" and re.search(r"27 measured .* \d+ more poses .* most of all \w+\.\w+", check.text)
+
+
+def test_poses_of_one_corner_are_not_called_good(tx90l, result):
+    def workspace(found):
+        return next(c for c in judge_poses(found).checks if c.name == "Poses all over the workspace")
+
+    assert workspace(result).level == "good"
+    calibration = Calibration.of(result.robot).only([DYNAMICS])
+    arm = PoseSet(result.robot, table("poses_calibration"), result.robot.poses.tracker)
+    rng = np.random.default_rng(5)
+    for half_width, level in ((0.1, "warn"), (0.02, "bad")):
+        q = arm.poses.q[3] + half_width * rng.uniform(-1.0, 1.0, (60, 6))
+        near = replace(arm.poses, names=tuple(map(str, range(60))), q=q, target=None, torque=None)
+        target = replace(arm, poses=near).point(calibration).target + 2e-5 * rng.normal(size=(60, 3))
+        check = workspace(calibrate_poses(tx90l, [replace(near, target=target)]))
+        assert check.level == level and "record poses all over the workspace" in check.text, check.text
+
+
+def test_many_poses_that_do_not_fit_are_not_called_good(tx90l):
+    poses, rng = table("poses_calibration"), np.random.default_rng(4)
+    wrong = np.isin(np.arange(len(poses)), rng.choice(len(poses), 5, replace=False))[:, None]
+    away = rng.normal(size=(len(poses), 3))
+    away *= 2e-2 / np.linalg.norm(away, axis=1)[:, None]
+    (check,) = (
+        c
+        for c in judge_poses(calibrate_poses(tx90l, [replace(poses, target=poses.target + wrong * away)])).checks
+        if c.name == "Poses that fit"
+    )
+    assert check.level == "warn" and "of 40 poses were left out" in check.text, check.text
 
 
 def test_too_few_poses_are_told_with_how_many_more(tx90l):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,6 +125,14 @@ def test_what_does_not_go_together_is_one_line(tmp_path, monkeypatch, capsys, ar
         ("pose,q1,q2,q3,q4,q5,q6,x,y,z\n0,1,1,1,1\n", "line 2 has 5 cells, the first line 10"),
         ("pose,q1,q2,q3,q4,q5,q6,x,y,z\n0,1,1,1,1,1,nan,2,2,2\n", "column q6: expected a finite number"),
         ("", "expected a line with the names of the columns"),
+        (
+            "pose,q1,q2,q3,q4,q5,q6,contact\n0,1,1,1,1,1,1,a\n1,1,1,1,1,1,1, \n",
+            "line 3, column contact: expected the name",
+        ),
+        (
+            "pose,q1,q2,q3,q4,q5,q6,x,y,z\n" + "".join(f"{i},{i % 2},1,1,1,1,1,2,2,2\n" for i in range(3)),
+            "line 4 repeats line 2 to the last digit, 1 of 3 poses",
+        ),
     ],
 )
 def test_a_table_that_cannot_be_read_says_where(tx90l, tmp_path, text, told):
@@ -143,7 +152,7 @@ def test_a_table_that_cannot_be_read_says_where(tx90l, tmp_path, text, told):
 )
 def test_angles_that_were_commanded_are_told(tx90l, tmp_path, angles, told):
     path = tmp_path / "poses.csv"
-    path.write_text("pose,q1,q2,q3,q4,q5,q6,x,y,z\n" + "".join(f"{i},{angles},2,2,2\n" for i in range(5)))
+    path.write_text("pose,q1,q2,q3,q4,q5,q6,x,y,z\n" + "".join(f"{i},{angles},{i},2,2\n" for i in range(5)))
     texts = [notice.text for notice in read_poses(path, tx90l).notices]
     assert (len(texts) == 1 and told in texts[0]) if told else not texts
 
@@ -154,6 +163,29 @@ def test_contacts_and_places_of_a_table(tx90l):
     poses = read_poses(path, tx90l)  # its first six joints have the same names
     assert len(poses) == 182 and len(set(poses.contacts)) == 6
     assert set(poses.groups) == {"back-high", "front", "right"} and poses.target is None
+
+
+@pytest.mark.parametrize(
+    ("places", "told"),
+    [
+        (("left", "left", "left"), "place left has 3 contacts; expected two"),
+        (("left", "right", "table"), "no place has two contacts, so `contact_distance` is not used"),
+        (("left", "left", "right"), None),
+    ],
+)
+def test_a_distance_that_no_two_contacts_have_is_told(tx90l, tmp_path, places, told):
+    robot = replace(tx90l, poses=replace(tx90l.poses, contact_distance=0.05))
+    rows = "".join(
+        f"{i},{0.1234567 * i},1,1,1,1,1,{c},{p}\n" for i, (c, p) in enumerate(zip("abc", places, strict=True))
+    )
+    path = tmp_path / "poses.csv"
+    path.write_text("pose,q1,q2,q3,q4,q5,q6,contact,place\n" + rows)
+    if len(set(places)) == 1:
+        with pytest.raises(RecordingError, match=told):
+            read_poses(path, robot)
+        return
+    texts = [notice.text for notice in read_poses(path, robot).notices]
+    assert (len(texts) == 1 and told in texts[0]) if told else not texts
 
 
 def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor
 
 Array = NDArray[np.float64]
@@ -56,9 +58,15 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
     digest = hashlib.sha256(text.encode()).hexdigest()
     if "contact" in head:
         contacts = tuple(row[head.index("contact")].strip() for row in body)
+        if "" in contacts:
+            raise RecordingError(
+                f"{path}: line {contacts.index('') + 2}, column contact: expected the name of the contact that "
+                "holds the target, got nothing; name it, or remove the pose"
+            )
         places = tuple(row[head.index("place")].strip() for row in body) if "place" in head else contacts
         pairs = tuple(dict.fromkeys(zip(contacts, places, strict=True)))
-        return Poses(str(path), digest, names, q, None, contacts, pairs, tau)
+        notices = () if setup.contact_distance is None else _unused_distance(path, pairs)
+        return Poses(str(path), digest, names, q, None, contacts, pairs, tau, notices)
     missing = [axis for axis in AXES if axis not in head]
     if missing:
         raise RecordingError(
@@ -66,7 +74,35 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
             f"{', '.join(head)}"
         )
     target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
+    _must_differ(path, np.hstack([q, target]))
     return Poses(str(path), digest, names, q, target, torque=tau)
+
+
+def _must_differ(path: Path, rows: Array) -> None:
+    """No measured target has the noise of another: such a row was copied."""
+    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    earlier = first[which.ravel()]
+    again = np.flatnonzero(earlier != np.arange(len(rows)))
+    if len(again):
+        raise RecordingError(
+            f"{path}: line {again[0] + 2} repeats line {earlier[again[0]] + 2} to the last digit, {len(again)} of "
+            f"{len(rows)} poses in all do so; give every pose once, or it counts twice"
+        )
+
+
+def _unused_distance(path: Path, pairs: Sequence[tuple[str, str]]) -> tuple[Notice, ...]:
+    """A known distance needs places with two contacts; one contact alone has none, three have three."""
+    by_place = Counter(place for _, place in pairs)
+    many = next((place for place, count in by_place.items() if count > 2), None)
+    if many is not None:
+        raise RecordingError(
+            f"{path}: place {many} has {by_place[many]} contacts; expected two, which are `contact_distance` of the "
+            "robot file apart; give each pair a place of its own in the column `place`, or leave out `contact_distance`"
+        )
+    if 2 in by_place.values():
+        return ()
+    text = f"{path}: no place has two contacts, so `contact_distance` is not used; name places in a column `place`"
+    return (Notice("poses", "info", len(pairs), text),)
 
 
 def _text(path: Path) -> str:

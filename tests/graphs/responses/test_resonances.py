@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Resonance and anti-resonance of two masses on a spring, against the roots of their equations of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from jointscope.graphs.responses.resonances import resonances
+
+MOTOR, LOAD, SPRING, DAMPER, BEARING = 1.5, 0.8, 6000.0, 4.0, 20.0  # [kg m2, kg m2, N m/rad, N m s/rad, N m s/rad]
+
+
+def motor_angle_per_torque(f):
+    """Shape (l, 1, 1) [rad/(N m)]: both equations of motion, solved at each frequency."""
+    s = 2j * np.pi * f
+    spring = SPRING + DAMPER * s
+    M = np.empty((len(f), 2, 2), complex)
+    M[:, 0, 0], M[:, 1, 1] = MOTOR * s**2 + BEARING * s + spring, LOAD * s**2 + spring
+    M[:, 0, 1] = M[:, 1, 0] = -spring
+    return np.linalg.inv(M)[:, :1, :1]
+
+
+def true_roots():
+    """Frequency [Hz] and damping of the resonance and of the anti-resonance."""
+    c, k = np.array([[DAMPER + BEARING, -DAMPER], [-DAMPER, DAMPER]]), SPRING * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    inverse = np.diag([1.0 / MOTOR, 1.0 / LOAD])
+    poles = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ k, -inverse @ c]]))
+    zero = np.roots([LOAD, DAMPER, SPRING])[0]
+    return [(abs(root) / (2.0 * np.pi), -root.real / abs(root)) for root in (poles[np.argmax(poles.imag)], zero)]
+
+
+@pytest.mark.parametrize("apart", [0.25, 1.0])
+def test_a_dip_beside_a_peak_is_found_where_the_equations_have_it(apart):
+    f = np.arange(0.5, 200.0, apart)
+    G = motor_angle_per_torque(f)
+    sigma = np.full(G.shape, 1e-8)  # as of an encoder: the same at all lines
+    rng = np.random.default_rng(3)
+    noisy = G + sigma * (rng.normal(size=G.shape) + 1j * rng.normal(size=G.shape)) / np.sqrt(2.0)
+    found = {r.anti: r for r in resonances(f, noisy, sigma)}
+    for anti, (frequency, damping) in zip((False, True), true_roots(), strict=True):
+        r = found[anti]
+        assert abs(r.frequency - frequency) < 3.0 * r.frequency_sigma and abs(r.frequency / frequency - 1.0) < 0.002
+        assert abs(r.damping - damping) < 3.0 * r.damping_sigma and r.damping_sigma < 0.003
