@@ -15,6 +15,8 @@ from jointscope.tools.presentation.frequency_sentences import identifiable_sente
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
+from jointscope.tools.verdicts.priors.far_from_priors import far_parameters
 from jointscope.tools.verdicts.same_values import NAME, test_said
 
 AS_NOISE = 3.0  # power of what is left over that of the noise: up to here friction adds little
@@ -30,7 +32,8 @@ SHOWN = 3
 def judge_frequency(result: FrequencyCalibration) -> Judgement:
     """Applies all checks."""
     checks = tuple(make(result) for make in (_settled, _answer, _noise, _heldout, _agree, _told, _friction))
-    return Judgement.of(checks)
+    level, text = far_parameters(result.robot.parameters, result.told, result.start.path.name)
+    return Judgement.of((*checks, Check(level, AS_EXPECTED_BY_PRIORS, text)))
 
 
 def judge_kinds(result: KindsCalibration) -> Judgement:

@@ -14,6 +14,8 @@ from jointscope.graphs.poses.tip_errors import summary
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
+from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
+from jointscope.tools.verdicts.priors.far_from_priors import far_parameters
 
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
@@ -28,7 +30,7 @@ BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _backlash, _worth)
+    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _near_priors, _backlash, _worth)
     checks = tuple(make(result) for make in makers)
     return Judgement.of(checks)
 
@@ -146,6 +148,13 @@ def _within(result: PoseCalibration) -> Check:
         f"{', '.join(far[:3])} {'is' if len(far) == 1 else 'are'} beyond {BEYOND:g} times what the robot file expects "
         "(`length_sigma`, `angle_sigma`): a wrong URDF, or an effect that is missing.",
     )
+
+
+def _near_priors(result: PoseCalibration) -> Check:
+    """Of springs and all else that is no length or angle, which `_within` looks at."""
+    others = [name for name in result.told if name not in _geometric(result)]
+    level, text = far_parameters(result.robot.parameters, others, result.start.path.name)
+    return Check(level, AS_EXPECTED_BY_PRIORS, text)
 
 
 def _backlash(result: PoseCalibration) -> Check:

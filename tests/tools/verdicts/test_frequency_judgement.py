@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from jointscope.graphs.frequency.agreement import Agreement
 from jointscope.graphs.frequency.explained import Answered, Explained, PoseFit
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
 
@@ -19,7 +21,9 @@ def pose(share=0.02, over_noise=1.2, by_realisations=True):
     return PoseFit("P1", np.array([0.004]), noise, (Answered(1.0, 20.0, 0.0, 0.02), band), by_realisations)
 
 
-def judged(the_pose=None, poses=None, realisations=None, heldout=1.01, silent=(), sharp=0.01, settled=True):
+def judged(
+    the_pose=None, poses=None, realisations=None, heldout=1.01, silent=(), sharp=0.01, settled=True, parameters=None
+):
     """The checks by name, of a calibration that is good but for what is given."""
     fine = Agreement(20.0, 22)
     found = Explained(
@@ -33,7 +37,15 @@ def judged(the_pose=None, poses=None, realisations=None, heldout=1.01, silent=()
     problem = SimpleNamespace(pose=SimpleNamespace(path="P1", matrix=SimpleNamespace(each=(0, 1))))
     told = names if sharp < 0.1 else ()
     result = SimpleNamespace(
-        explained=found, silent=silent, names=names, told=told, problems=(problem,), settled=settled, stages=4
+        explained=found,
+        silent=silent,
+        names=names,
+        told=told,
+        problems=(problem,),
+        settled=settled,
+        stages=4,
+        robot=SimpleNamespace(parameters={} if parameters is None else parameters),
+        start=SimpleNamespace(path=Path("arm.yaml")),
     )
     verdict = judge_frequency(result)
     return verdict, {check.name: check for check in verdict.checks}
@@ -96,3 +108,11 @@ def test_iterations_that_do_not_come_to_rest_are_a_no():
     verdict, checks = judged(settled=False)
     assert verdict.level == "bad"
     assert [name for name, check in checks.items() if check.level == "bad"] == ["Values that came to rest"]
+
+
+def test_a_value_far_from_its_prior_is_a_no():
+    name = "joint1.friction_sharpness"
+    far = Parameter(name, 2000.0, "s/rad", 20.0, 2.0, sigma=1.0)
+    verdict, checks = judged(parameters={name: far})
+    assert verdict.level == "bad"
+    assert "46 sigma from its prior of 20.0 ± 2.0" in checks["Values where their priors expect them"].text

@@ -86,7 +86,7 @@ def far_from_priors(result: CalibrationResult) -> tuple[str, str]:
 
 def far_parameters(parameters: Mapping[str, Parameter], names: Iterable[str], file: str) -> tuple[str, str]:
     """The same of some calibrated parameters of a robot."""
-    told = [parameters[n] for n in names if parameters[n].prior_sigma > 0.0]
+    told = [parameters[n] for n in names if n in parameters and parameters[n].prior_sigma > 0.0]
     values = [FarValue.of(p.name, p.value, p.prior, p.prior_sigma, p.unit, p.positive) for p in told]
     level, found = _level_of(values)
     if not found:
