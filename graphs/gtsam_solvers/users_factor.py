@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A factor of the user's own, looked at before GTSAM linearises it.
 
-GTSAM takes a Jacobian with columns of another variable without a word, and crashes at one with other rows.
+GTSAM says nothing that one could read of a Jacobian with another shape.
 """
 
 from __future__ import annotations
