@@ -210,12 +210,12 @@ def test_effects_that_are_always_or_never_there_say_how_to_get_them():
 @pytest.mark.slow
 def test_all_effects_of_all_kinds_run_together(plain):
     truth = true_robot(DOGGY, {})
-    texts = []
-    for effect_id, cls in ON_DOGGY.items():
+    texts, together = [], {id: cls for id, cls in ON_DOGGY.items() if id != "spring_slack"}  # one dead zone a spring
+    for effect_id, cls in together.items():
         owner = owners_of(cls.acts_on[0], truth)[-1]
         texts.append(f"{effect_id}@{owner}")
     simulation = run(*texts, friction="dry")
-    assert len(simulation.truth["effects"]) == len(ON_DOGGY)
+    assert len(simulation.truth["effects"]) == len(together)
     assert np.isfinite(simulation.states).all()
 
 

@@ -54,7 +54,14 @@ def arm(tmp_path_factory):
 
 @pytest.mark.parametrize("effect_id", list(simulated_effects()))
 def test_every_effect_runs_on_the_arm(arm, effect_id):
-    owner = owners_of(simulated_effects()[effect_id].acts_on[0], arm)[-1]
+    owners = owners_of(simulated_effects()[effect_id].acts_on[0], arm)
+    if not owners:
+        with pytest.raises(
+            EffectError, match=f"{effect_id} cannot act on 'elbow'; it needs a joint seen on the link, and"
+        ):
+            make_effect(f"{effect_id}@elbow", arm)
+        return
+    owner = owners[-1]
     simulation = simulate(arm, "moves", 1.0, 1, effects=[f"{effect_id}@{owner}"])
     assert np.isfinite(simulation.states).all()
     assert np.abs(simulation.states).max() < 50

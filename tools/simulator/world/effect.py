@@ -10,7 +10,7 @@ Prefer `edit`: what the engine has of its own is fast and shares nothing with th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -84,9 +84,7 @@ class SimulatedEffect:
     def __init__(self, owner: str, parameters: Mapping[str, float], robot: Robot):
         owners = [name for kind in self.acts_on for name in owners_of(kind, robot)]
         if owner not in owners:
-            acts = (
-                f"acts on {', '.join(owners)}" if owners else f"needs an {' or '.join(self.acts_on)}, and there is none"
-            )
+            acts = f"acts on {', '.join(owners)}" if owners else f"needs {_one_of(self.acts_on)}, and there is none"
             raise EffectError(f"effect {self.id} cannot act on {owner!r}; it {acts}")
         self.owner = owner
         self.robot = robot
@@ -207,3 +205,8 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
     joints["joint seen on the link"] = tuple(f"{joint}{LINK_SIDE}" for joint in seen)
     joints["weighed elastic joint"] = elastic if robot.tree.gravity.any() else ()
     return {**joints, "robot": ("robot",), "upright robot": upright}[kind]
+
+
+def _one_of(kinds: Sequence[str]) -> str:
+    """As "a joint or an imu"."""
+    return " or ".join(f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}" for kind in kinds)
