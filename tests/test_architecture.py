@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -154,3 +155,15 @@ def test_files_and_functions_stay_short(path):
 def test_tests_carry_the_licence_line_too():
     for path in (ROOT / "tests").rglob("*.py"):
         assert path.read_text(encoding="utf-8").startswith("# SPDX-License-Identifier: BSD-3-Clause\n"), path
+
+
+def test_the_map_has_every_room_and_the_way_of_a_sample_names_files_that_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    plan, way = text[text.index("| room |") :].split("## One sample, from the bag to the report")
+    rows = [row.split("|")[1] for row in plan.splitlines() if row.startswith("| `")]
+    told = {name for row in rows for name in re.findall(r"`([a-z_/]+)`", row)}
+    for room in {"/".join(room.split(".")[:2]) for room in ROOMS if "." in room}:
+        assert room in told or room.split("/")[1] in told, f"the map of CONTRIBUTING.md lacks {room}"
+    files = {path.relative_to(ROOT).as_posix() for path in MODULES}
+    for name in re.findall(r"`([a-z_/]+\.py)`", way.split("\n## ")[0]):
+        assert any(path == name or path.endswith(f"/{name}") for path in files), name

@@ -90,7 +90,7 @@ class CalibrationGraph:
         condensed, values = CondensedGraph.of(problems, estimate)
         for stretch in (stretch for cuts in condensed.stretches for stretch in cuts):
             if isinstance(stretch, RecordingStretch):  # so that an error depends on its values alone
-                stretch.inner_steps = INNER_STEPS
+                stretch.begin_here(INNER_STEPS)
         keys = _keys(problems, estimate, values)
         names = ["motion" if isinstance(problem, BagProblem) else problem.kind for problem in problems]
         kinds = [name for name, cuts in zip(names, condensed.stretches, strict=True) for _ in cuts]

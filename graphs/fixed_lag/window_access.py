@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from numbers import Real
 from typing import TypeVar
 
 import gtsam
@@ -53,6 +54,8 @@ class WindowAccess(ABC):
         Raises:
             EstimatorError: there is no tick yet, or none near that time is in the window.
         """
+        if not isinstance(t, Real | None):
+            raise EstimatorError(f"expected a time [s] or None, got {t!r}")
         if self.status.running:
             self._catch_up(t)
         if not self.status.running:
@@ -74,6 +77,8 @@ class WindowAccess(ABC):
         """
         if not self.status.running:
             raise EstimatorError(f"{NO_STATE}: add factors once `est.status.running` is true")
+        if not isinstance(factor, gtsam.NonlinearFactor):
+            raise EstimatorError(f"expected a gtsam.NonlinearFactor, as gtsam.CustomFactor is, got {factor!r}")
         self._unbroken(lambda: self._engine.add(factor))
 
     @abstractmethod

@@ -96,11 +96,7 @@ class RecordingStretch:
 
     Attributes:
         damping: Levenberg-Marquardt lambda of each state, relative to the diagonal, shape (m,).
-        inner_steps: at the most, after which inner states are at their minimum wherever the ends are put; with none
-            they follow by one linear step, as a solver needs, and the cost depends on where they were before.
     """
-
-    inner_steps = 0
 
     def __init__(
         self,
@@ -120,7 +116,7 @@ class RecordingStretch:
         self._sizes = problem, kept, start, len(x), x.shape[1], calibration.size
         self._kept = [self._room()]
         self._base = self._trial = self._kept[0].move(x.copy(), calibration, self.damping)
-        self._damped_with = self.damping
+        self._damped_with, self._begin, self._inner_steps = self.damping, self._base, 0
 
     @property
     def ticks(self) -> tuple[int, ...]:
@@ -152,29 +148,46 @@ class RecordingStretch:
         own = np.zeros(len(self.damping)) if bends is None else bends[first : last + 1]
         self.damping = np.maximum(own, damping)
 
+    def begin_here(self, inner_steps: int) -> None:
+        """Makes the cost depend on its place alone: inner states go to their minimum from where they are now.
+
+        Without, they follow from the last linearisation by one linear step, as a solver needs, wherever that was.
+
+        Args:
+            inner_steps: at the most, to a minimum.
+        """
+        self._inner_steps = inner_steps
+        self._go_inside(self._base.x[0], self._base.x[-1], self._base.calibration)
+        self._begin = self._base
+
     def visit(self, ends: Sequence[Array], calibration: Calibration) -> float:
         """Evaluates everything at new ends and shared values; returns the cost there."""
         first, last = ends
         if self._base.is_at(first, last, calibration):
             self._trial = self._base
         elif not self._trial.is_at(first, last, calibration):
+            if self._inner_steps:
+                self._base, self._damped_with = self._begin, np.zeros(len(self.damping))
             self._trial = self._base
-            x = self._following(first, last, calibration)
-            self._trial = self._free_room().move(x, calibration, self.damping)
-            self._go_inside(first, last, calibration)
+            if not self._base.is_at(first, last, calibration):
+                x = self._following(first, last, calibration)
+                self._trial = self._free_room().move(x, calibration, self.damping)
+                self._go_inside(first, last, calibration)
         return self._trial.cost
 
     def _go_inside(self, first: Array, last: Array, calibration: Calibration) -> None:
         """Takes the inner states to their minimum, while the ends stay."""
-        for _ in range(self.inner_steps):
-            before = self._trial
-            self._base, self._damped_with = before, self.damping
+        for _ in range(self._inner_steps):
+            before = self._base = self._trial
+            self._damped_with = self.damping
             x = self._following(first, last, calibration)
             self._trial = self._free_room().move(x, calibration, self.damping)
             if not self._trial.cost < before.cost * (1.0 - AT_REST):
                 if not self._trial.cost < before.cost:
                     self._trial = before
                 break
+        if self._inner_steps:
+            self._base, self._damped_with = self._trial, self.damping
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
@@ -190,8 +203,10 @@ class RecordingStretch:
         if own is None and not self._keeps_both:  # a step was rejected
             self._keeps_both = True
             self._kept = [self._room()]
-        room = own or self._free_room()
+        room, begins = own or self._free_room(), self._base is self._begin
         self._base = self._trial = room.move(self._base.x, self._base.calibration, self._damped_with)
+        if begins:
+            self._begin = self._base
         return room
 
     def _room(self) -> LinearisedStretch:
