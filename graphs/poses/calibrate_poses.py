@@ -43,7 +43,7 @@ MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is 
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseCalibration:
     """Result of a calibration from poses.
 

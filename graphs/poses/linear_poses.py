@@ -38,6 +38,9 @@ class LinearPoses:
         groups: number of the group of each pose, shape (m,).
         contacts: number of the contact of each pose, shape (m,); -1 where a tracker measured.
         whiten: of each pose, shape (m, 3, 3).
+        off, apart: whitened residuals of known distances between contacts, shape (d,), and their columns, shape (d, p);
+            `tied` and `pull` hold them, too.
+        places: for each session, which of the columns are those of its calibration.
     """
 
     r: Array
@@ -47,13 +50,17 @@ class LinearPoses:
     groups: NDArray[np.intp]
     contacts: NDArray[np.intp]
     whiten: Array
+    off: Array
+    apart: Array
+    places: tuple[NDArray[np.intp], ...]
 
     kind = POSES
 
     @staticmethod
     def of(result: PoseCalibration) -> LinearPoses:
         """The poses of a calibration at its values."""
-        pieces, names, held, size = [], list[str](), list[int](), len(result.names)
+        pieces, ties, places = [], [], list[NDArray[np.intp]]()
+        names, held, size = list[str](), list[int](), len(result.names)
         total = size + 3 * sum(len(problem.contacts) for problem in result.problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
         tied[:size, :size], pull = prior_information(result.robot, result.names), np.zeros(total)
@@ -67,9 +74,11 @@ class LinearPoses:
             W, r, J = _whitened(problem, calibration)
             wide = np.zeros((len(r), total))
             wide[:, place] = J
-            off, apart = problem.distances(calibration)
-            tied[np.ix_(place, place)] += apart.T @ apart
-            pull[place] += apart.T @ off
+            off, own_apart = problem.distances(calibration)
+            apart = np.zeros((len(off), total))
+            apart[:, place] = own_apart
+            ties.append((off, apart))
+            places.append(place)
             number = {contact: (first - size) // 3 + i for i, contact in enumerate(problem.contacts)}
             held += [number[c] for c in problem.poses.contacts] or [-1] * len(problem.poses)
             names += problem.poses.groups
@@ -77,8 +86,10 @@ class LinearPoses:
             pieces.append((r, wide, W))
         groups = {name: i for i, name in enumerate(dict.fromkeys(names))}
         r, J, W = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        off, apart = (np.concatenate([tie[k] for tie in ties]) for k in range(2))
+        tied, pull = tied + apart.T @ apart, pull + apart.T @ off
         numbers = np.array([groups[name] for name in names])
-        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W)
+        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W, off, apart, tuple(places))
 
     @cached_property
     def fold_of(self) -> NDArray[np.intp]:

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a calibrated arm lacks where a response is left over, named in the verdict of `calibrate`."""
+"""What a calibrated arm lacks, by poses or where a response is left over, named in the verdict of `calibrate`."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
 from jointscope.graphs.joint_kinds.discover_arm import candidates_of
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.tools.presentation.numbers import significant
+
+
+@lru_cache(maxsize=4)
+def missing_by_poses(result: PoseCalibration) -> tuple[ArmCandidate, ...]:
+    """Effects of which poses say that they are missing, best first; of one calibration they are asked once."""
+    found = [c.beside_the_best for c in candidates_of(Calibrated(result, None))[0]]
+    return tuple(c for c in found if c.verdict == "missing")
 
 
 def missing_in_arm(result: Calibrated) -> tuple[ArmCandidate, ...]:
