@@ -20,6 +20,7 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import tracker_and_target
+from jointscope.graphs.poses.trimmed_poses import TrimmedPoses
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
@@ -114,7 +115,7 @@ def calibrate_poses(
     screen_poses(problems)
     before = tuple(tip_errors(problem) for problem in problems)
     out: list[tuple[str, str, float]] = []
-    scale, iterations = 1.0, 0
+    scale, weighted, iterations = 1.0, False, 0
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
         problems = [replace(problem, repeatability=scale) for problem in problems]
@@ -127,9 +128,13 @@ def calibrate_poses(
                 f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
+        if i == 0:
+            problems, out = _without_hidden(robot, problems, known[: len(problems)])
+        if i == 0 and out:
+            continue
         distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
         worst = max(float(d.max()) for d in distances)
-        if 0 < i < PASSES - 1 and worst > OUTLYING:
+        if weighted and i < PASSES - 1 and worst > OUTLYING:
             problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
             out += found
             if len(out) > MOST_OUT * sum(map(len, sessions)):
@@ -145,7 +150,7 @@ def calibrate_poses(
         wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
         if abs(np.log(wanted / scale)) < AGREES:
             break
-        scale = float(wanted)
+        scale, weighted = float(wanted), True
     seconds = time.perf_counter() - began
     return _result(robot, problems, known[: len(problems)], covariance, before, scale, ratio, out, iterations, seconds)
 
@@ -219,6 +224,16 @@ def _without_outliers(
         out += [(poses.path, poses.names[i], float(np.sqrt(found[i]))) for i in np.flatnonzero(far)]
         kept.append(replace(problem, poses=poses.only(~far)))
     return kept, out
+
+
+def _without_hidden(
+    robot: Robot, problems: list[PoseSet], known: Sequence[Calibration]
+) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
+    """The sessions without poses that hide each other in a fit of all."""
+    at = robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
+    squares = TrimmedPoses(at, problems, known, MOST_OUT).outlying() ** 2
+    ends = np.cumsum([len(problem.poses) for problem in problems])[:-1]
+    return _without_outliers(problems, np.split(squares, ends), 0.0)
 
 
 def _result(

@@ -10,16 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.robots.geometry.added_effect import RIGID, at_null
 from jointscope.robots.geometry.arm_effects import POSES, ArmHypothesis
 from jointscope.robots.model.robot import Robot
+
+if TYPE_CHECKING:  # which begins with the poses linearised here
+    from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 
 Array = NDArray[np.float64]
 SPREAD = 1.0  # [m] prior sigma of the point of a contact, so that one that was left out has one
@@ -59,14 +62,26 @@ class LinearPoses:
     @staticmethod
     def of(result: PoseCalibration) -> LinearPoses:
         """The poses of a calibration at its values."""
+        return LinearPoses.at(result.robot, result.problems, result.calibrations)
+
+    @staticmethod
+    def at(robot: Robot, problems: Sequence[PoseSet], calibrations: Sequence[Calibration]) -> LinearPoses:
+        """Poses at some values.
+
+        Args:
+            robot: with these values.
+            problems: the sessions.
+            calibrations: of each session, with the points of its contacts.
+        """
+        shared = calibrations[0].names
         pieces, ties, places = [], [], list[NDArray[np.intp]]()
-        names, held, size = list[str](), list[int](), len(result.names)
-        total = size + 3 * sum(len(problem.contacts) for problem in result.problems)
+        names, held, size = list[str](), list[int](), len(shared)
+        total = size + 3 * sum(len(problem.contacts) for problem in problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
-        tied[:size, :size], pull = prior_information(result.robot, result.names), np.zeros(total)
-        pull[:size] = prior_pull(result.robot, result.names)
+        tied[:size, :size], pull = prior_information(robot, shared), np.zeros(total)
+        pull[:size] = prior_pull(robot, shared)
         first = size
-        for problem, calibration in zip(result.problems, result.calibrations, strict=True):
+        for problem, calibration in zip(problems, calibrations, strict=True):
             index = calibration.columns[DYNAMICS]
             own = [k for k in range(calibration.size) if not index.start <= k < index.stop]
             place = np.zeros(calibration.size, dtype=np.intp)
