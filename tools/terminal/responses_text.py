@@ -11,7 +11,9 @@ from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, entries
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
+from jointscope.robots.recordings.signals import Excitation
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
+from jointscope.tools.presentation.noisy_response import noise_doubt
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
@@ -28,7 +30,7 @@ def response_text(found: MeasuredResponse) -> str:
         f"{found.spectra.path}: {len(f)} lines from {f[0]:.6g} to {f[-1]:.6g} Hz, {apart:.6g} Hz apart; "
         + (periods if whole else f"a stretch of {1.0 / excitation.f0:.4g} s without whole periods")
         + (" (pairs of both signs)" if found.spectra.common is not None else ""),
-        f"  excitation: {excitation.source}; total covariance: {matrix.total_from}",
+        f"  excitation: {excitation.source}{_left_out(excitation)}; total covariance: {matrix.total_from}",
         "",
         text_table(["from", "to", "noise", "total"], entry_rows(matrix), "<<>>"),
     ]
@@ -43,7 +45,18 @@ def response_text(found: MeasuredResponse) -> str:
         ]
     elif not len(d.even.frequencies) + len(d.odd.frequencies):
         lines += ["", "All lines were excited, so even and odd distortions cannot be told apart."]
+    if doubt := noise_doubt(found):
+        lines += ["", f"! {doubt}"]
     return "\n".join(lines)
+
+
+def _left_out(excitation: Excitation) -> str:
+    """Periods that are not used."""
+    most = max(e.transient for e in excitation.experiments)
+    if not most:
+        return ""
+    few = "the first period" if most == 1 else f"the first {most} periods"
+    return f", without {few} of each experiment, in which the response had not settled"
 
 
 def entry_rows(matrix: ResponseMatrix) -> list[list[str]]:
