@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.bodies.misplaced_joints import LENGTHS
-from jointscope.robots.errors import SolveError
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.geometry.error_parameters import TOOL, error_names
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
 from jointscope.robots.model.robot import Robot
@@ -110,6 +111,7 @@ def calibrate_poses(
         SolveError: no convergence, or too many outliers.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
+    _must_be_poses(sessions)
     report("looking at the poses", 0.0)
     robot, problems = placed(robot, sessions)
     screen_poses(problems)
@@ -153,6 +155,17 @@ def calibrate_poses(
         scale, weighted = float(wanted), True
     seconds = time.perf_counter() - began
     return _result(robot, problems, known[: len(problems)], covariance, before, scale, ratio, out, iterations, seconds)
+
+
+def _must_be_poses(sessions: Sequence[Poses]) -> None:
+    """Paths and single sessions are what is given by mistake."""
+    many = not isinstance(sessions, Poses | str | Path) and len(sessions) > 0
+    wrong: object = next((each for each in sessions if not isinstance(each, Poses)), None) if many else sessions
+    if wrong is not None:
+        raise RecordingError(
+            f"expected a list of poses, got {type(wrong).__name__}; jointscope.tools.bags.at_poses.read_poses."
+            "read_poses(path, robot) reads those of a table or bag: calibrate_poses(robot, [read_poses(path, robot)])"
+        )
 
 
 def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:

@@ -90,7 +90,7 @@ def _signal(bag: Bag, raws: Mapping[str, RawTopic], spec: str, names: Sequence[s
     if not field:
         raise RecordingError(f"{spec!r}: expected TOPIC:FIELD or TOPIC:FIELD:NAME,NAME, for example {INPUT}")
     kind, raw = bag.message_type(topic), raws[topic]
-    field_path(kind, field, topic)
+    field_path(kind, field, topic, "correct TOPIC:FIELD")
     columns = read_columns(raw, kind, field, wanted=wanted)
     stamps = columns.of(raw.received_ns) if columns.stamps is None else columns.stamps
     called = columns.names or tuple(f"{field}[{i}]" for i in range(columns.values.shape[1]))

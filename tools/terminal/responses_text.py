@@ -12,6 +12,7 @@ from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, entri
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
 from jointscope.robots.recordings.signals import Excitation
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
 from jointscope.tools.presentation.noisy_response import noise_doubt
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
@@ -23,7 +24,7 @@ def response_text(found: MeasuredResponse) -> str:
     """The summary of one recording."""
     matrix, excitation = found.matrix, found.spectra.excitation
     f = matrix.frequencies
-    periods = f"{len(found.spectra.U)} experiments of {matrix.periods} steady periods"
+    periods = f"{counted(len(found.spectra.U), 'experiment')} of {counted(matrix.periods, 'steady period')}"
     whole = found.distortions is not None
     apart = excitation.f0 if whole else float(np.median(np.diff(f)))
     lines = [
@@ -89,8 +90,8 @@ def frequency_calibration_text(result: FrequencyCalibration) -> str:
     """The summary of a calibration."""
     paths, judgement = ", ".join(problem.pose.path for problem in result.problems), judge_frequency(result)
     lines = [
-        f"{result.robot.name} from {paths}: {len(result.problems)} poses, calibrated in {result.wall_seconds:.1f} s, "
-        f"{result.iterations} iterations in {result.stages} stages",
+        f"{result.robot.name} from {paths}: {counted(len(result.problems), 'pose')}, "
+        f"calibrated in {result.wall_seconds:.1f} s, {result.iterations} iterations in {result.stages} stages",
         "",
         judgement.headline,
         *(f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")),
@@ -135,7 +136,8 @@ def frequency_errors_text(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> 
     first = next(iter(by_label.values()))
     count = sum(len(one.pose.lines) for one in first)
     lines = [
-        f"{len(first)} poses, {count} lines: size of the model's matrix over the measured one, the floor that the "
+        f"{counted(len(first), 'pose')}, {counted(count, 'line')}: "
+        "size of the model's matrix over the measured one, the floor that the "
         "covariance of the measured one alone would give, and the distance in its sigmas (root mean squares)",
         text_table(ERROR_HEAD, error_rows(by_label), "<<<>>>"),
         "",

@@ -21,6 +21,8 @@ from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED
 
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
+UNSEEN = 0.05  # of the target's noise: what transmissions make of it at the end of an arm of a METRE is not seen
+METRE = 1.0  # [m]
 SURE = 3.0  # [sigma]
 FEWEST = 4  # poses on each side of a step
 CHANCE = 1e-4  # of a step where there is none
@@ -125,8 +127,12 @@ def _repeatability(result: PoseCalibration) -> Check:
     name, factor = "Residuals as the arm repeats", result.repeatability
     level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
     assert result.robot.poses is not None
-    micro = 1e6 * float(np.median(result.robot.poses.joint_sigmas))
-    text = f"The residuals are those of transmissions that repeat to {significant(micro, 2)} urad"
+    setup = result.robot.poses
+    repeats = float(np.median(setup.joint_sigmas))
+    text = f"The residuals are those of transmissions that repeat to {significant(1e6 * repeats, 2)} urad"
+    if repeats * METRE < UNSEEN * setup.target_sigma:
+        noise = significant(1e3 * setup.target_sigma, 2)
+        text = f"The noise of the target, {noise} mm, explains the residuals; transmissions repeat better than it shows"
     if level != "good":
         text += (
             f", {significant(factor, 2)} times what the robot file says: joints that had not settled, another "
