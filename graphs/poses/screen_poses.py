@@ -92,19 +92,7 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
             "target are exchanged; expected right-handed x, y, z"
         )
     _check_single_poses(problem, predicted, target)
-    joints = _exchanged(problem, target, left)
-    if joints:
-        raise RecordingError(
-            f"{poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other way "
-            f"round the arm "
-            f"fits; check the names in the table, or `names` of poses.joint_states in {place}"
-        )
-    reversed_joint = _reversed(problem, target, left)
-    if reversed_joint:
-        raise RecordingError(
-            f"{poses.path}: {reversed_joint} seems to turn the other way: with its sign reversed the arm fits; "
-            f"check its sign in the table or bag, and its axis in {problem.robot.tree.urdf.name}"
-        )
+    _check_joints(problem, target, left)
     if left < LARGEST_ERROR:
         raise RecordingError(
             f"{poses.path}: the tracker does not stand where {place} says: another place fits to {1e3 * left:.2g} mm "
@@ -124,6 +112,23 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         f"with a tracker "
         "anywhere; check names, signs and units of the joints, and the link that carries the target"
     )
+
+
+def _check_joints(problem: PoseSet, target: Array, left: float) -> None:
+    """Two joints may be exchanged, or one may turn the other way."""
+    joints = _exchanged(problem, target, left)
+    if joints:
+        raise RecordingError(
+            f"{problem.poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other way "
+            f"round the arm "
+            f"fits; check the names in the table, or `names` of poses.joint_states in {problem.robot.path.name}"
+        )
+    reversed_joint = _reversed(problem, target, left)
+    if reversed_joint:
+        raise RecordingError(
+            f"{problem.poses.path}: {reversed_joint} seems to turn the other way: with its sign reversed the arm fits; "
+            f"check its sign in the table or bag, and its axis in {problem.robot.tree.urdf.name}"
+        )
 
 
 def _check_single_poses(problem: PoseSet, predicted: Array, target: Array) -> None:

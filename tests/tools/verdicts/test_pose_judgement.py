@@ -81,7 +81,7 @@ def test_errors_of_a_size_that_no_geometry_has_are_a_no(tx90l):
 def test_drives_that_are_rigid_have_bounds_and_lack_no_effect(tx90l):
     """The springs of the model are not there: what their priors leave of sag is no effect of another kind."""
     springs = {n: 1e12 for n in tx90l.parameters if "stiffness" in n}
-    result = calibrate_poses(tx90l, [simulate_poses(tx90l, 60, 3, PoseConditions(values=springs))[0]])
+    result = calibrate_poses(tx90l, [simulate_poses(tx90l, 60, 4, PoseConditions(values=springs))[0]])
     (said,) = (text for text in silent_sentences(result) if text.startswith("Too stiff"))
     bounds = {name: float(bound) for name, bound in re.findall(r"(\S+) above (\d+) N m/rad", said)}
     assert "joint3.stiffness" in bounds and all(bounds[n] > tx90l.parameters[n].prior for n in bounds)
