@@ -119,9 +119,9 @@ def _check_joints(problem: PoseSet, target: Array, left: float) -> None:
     joints = _exchanged(problem, target, left)
     if joints:
         raise RecordingError(
-            f"{problem.poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other way "
-            f"round the arm "
-            f"fits; check the names in the table, or `names` of poses.joint_states in {problem.robot.path.name}"
+            f"{problem.poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other "
+            f"way round the arm fits; check the names in the table, or `names` of "
+            f"poses.joint_states in {problem.robot.path.name}"
         )
     reversed_joint = _reversed(problem, target, left)
     if reversed_joint:
