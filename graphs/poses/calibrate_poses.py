@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +21,14 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import tracker_and_target
+from jointscope.graphs.poses.trimmed_poses import TrimmedPoses
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.bodies.misplaced_joints import LENGTHS
-from jointscope.robots.errors import SolveError
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.geometry.error_parameters import TOOL, error_names
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
 from jointscope.robots.model.robot import Robot
@@ -43,7 +45,7 @@ MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is 
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseCalibration:
     """Result of a calibration from poses.
 
@@ -109,12 +111,13 @@ def calibrate_poses(
         SolveError: no convergence, or too many outliers.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
+    _must_be_poses(sessions)
     report("looking at the poses", 0.0)
     robot, problems = placed(robot, sessions)
     screen_poses(problems)
     before = tuple(tip_errors(problem) for problem in problems)
     out: list[tuple[str, str, float]] = []
-    scale, iterations = 1.0, 0
+    scale, weighted, iterations = 1.0, False, 0
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
         problems = [replace(problem, repeatability=scale) for problem in problems]
@@ -127,9 +130,13 @@ def calibrate_poses(
                 f"no convergence after {len(solution.iterations)} iterations over {sum(map(len, sessions))} poses; "
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
+        if i == 0:
+            problems, out = _without_hidden(robot, problems, known[: len(problems)])
+        if i == 0 and out:
+            continue
         distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
         worst = max(float(d.max()) for d in distances)
-        if 0 < i < PASSES - 1 and worst > OUTLYING:
+        if weighted and i < PASSES - 1 and worst > OUTLYING:
             problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
             out += found
             if len(out) > MOST_OUT * sum(map(len, sessions)):
@@ -145,9 +152,20 @@ def calibrate_poses(
         wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
         if abs(np.log(wanted / scale)) < AGREES:
             break
-        scale = float(wanted)
+        scale, weighted = float(wanted), True
     seconds = time.perf_counter() - began
     return _result(robot, problems, known[: len(problems)], covariance, before, scale, ratio, out, iterations, seconds)
+
+
+def _must_be_poses(sessions: Sequence[Poses]) -> None:
+    """Paths and single sessions are what is given by mistake."""
+    many = not isinstance(sessions, Poses | str | Path) and len(sessions) > 0
+    wrong: object = next((each for each in sessions if not isinstance(each, Poses)), None) if many else sessions
+    if wrong is not None:
+        raise RecordingError(
+            f"expected a list of poses, got {type(wrong).__name__}; jointscope.tools.bags.at_poses.read_poses."
+            "read_poses(path, robot) reads those of a table or bag: calibrate_poses(robot, [read_poses(path, robot)])"
+        )
 
 
 def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:
@@ -219,6 +237,16 @@ def _without_outliers(
         out += [(poses.path, poses.names[i], float(np.sqrt(found[i]))) for i in np.flatnonzero(far)]
         kept.append(replace(problem, poses=poses.only(~far)))
     return kept, out
+
+
+def _without_hidden(
+    robot: Robot, problems: list[PoseSet], known: Sequence[Calibration]
+) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
+    """The sessions without poses that hide each other in a fit of all."""
+    at = robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
+    squares = TrimmedPoses(at, problems, known, MOST_OUT).outlying() ** 2
+    ends = np.cumsum([len(problem.poses) for problem in problems])[:-1]
+    return _without_outliers(problems, np.split(squares, ends), 0.0)
 
 
 def _result(

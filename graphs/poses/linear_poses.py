@@ -10,16 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.robots.geometry.added_effect import RIGID, at_null
 from jointscope.robots.geometry.arm_effects import POSES, ArmHypothesis
 from jointscope.robots.model.robot import Robot
+
+if TYPE_CHECKING:  # which begins with the poses linearised here
+    from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 
 Array = NDArray[np.float64]
 SPREAD = 1.0  # [m] prior sigma of the point of a contact, so that one that was left out has one
@@ -38,6 +41,9 @@ class LinearPoses:
         groups: number of the group of each pose, shape (m,).
         contacts: number of the contact of each pose, shape (m,); -1 where a tracker measured.
         whiten: of each pose, shape (m, 3, 3).
+        off, apart: whitened residuals of known distances between contacts, shape (d,), and their columns, shape (d, p);
+            `tied` and `pull` hold them, too.
+        places: for each session, which of the columns are those of its calibration.
     """
 
     r: Array
@@ -47,19 +53,35 @@ class LinearPoses:
     groups: NDArray[np.intp]
     contacts: NDArray[np.intp]
     whiten: Array
+    off: Array
+    apart: Array
+    places: tuple[NDArray[np.intp], ...]
 
     kind = POSES
 
     @staticmethod
     def of(result: PoseCalibration) -> LinearPoses:
         """The poses of a calibration at its values."""
-        pieces, names, held, size = [], list[str](), list[int](), len(result.names)
-        total = size + 3 * sum(len(problem.contacts) for problem in result.problems)
+        return LinearPoses.at(result.robot, result.problems, result.calibrations)
+
+    @staticmethod
+    def at(robot: Robot, problems: Sequence[PoseSet], calibrations: Sequence[Calibration]) -> LinearPoses:
+        """Poses at some values.
+
+        Args:
+            robot: with these values.
+            problems: the sessions.
+            calibrations: of each session, with the points of its contacts.
+        """
+        shared = calibrations[0].names
+        pieces, ties, places = [], [], list[NDArray[np.intp]]()
+        names, held, size = list[str](), list[int](), len(shared)
+        total = size + 3 * sum(len(problem.contacts) for problem in problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
-        tied[:size, :size], pull = prior_information(result.robot, result.names), np.zeros(total)
-        pull[:size] = prior_pull(result.robot, result.names)
+        tied[:size, :size], pull = prior_information(robot, shared), np.zeros(total)
+        pull[:size] = prior_pull(robot, shared)
         first = size
-        for problem, calibration in zip(result.problems, result.calibrations, strict=True):
+        for problem, calibration in zip(problems, calibrations, strict=True):
             index = calibration.columns[DYNAMICS]
             own = [k for k in range(calibration.size) if not index.start <= k < index.stop]
             place = np.zeros(calibration.size, dtype=np.intp)
@@ -67,9 +89,11 @@ class LinearPoses:
             W, r, J = _whitened(problem, calibration)
             wide = np.zeros((len(r), total))
             wide[:, place] = J
-            off, apart = problem.distances(calibration)
-            tied[np.ix_(place, place)] += apart.T @ apart
-            pull[place] += apart.T @ off
+            off, own_apart = problem.distances(calibration)
+            apart = np.zeros((len(off), total))
+            apart[:, place] = own_apart
+            ties.append((off, apart))
+            places.append(place)
             number = {contact: (first - size) // 3 + i for i, contact in enumerate(problem.contacts)}
             held += [number[c] for c in problem.poses.contacts] or [-1] * len(problem.poses)
             names += problem.poses.groups
@@ -77,8 +101,10 @@ class LinearPoses:
             pieces.append((r, wide, W))
         groups = {name: i for i, name in enumerate(dict.fromkeys(names))}
         r, J, W = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        off, apart = (np.concatenate([tie[k] for tie in ties]) for k in range(2))
+        tied, pull = tied + apart.T @ apart, pull + apart.T @ off
         numbers = np.array([groups[name] for name in names])
-        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W)
+        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W, off, apart, tuple(places))
 
     @cached_property
     def fold_of(self) -> NDArray[np.intp]:

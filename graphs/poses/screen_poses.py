@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import permutations
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ LARGEST_ERROR = 0.05  # [m] that geometric errors of an arm can make
 ALIKE = 1e-3  # [rad]
 FEW = 0.2  # share of the poses that may be wrong by themselves
 ROUNDS = 10
+MUCH_BETTER = 0.2  # of what is left, where angles that were read otherwise fit
 
 
 def screen_poses(problems: Sequence[PoseSet]) -> None:
@@ -91,13 +92,7 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
             "target are exchanged; expected right-handed x, y, z"
         )
     _check_single_poses(problem, predicted, target)
-    joints = _exchanged(problem, target, left)
-    if joints:
-        raise RecordingError(
-            f"{poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other way "
-            f"round the arm "
-            f"fits; check the names in the table, or `names` of poses.joint_states in {place}"
-        )
+    _check_joints(problem, target, left)
     if left < LARGEST_ERROR:
         raise RecordingError(
             f"{poses.path}: the tracker does not stand where {place} says: another place fits to {1e3 * left:.2g} mm "
@@ -117,6 +112,23 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         f"with a tracker "
         "anywhere; check names, signs and units of the joints, and the link that carries the target"
     )
+
+
+def _check_joints(problem: PoseSet, target: Array, left: float) -> None:
+    """Two joints may be exchanged, or one may turn the other way."""
+    joints = _exchanged(problem, target, left)
+    if joints:
+        raise RecordingError(
+            f"{problem.poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other "
+            f"way round the arm fits; check the names in the table, or `names` of "
+            f"poses.joint_states in {problem.robot.path.name}"
+        )
+    reversed_joint = _reversed(problem, target, left)
+    if reversed_joint:
+        raise RecordingError(
+            f"{problem.poses.path}: {reversed_joint} seems to turn the other way: with its sign reversed the arm fits; "
+            f"check its sign in the table or bag, and its axis in {problem.robot.tree.urdf.name}"
+        )
 
 
 def _check_single_poses(problem: PoseSet, predicted: Array, target: Array) -> None:
@@ -154,16 +166,29 @@ def _check_contacts(problem: PoseSet) -> None:
 def _exchanged(problem: PoseSet, target: Array, left: float) -> tuple[str, str] | None:
     """Two joints whose angles fit much better the other way round."""
     joints = problem.arm.chain.joints
-    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
-    values = problem.values(calibration)
-    for a, b in permutations(range(len(joints)), 2):
-        if a < b:
-            q = problem.q.copy()
-            q[:, [a, b]] = q[:, [b, a]]
-            other = base_from_tracker(problem.arm.at(q, e, values).target, target)[1]
-            if other < LARGEST_ERROR and other < 0.2 * left:
-                return joints[a], joints[b]
+    for a, b in combinations(range(len(joints)), 2):
+        q = problem.q.copy()
+        q[:, [a, b]] = q[:, [b, a]]
+        if _fits(problem, q, target, left):
+            return joints[a], joints[b]
     return None
+
+
+def _reversed(problem: PoseSet, target: Array, left: float) -> str | None:
+    """A joint whose angles fit much better with the other sign."""
+    for k, joint in enumerate(problem.arm.chain.joints):
+        q = problem.q.copy()
+        q[:, k] *= -1.0
+        if _fits(problem, q, target, left):
+            return joint
+    return None
+
+
+def _fits(problem: PoseSet, q: Array, target: Array, left: float) -> bool:
+    """Whether other angles fit, and much better than those that were read, with a tracker anywhere."""
+    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
+    other = base_from_tracker(problem.arm.at(q, e, problem.values(calibration)).target, target)[1]
+    return other < LARGEST_ERROR and other < MUCH_BETTER * left
 
 
 def _check_number(problems: Sequence[PoseSet]) -> None:
@@ -173,8 +198,9 @@ def _check_number(problems: Sequence[PoseSet]) -> None:
     told = 3 * poses - 3 * contacts
     if poses < FEWEST or told < FEWEST:
         more = max(FEWEST - poses, -(-(FEWEST - told) // 3))
+        at = f" at {contacts} contacts" if contacts else ""
+        said = f"1 pose{at} tells" if poses == 1 else f"{poses} poses{at} tell"
         raise RecordingError(
-            f"{problems[0].poses.path}: {poses} poses{f' at {contacts} contacts' if contacts else ''} tell "
-            f"{max(told, 0)} "
-            f"coordinates; expected at least {FEWEST} poses that tell as many: add {more} more"
+            f"{problems[0].poses.path}: {said} {max(told, 0)} coordinates; expected at least {FEWEST} poses that tell "
+            f"as many: add {more} more"
         )

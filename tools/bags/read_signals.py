@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from jointscope.graphs.responses.find_excitation import find_excitation
+from jointscope.graphs.responses.settled_periods import settled
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.excitation_file import excitation_beside, read_excitation
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
@@ -62,17 +63,19 @@ def read_signals(path: Path, source: str = "", target: str = "", led: bool = Fal
     return Signals(str(path), bag_sha256(path), inputs, outputs), moved[-1] if led else inputs
 
 
-def excitation_of(path: Path, drive: Signal, inputs: int, file: Path | None = None) -> Excitation:
+def excitation_of(path: Path, signals: Signals, drive: Signal, file: Path | None = None) -> Excitation:
     """What a file says of the excitation of a bag, or, where there is none, the recording itself.
 
     Args:
         path: the bag.
+        signals: inputs and outputs, which settle after the excitation has begun.
         drive: the signal that was made.
-        inputs: how many there are.
         file: that describes it; by default the one beside the bag.
     """
     file = file or excitation_beside(path)
-    return find_excitation(drive, inputs, str(path)) if file is None else read_excitation(file, path, drive.step)
+    if file is not None:
+        return read_excitation(file, path, drive.step)
+    return settled(signals, find_excitation(drive, len(signals.inputs.names), str(path)))
 
 
 def _signal(bag: Bag, raws: Mapping[str, RawTopic], spec: str, names: Sequence[str]) -> tuple[Signal, int]:
@@ -87,7 +90,7 @@ def _signal(bag: Bag, raws: Mapping[str, RawTopic], spec: str, names: Sequence[s
     if not field:
         raise RecordingError(f"{spec!r}: expected TOPIC:FIELD or TOPIC:FIELD:NAME,NAME, for example {INPUT}")
     kind, raw = bag.message_type(topic), raws[topic]
-    field_path(kind, field, topic)
+    field_path(kind, field, topic, "correct TOPIC:FIELD")
     columns = read_columns(raw, kind, field, wanted=wanted)
     stamps = columns.of(raw.received_ns) if columns.stamps is None else columns.stamps
     called = columns.names or tuple(f"{field}[{i}]" for i in range(columns.values.shape[1]))

@@ -25,7 +25,7 @@ from jointscope.graphs.transmission.calibrate_links import calibrate_links
 from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
-from jointscope.robots.errors import SolveError
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
 from jointscope.tools.notebook.given import (
@@ -83,6 +83,11 @@ def calibrate(
         SolveError: no convergence, or a value that nothing determines.
     """
     model, limits = robot_of(robot), limits_of(accept)
+    if isinstance(recordings, Sequence) and not recordings and (rests or poses or frequency):
+        raise RecordingError(
+            "no recording of motion is given; from poses alone call calibrate_poses(robot, [read_poses(path, robot)]), "
+            "as docs/poses.md shows, from rests or frequency responses alone `jointscope calibrate` on the command line"
+        )
     read_ones = without_stretches(recordings_of(recordings, model), leave_out)
     if rests or poses or frequency:
         model.need_link_dynamics()

@@ -8,7 +8,9 @@ from collections.abc import Mapping, Sequence
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.silent_values import silent_sentences
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
@@ -34,14 +36,15 @@ def pose_errors_text(by_label: Mapping[str, Mapping[str, TipErrors]], count: int
             mm = errors.to_json()
             rows.append([label, part, *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm", "rms_mm"))])
     head = ["model", "of it", "mean [mm]", "90 % [mm]", "largest [mm]", "rms [mm]"]
-    return f"{count} poses, distance of the predicted target from the measured one\n{text_table(head, rows, '<<>>>>')}"
+    said = f"{counted(count, 'pose')}, distance of the predicted target from the measured one"
+    return f"{said}\n{text_table(head, rows, '<<>>>>')}"
 
 
 def _headline(result: PoseCalibration) -> str:
     paths = ", ".join(problem.poses.path for problem in result.problems)
     return (
-        f"{result.robot.name} from {paths}: {result.count} poses, calibrated in {result.wall_seconds:.1f} s, "
-        f"{result.iterations} iterations"
+        f"{result.robot.name} from {paths}: {counted(result.count, 'pose')}, "
+        f"calibrated in {result.wall_seconds:.1f} s, {result.iterations} iterations"
     )
 
 
@@ -67,16 +70,13 @@ def _tips(result: PoseCalibration) -> str:
 
 
 def _parameters(result: PoseCalibration) -> str:
-    rows, silent = [], []
-    for name in result.names:
+    rows = []
+    for name in result.told:
         p = result.robot.parameters[name]
-        if name not in result.told:
-            silent.append(name)
-            continue
         value, sigma = with_sigma(*_shown(p.value, p.sigma or 0.0, p.unit))
         rows.append([name, value, sigma, _unit(p.unit)])
     table = text_table(["parameter", "value", "± sigma", "unit"], rows, "<>><")
-    return table + (f"\n\nThe poses say nothing about {', '.join(silent)}." if silent else "")
+    return "\n\n".join([table, *silent_sentences(result)])
 
 
 def _shown(value: float, sigma: float, unit: str) -> tuple[float, float]:

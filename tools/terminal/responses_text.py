@@ -11,7 +11,10 @@ from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, entries
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.graphs.responses.response_matrix import ResponseMatrix
+from jointscope.robots.recordings.signals import Excitation
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
+from jointscope.tools.presentation.noisy_response import noise_doubt
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
@@ -21,14 +24,14 @@ def response_text(found: MeasuredResponse) -> str:
     """The summary of one recording."""
     matrix, excitation = found.matrix, found.spectra.excitation
     f = matrix.frequencies
-    periods = f"{len(found.spectra.U)} experiments of {matrix.periods} steady periods"
+    periods = f"{counted(len(found.spectra.U), 'experiment')} of {counted(matrix.periods, 'steady period')}"
     whole = found.distortions is not None
     apart = excitation.f0 if whole else float(np.median(np.diff(f)))
     lines = [
         f"{found.spectra.path}: {len(f)} lines from {f[0]:.6g} to {f[-1]:.6g} Hz, {apart:.6g} Hz apart; "
         + (periods if whole else f"a stretch of {1.0 / excitation.f0:.4g} s without whole periods")
         + (" (pairs of both signs)" if found.spectra.common is not None else ""),
-        f"  excitation: {excitation.source}; total covariance: {matrix.total_from}",
+        f"  excitation: {excitation.source}{_left_out(excitation)}; total covariance: {matrix.total_from}",
         "",
         text_table(["from", "to", "noise", "total"], entry_rows(matrix), "<<>>"),
     ]
@@ -43,7 +46,18 @@ def response_text(found: MeasuredResponse) -> str:
         ]
     elif not len(d.even.frequencies) + len(d.odd.frequencies):
         lines += ["", "All lines were excited, so even and odd distortions cannot be told apart."]
+    if doubt := noise_doubt(found):
+        lines += ["", f"! {doubt}"]
     return "\n".join(lines)
+
+
+def _left_out(excitation: Excitation) -> str:
+    """Periods that are not used."""
+    most = max(e.transient for e in excitation.experiments)
+    if not most:
+        return ""
+    few = "the first period" if most == 1 else f"the first {most} periods"
+    return f", without {few} of each experiment, in which the response had not settled"
 
 
 def entry_rows(matrix: ResponseMatrix) -> list[list[str]]:
@@ -76,8 +90,8 @@ def frequency_calibration_text(result: FrequencyCalibration) -> str:
     """The summary of a calibration."""
     paths, judgement = ", ".join(problem.pose.path for problem in result.problems), judge_frequency(result)
     lines = [
-        f"{result.robot.name} from {paths}: {len(result.problems)} poses, calibrated in {result.wall_seconds:.1f} s, "
-        f"{result.iterations} iterations in {result.stages} stages",
+        f"{result.robot.name} from {paths}: {counted(len(result.problems), 'pose')}, "
+        f"calibrated in {result.wall_seconds:.1f} s, {result.iterations} iterations in {result.stages} stages",
         "",
         judgement.headline,
         *(f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")),
@@ -122,7 +136,8 @@ def frequency_errors_text(by_label: Mapping[str, Sequence[FrequencyErrors]]) -> 
     first = next(iter(by_label.values()))
     count = sum(len(one.pose.lines) for one in first)
     lines = [
-        f"{len(first)} poses, {count} lines: size of the model's matrix over the measured one, the floor that the "
+        f"{counted(len(first), 'pose')}, {counted(count, 'line')}: "
+        "size of the model's matrix over the measured one, the floor that the "
         "covariance of the measured one alone would give, and the distance in its sigmas (root mean squares)",
         text_table(ERROR_HEAD, error_rows(by_label), "<<<>>>"),
         "",

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             progress(f"reading {bag.name}", i / len(args.bags))
             signals, drive = read_signals(bag, args.source, args.target)
             try:
-                excitation = excitation_of(bag, drive, len(signals.inputs.names), args.excitation)
+                excitation = excitation_of(bag, signals, drive, args.excitation)
             except NoPeriodsError:
                 excitation = None
             found.append(MeasuredResponse.of(signals, excitation))

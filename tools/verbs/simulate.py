@@ -94,6 +94,7 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
         SimulationError: an option of recordings of motion, or another file than a table.
     """
     from jointscope.tools.bags.at_poses.pose_table import pose_table
+    from jointscope.tools.bags.clocks.durations import counted
     from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
     from jointscope.tools.verb_parts.simulation_options import assignments
 
@@ -107,7 +108,7 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
     if args.json is not None:
         write_json(args.json, {"table": str(args.output), "truth_file": str(truth_file), "truth": truth})
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
-    print(f"{args.output}: {len(poses)} poses of {robot.name}, seed {args.seed}")
+    print(f"{args.output}: {counted(len(poses), 'pose')} of {robot.name}, seed {args.seed}")
     print(f"  effects: {effects}\n  truth:   {truth_file}")
     return 0
 

@@ -11,28 +11,33 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.elsewhere import sigma_elsewhere
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import summary
+from jointscope.graphs.poses.untold_distances import untold_distance
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
+from jointscope.tools.verdicts.missing_in_arm import missing_by_poses
+from jointscope.tools.verdicts.priors.far_from_priors import FAR, far_parameters
 from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
-from jointscope.tools.verdicts.priors.far_from_priors import far_parameters
 
 REDUNDANT = (2.0, 1.2)  # measured coordinates per independent value: fine from the first, bad below the second
 REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses may ask for
+UNSEEN = 0.05  # of the target's noise: what transmissions make of it at the end of an arm of a METRE is not seen
+METRE = 1.0  # [m]
 SURE = 3.0  # [sigma]
 FEWEST = 4  # poses on each side of a step
 CHANCE = 1e-4  # of a step where there is none
 SHOWN = 4
 OUT = 0.1  # share of the poses that may be left out
 ELSEWHERE = (10.0, 100.0)  # times what is left at the poses that the target may be uncertain in other postures
-BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach
+BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach; beyond FAR the calibration is worth nothing
+APART = (3.0, 10.0)  # [sigma] that a distance which is said may be from that of the arm: doubtful, and wrong
 
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _near_priors, _backlash, _worth)
-    checks = tuple(make(result) for make in makers)
-    return Judgement.of(checks)
+    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _near_priors, _apart, _lacks)
+    checks = (make(result) for make in (*makers, _backlash, _worth))
+    return Judgement.of([check for check in checks if check is not None])
 
 
 def _enough(result: PoseCalibration) -> Check:
@@ -122,8 +127,12 @@ def _repeatability(result: PoseCalibration) -> Check:
     name, factor = "Residuals as the arm repeats", result.repeatability
     level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
     assert result.robot.poses is not None
-    micro = 1e6 * float(np.median(result.robot.poses.joint_sigmas))
-    text = f"The residuals are those of transmissions that repeat to {significant(micro, 2)} urad"
+    setup = result.robot.poses
+    repeats = float(np.median(setup.joint_sigmas))
+    text = f"The residuals are those of transmissions that repeat to {significant(1e6 * repeats, 2)} urad"
+    if repeats * METRE < UNSEEN * setup.target_sigma:
+        noise = significant(1e3 * setup.target_sigma, 2)
+        text = f"The noise of the target, {noise} mm, explains the residuals; transmissions repeat better than it shows"
     if level != "good":
         text += (
             f", {significant(factor, 2)} times what the robot file says: joints that had not settled, another "
@@ -135,18 +144,19 @@ def _repeatability(result: PoseCalibration) -> Check:
 
 def _within(result: PoseCalibration) -> Check:
     name = "Errors of a size that geometry has"
-    far = []
-    for n in result.told:
-        p = result.robot.parameters[n]
-        if n in _geometric(result) and abs(p.value - p.prior) > BEYOND * p.prior_sigma:
-            far.append(f"{n} ({significant(1e3 * p.value, 3)} {'mm' if p.unit == 'm' else 'mrad'})")
+    parameters = [result.robot.parameters[n] for n in result.told if n in _geometric(result)]
+    sizes = {p.name: abs(p.value - p.prior) / p.prior_sigma for p in parameters}
+    far = sorted((p for p in parameters if sizes[p.name] > BEYOND), key=lambda p: -sizes[p.name])
     if not far:
         return Check("good", name, "All geometric errors are of the size that the robot file expects.")
+    said = (f"{p.name} ({significant(1e3 * p.value, 3)} {'mm' if p.unit == 'm' else 'mrad'})" for p in far[:3])
+    contacts = any(problem.contacts for problem in result.problems)
     return Check(
-        "warn",
+        "bad" if sizes[far[0].name] > FAR[1] else "warn",
         name,
-        f"{', '.join(far[:3])} {'is' if len(far) == 1 else 'are'} beyond {BEYOND:g} times what the robot file expects "
-        "(`length_sigma`, `angle_sigma`): a wrong URDF, or an effect that is missing.",
+        f"{', '.join(said)} {'is' if len(far) == 1 else 'are'} beyond {BEYOND:g} times what the robot file expects "
+        f"(`length_sigma`, `angle_sigma`): a wrong URDF, {'a wrong `contact_distance`, ' * contacts}or an effect that "
+        "is missing.",
     )
 
 
@@ -155,6 +165,41 @@ def _near_priors(result: PoseCalibration) -> Check:
     others = [name for name in result.told if name not in _geometric(result)]
     level, text = far_parameters(result.robot.parameters, others, result.start.path.name)
     return Check(level, AS_EXPECTED_BY_PRIORS, text)
+
+
+def _apart(result: PoseCalibration) -> Check | None:
+    """Whether contacts are as far apart as the robot file says; None where it says nothing."""
+    name, found = "Contacts as far apart as the robot file says", untold_distance(result)
+    if found is None:
+        return None
+    level = "good" if found.distance <= APART[0] else "warn" if found.distance <= APART[1] else "bad"
+    own, sigma = significant(1e3 * found.found, 4), significant(1e3 * found.sigma, 2)
+    text = f"Without `contact_distance` the contacts of a place are {own} ± {sigma} mm apart"
+    if level != "good":
+        said = f"{significant(1e3 * found.said, 4)} mm that {result.start.path.name} says"
+        text += (
+            f", {significant(found.distance, 2)} sigma from the {said}: the arm was stretched to reach them; measure "
+            "the distance, and correct it there"
+        )
+    return Check(level, name, f"{text}.")
+
+
+def _lacks(result: PoseCalibration) -> Check:
+    """Whether poses that were left out are met better with an effect of the catalogue."""
+    name, missing = "An effect that is missing", missing_by_poses(result)
+    if not missing:
+        return Check("good", name, "No effect of the catalogue would meet poses that are left out better.")
+    first, *others = missing
+    sizes = ", ".join(significant(size, 3) for size in first.sizes)
+    unit = "rad/(N m)" if first.hypothesis.kind.soft else first.hypothesis.kind.unit
+    also = f"; then {', '.join(c.hypothesis.label for c in others[:2])}" if others else ""
+    return Check(
+        "warn",
+        name,
+        f"What is left looks like {first.hypothesis.label}, about {sizes} {unit} (by chance: {first.p_value:.0e}){also}"
+        "; other values may be wrong by many of their sigmas until it is in the model: `jointscope diagnose` with the "
+        "same poses ranks what it may be, `jointscope discover` adds it.",
+    )
 
 
 def _backlash(result: PoseCalibration) -> Check:

@@ -166,6 +166,8 @@ def changed(poses, **what):
         ({"target": lambda x: 1e3 * x}, "as in millimetres; expected m: set `unit: mm` of poses.positions"),
         ({"target": lambda x: x * [1, 1, -1]}, "only a mirrored arm would fit"),
         ({"q": lambda q: q[:, [0, 2, 1, 3, 4, 5]]}, "columns of joint2 and joint3 seem to be exchanged"),
+        ({"q": lambda q: q * [1, 1, 1, -1, 1, 1]}, "joint4 seems to turn the other way"),
+        ({"q": lambda q: q * [1, 1, -1, 1, 1, 1]}, "joint3 seems to turn the other way"),
         ({"target": lambda x: x + np.array([0.5, 0, 0])}, "the tracker does not stand where tx90l.yaml says"),
         ({"target": lambda x: np.where(np.arange(len(x))[:, None] == 4, 0.0, x)}, "exactly zero in pose 4"),
         ({"q": lambda q: q[:1].repeat(len(q), 0)}, "all 40 poses are alike"),

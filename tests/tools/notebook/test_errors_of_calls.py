@@ -74,6 +74,8 @@ def test_a_function_raises_the_line_that_the_command_line_prints(case, folder, m
 def test_nothing_given_is_told():
     with pytest.raises(js.errors.RecordingError, match=r"^no recording is given; expected a path"):
         js.calibrate("doggy", [])
+    with pytest.raises(js.errors.RecordingError, match=r"from poses alone call calibrate_poses\(robot, \[read_poses"):
+        js.calibrate("tx90l", [], poses=["poses.csv"])
     with pytest.raises(js.errors.RobotError, match=r"^no robot is given; expected one"):
         js.compare([], "good.mcap")
 

@@ -115,6 +115,13 @@ def test_descriptions_that_do_not_fit_are_refused_in_one_line(case, tmp_path, ca
     assert not (tmp_path / "f.npz").exists()
 
 
+def test_a_field_that_is_not_there_is_corrected_where_it_was_written(tmp_path, capsys):
+    write(tmp_path)
+    assert main(["frequency", str(tmp_path / "run"), "--from", "/joint_states:efort"]) == 1
+    error = capsys.readouterr().err
+    assert "has no field 'efort'" in error and "correct TOPIC:FIELD" in error and "robot file" not in error
+
+
 def test_an_experiment_that_is_not_in_the_bag_is_refused(tmp_path, capsys):
     excitation = write(tmp_path)
     late = replace(excitation, experiments=tuple(replace(e, start=e.start + 100.0) for e in excitation.experiments))

@@ -65,7 +65,8 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
             )
         places = tuple(row[head.index("place")].strip() for row in body) if "place" in head else contacts
         pairs = tuple(dict.fromkeys(zip(contacts, places, strict=True)))
-        notices = () if setup.contact_distance is None else _unused_distance(path, pairs)
+        unused = () if setup.contact_distance is None else _unused_distance(path, pairs)
+        notices = (*_same_names(path, names), *unused)
         return Poses(str(path), digest, names, q, None, contacts, pairs, tau, notices)
     missing = [axis for axis in AXES if axis not in head]
     if missing:
@@ -75,7 +76,20 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
         )
     target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
     _must_differ(path, np.hstack([q, target]))
-    return Poses(str(path), digest, names, q, target, torque=tau)
+    return Poses(str(path), digest, names, q, target, torque=tau, notices=_same_names(path, names))
+
+
+def _same_names(path: Path, names: Sequence[str]) -> tuple[Notice, ...]:
+    """Rows of one name count as poses of their own, and are left out together when an effect is judged."""
+    again = {name: count for name, count in Counter(names).items() if count > 1}
+    if not again:
+        return ()
+    first = next(iter(again))
+    text = (
+        f"{path}: {sum(again.values())} of {len(names)} rows share their name in the column `pose` with another one, "
+        f"as {again[first]} rows named {first}: each counts as a pose of its own; give each a name if they are"
+    )
+    return (Notice("poses", "info", sum(again.values()), text),)
 
 
 def _must_differ(path: Path, rows: Array) -> None:

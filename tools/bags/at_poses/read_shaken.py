@@ -32,7 +32,8 @@ def read_shaken(path: Path, robot: Robot) -> tuple[Signals, Excitation]:
     signals, drive = read_signals(path, source, target, led=True)
     inputs = replace(signals.inputs, values=signals.inputs.values * _of(setup.torques, shaken), names=setup.joints)
     outputs = replace(signals.outputs, values=signals.outputs.values * setup.positions.factor, names=robot.joints)
-    return replace(signals, inputs=inputs, outputs=outputs), excitation_of(path, drive, len(shaken))
+    signals = replace(signals, inputs=inputs, outputs=outputs)
+    return signals, excitation_of(path, signals, drive)
 
 
 def _spec(topic: Topic, places: list[int]) -> str:

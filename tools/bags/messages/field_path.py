@@ -91,8 +91,16 @@ class FieldPath:
         return _entry(block, layout.texts[".".join(here)].index(self.chosen))
 
 
-def field_path(message_type: MessageType, field: str, topic: str) -> FieldPath:
+def field_path(
+    message_type: MessageType, field: str, topic: str, correct: str = "set `field` in the robot file"
+) -> FieldPath:
     """A dotted field of a message type.
+
+    Args:
+        message_type: of the topic.
+        field: dotted path.
+        topic: for the text of an error.
+        correct: what to do about a wrong field.
 
     Raises:
         RecordingError: there is no such field; the message lists the fields at that level.
@@ -112,17 +120,16 @@ def field_path(message_type: MessageType, field: str, topic: str) -> FieldPath:
             continue
         beside = _list_of_texts(message_type, levels[-1]) if not msgtype and k == len(parts) - 1 else None
         if beside is None:
-            raise _no_field(message_type, field, topic, part, tuple(fields))
+            raise _no_field(message_type, field, topic, part, tuple(fields), correct)
         return FieldPath(parts[:-1], part, beside, _names(message_type, levels[:-1]))
     return FieldPath(parts, "", (), _names(message_type, levels))
 
 
-def _no_field(message_type: MessageType, field: str, topic: str, part: str, fields: tuple[str, ...]) -> RecordingError:
+def _no_field(
+    message_type: MessageType, field: str, topic: str, part: str, fields: tuple[str, ...], correct: str
+) -> RecordingError:
     there = f"it has {', '.join(fields)}" if fields else "there is nothing below"
-    return RecordingError(
-        f"topic {topic}: {message_type.name} has no field {field!r}: no {part!r}; {there}; set `field` in the robot "
-        "file"
-    )
+    return RecordingError(f"topic {topic}: {message_type.name} has no field {field!r}: no {part!r}; {there}; {correct}")
 
 
 def _names(message_type: MessageType, levels: list[Level]) -> tuple[str, ...] | None:

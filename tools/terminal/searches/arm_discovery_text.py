@@ -9,6 +9,7 @@ from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.terminal.text_table import text_table
 
@@ -119,7 +120,7 @@ def arm_discovery_text(found: ArmDiscovery) -> str:
 def recordings_said(found: ArmDiscovery) -> str:
     """How much was fitted."""
     last = found.steps[-1].calibrated
-    counts = [] if last.poses is None else [f"{last.poses.count} poses"]
+    counts = [] if last.poses is None else [counted(last.poses.count, "pose")]
     if last.frequency is not None:
         counts.append(f"{len(last.frequency.problems)} recordings of the arm shaken")
     return " and ".join(counts)
