@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.screening.windowed_motion import faded_mean, windowed_motion
 from jointscope.robots.bodies.body_accelerations import specific_force
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import RIGHT_FROM_LEFT, Accelerometer, Gyro
-from jointscope.robots.recordings.joint_motion import window_mean
-from jointscope.robots.recordings.recording import Notice, Recording, Stream
+from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
 Array = NDArray[np.float64]
@@ -110,21 +110,19 @@ class Felt:
     def of(recording: Recording, robot: Robot, sensor: Accelerometer, gyro: Gyro) -> Felt | None:
         """Where both streams last; None where that is too short."""
         encoder = robot.link_encoder or robot.motor_encoder
+        if encoder is robot.motor_encoder and not robot.motor_encoder.zero_known:
+            return None
         angles, stream = recording.streams[encoder.name], recording.streams[sensor.name]
         window = max(WINDOW, PERIODS * max(float(np.max(s.periods)) for s in (angles, stream)))
-        begin, end = (f(a, b) for f, a, b in zip((max, min), *((s.times[0], s.times[-1]) for s in (angles, stream))))
+        begin, end = max(angles.times[0], stream.times[0]), min(angles.times[-1], stream.times[-1])
         if not np.isfinite(window) or end - begin < FEWEST * window / PERIODS:
             return None
         times = np.linspace(begin + 1.5 * window, end - 1.5 * window, INSTANTS)
-        at = {part: _mean(angles, times + part * window, window) for part in (-1.0, -0.5, 0.0, 0.5, 1.0)}
-        motion = [
-            at[0.0] - encoder.zero,
-            (at[0.5] - at[-0.5]) / window,
-            (at[1.0] - 2.0 * at[0.0] + at[-1.0]) / window**2,
-        ]
+        found = windowed_motion(angles, times, window)
+        motion = [found.q - encoder.zero, found.v, found.a]
         if encoder is robot.motor_encoder:
             motion = [joint_angles(robot, x) for x in motion]
-        readings = (_mean(stream, times, window) - sensor.bias) @ gyro.R_imu_body
+        readings = (faded_mean(stream, times, window) - sensor.bias) @ gyro.R_imu_body
         return Felt(robot, sensor, gyro, readings, *motion)
 
     def mistake(self, size: float) -> Hypothesis | None:
@@ -195,11 +193,6 @@ class Felt:
                 yield replace(now, rank=6 if np.linalg.det(axes) > 0.0 else 7, axes=axes)
 
 
-def _mean(stream: Stream, times: Array, window: float) -> Array:
-    """Mean in a window whose edges fade, shape (m, k)."""
-    return np.mean([window_mean(stream, times + part * window, window) for part in (-0.5, -0.25, 0, 0.25, 0.5)], axis=0)
-
-
 def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis) -> str:
     """What was seen, and what to write."""
     name, file, now = sensor.name, robot_argument(robot), sensor.source.unit
@@ -217,8 +210,9 @@ def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis
         vector = ", ".join(f"{x:.12g}" for x in found.gravity + 0.0)
         place = file if sensor.gravity is None else f"sensors.{name} of {file}"
         kind = "the other way" if found.rank == 2 else "along another axis"
-        text = f"{name} feels gravity {kind} than the robot file says: if that is so, write `gravity: [{vector}]` in {place}"
-        return text + f"; or {name} reads minus what accelerometers do" * (found.rank == 2)
+        return (
+            f"{name} feels gravity {kind} than the robot file says: if that is so, write `gravity: [{vector}]` in {place}"
+        ) + f"; or {name} reads minus what accelerometers do" * (found.rank == 2)
     return _axes_sentence(sensor, gyro, found.axes, file)
 
 

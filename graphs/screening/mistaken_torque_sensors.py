@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.screening.windowed_motion import faded_mean, windowed_motion
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import TorqueSensor
-from jointscope.robots.recordings.joint_motion import window_mean
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 
 Array = NDArray[np.float64]
@@ -47,6 +47,7 @@ def mistaken_torque_sensors(recording: Recording, robot: Robot) -> list[Notice]:
     sensor = robot.torque_sensor
     if sensor is None:
         return []
+    robot = robot.in_posture(recording.posture)
     streams = (recording.streams[name] for name in (robot.motor_encoder.name, "command", sensor.name))
     drives = _Drives.of(*streams)
     if drives is None:
@@ -61,11 +62,7 @@ def mistaken_torque_sensors(recording: Recording, robot: Robot) -> list[Notice]:
             said.append(_scaled(robot, sensor, scale))
         lag = drives.lag(channels)
         if lag:
-            said.append(
-                f"{sensor.name} is about {abs(1e3 * lag):.0f} ms {'late' if lag > 0.0 else 'early'} against positions and "
-                "commands: so the drives explain it; correct its stamps or take those of its driver, or leave "
-                f"sensors.{sensor.name} out of {robot_argument(robot)}"
-            )
+            said.append(_out_of_time(robot, sensor, lag))
     return [Notice(sensor.name, MISTAKEN_TORQUE, 0, text) for text in said]
 
 
@@ -98,7 +95,7 @@ class _Drives:
         if not np.isfinite(window) or end - begin < FEWEST * window / PERIODS:
             return None
         times = np.linspace(begin, end, INSTANTS)
-        _, speed, acceleration = _motion(encoder, times, window)
+        _, speed, acceleration = windowed_motion(encoder, times, window)
         return _Drives(times, window, speed, acceleration, command, torque)
 
     def left(self, joint: int, channel: int, late: float = 0.0, command_late: float = 0.0) -> float:
@@ -134,24 +131,15 @@ class _Drives:
             return 0.0
         return 0.0 if min(whole(0.0, other) for other in coarse) < BOTH * left else lag
 
-    def _fit(self, joint: int, channel: int, late: float = 0.0, command_late: float = 0.0) -> tuple[Array, Array, Array]:
+    def _fit(
+        self, joint: int, channel: int, late: float = 0.0, command_late: float = 0.0
+    ) -> tuple[Array, Array, Array]:
         """A channel, signals of a drive, shape (m, 5), and their factors."""
-        y = _mean(self.torque, self.times + late, self.window)[:, channel]
-        u = _mean(self.command, self.times + command_late, self.window)[:, joint]
+        y = faded_mean(self.torque, self.times + late, self.window)[:, channel]
+        u = faded_mean(self.command, self.times + command_late, self.window)[:, joint]
         v, a = self.speed[:, joint], self.acceleration[:, joint]
         A = np.column_stack([u, a, v, np.tanh(v / REVERSAL), np.ones(len(v))])
         return y, A, np.linalg.lstsq(A, y, rcond=None)[0]
-
-
-def _mean(stream: Stream, times: Array, window: float) -> Array:
-    """Mean in a window whose edges fade, shape (m, k)."""
-    return np.mean([window_mean(stream, times + part * window, window) for part in (-0.5, -0.25, 0, 0.25, 0.5)], axis=0)
-
-
-def _motion(encoder: Stream, times: Array, window: float) -> tuple[Array, Array, Array]:
-    """Positions, speeds and accelerations, means in windows, shape (m, n) each."""
-    at = {part: _mean(encoder, times + part * window, window) for part in (-1.0, -0.5, 0.0, 0.5, 1.0)}
-    return at[0.0], (at[0.5] - at[-0.5]) / window, (at[1.0] - 2.0 * at[0.0] + at[-1.0]) / window**2
 
 
 def _belongs_to(left: Array) -> NDArray[np.intp]:
@@ -173,9 +161,9 @@ def _size(recording: Recording, robot: Robot, channels: NDArray[np.intp]) -> Arr
     if robot.free_links or end - begin < 4.0 * margin:
         return sizes
     times = np.linspace(begin + margin, end - margin, INSTANTS)
-    q, v, a = _motion(encoder, times, LINK_WINDOW)
+    q, v, a = windowed_motion(encoder, times, LINK_WINDOW)
     needed = robot.tree.torque(q - robot.motor_encoder.zero, v, a)
-    seen = np.std(_mean(torque, times, LINK_WINDOW)[:, channels], axis=0)
+    seen = np.std(faded_mean(torque, times, LINK_WINDOW)[:, channels], axis=0)
     for joint, ratio in enumerate(seen / np.maximum(np.std(needed, axis=0), 1e-300)):
         for factor in (THOUSAND, 1.0 / THOUSAND):
             if 1.0 / NEAR < ratio / factor < NEAR:
@@ -206,4 +194,12 @@ def _scaled(robot: Robot, sensor: TorqueSensor, factors: Array) -> str:
     return (
         f"{sensor.name}: torque of {wrong} {' and '.join(reasons)}; if that is so, write `scale: [{scale}]` in "
         f"sensors.{sensor.name} of {robot_argument(robot)}"
+    )
+
+
+def _out_of_time(robot: Robot, sensor: TorqueSensor, lag: float) -> str:
+    return (
+        f"{sensor.name} is about {abs(1e3 * lag):.0f} ms {'late' if lag > 0.0 else 'early'} against positions and "
+        "commands: so the drives explain it; correct its stamps or take those of its driver, or leave "
+        f"sensors.{sensor.name} out of {robot_argument(robot)}"
     )
