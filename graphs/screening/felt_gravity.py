@@ -203,16 +203,15 @@ def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis
         )
     if found.body != gyro.body:
         return (
-            f"{name} feels gravity as on {found.body}, not as on {gyro.body}; if that is so, write `body: {found.body}` "
-            f"in sensors.{gyro.name} of {file}"
+            f"{name} feels gravity as on {found.body}, not as on {gyro.body}; if that is so, write "
+            f"`body: {found.body}` in sensors.{gyro.name} of {file}"
         )
     if found.rank in (2, 4):
         vector = ", ".join(f"{x:.12g}" for x in found.gravity + 0.0)
         place = file if sensor.gravity is None else f"sensors.{name} of {file}"
         kind = "the other way" if found.rank == 2 else "along another axis"
-        return (
-            f"{name} feels gravity {kind} than the robot file says: if that is so, write `gravity: [{vector}]` in {place}"
-        ) + f"; or {name} reads minus what accelerometers do" * (found.rank == 2)
+        text = f"{name} feels gravity {kind} than the robot file says: if that is so, write `gravity: [{vector}]` in"
+        return f"{text} {place}" + f"; or {name} reads minus what accelerometers do" * (found.rank == 2)
     return _axes_sentence(sensor, gyro, found.axes, file)
 
 

@@ -123,7 +123,7 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "unit", "axes", "mirrored", "limit", "saturation", "jump", "clock", "foreign", "glitch", "dropped",
+        kind: one of "unit", "axes", "mirrored", "gravity", "torque", "limit", "saturation", "jump", "clock", "foreign", "glitch", "dropped",
             "gap", "staircase", "posture", "mimic", "coarse", "clipping", "end_stop", "out_of_order", "duplicate",
             "info", "jitter".
         count: number of samples concerned.
