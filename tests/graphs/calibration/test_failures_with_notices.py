@@ -63,7 +63,7 @@ def test_a_robot_without_effects_gets_start_values_from_init(doggy):
 @pytest.mark.parametrize("verb", [diagnose, discover])
 def test_verbs_that_learn_name_what_looked_odd(monkeypatch, verb, doggy):
     monkeypatch.setattr(failures_with_notices, "screen_all", lambda recording, robot: [SWAPPED])
-    monkeypatch.setattr("jointscope.graphs.discovery.starting_model.screen", lambda recording, robot: [SWAPPED])
+    monkeypatch.setattr("jointscope.graphs.discovery.starting_model.screen_all", lambda recording, robot: [SWAPPED])
     place = {"diagnose": "jointscope.graphs.discovery.diagnose", "discover": "jointscope.graphs.discovery.search_kind"}[
         verb.__name__
     ]
