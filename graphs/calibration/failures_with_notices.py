@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
+from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY
+from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE
 from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
@@ -15,6 +17,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 
 SUSPICIOUS = ("gap", *PLAIN_MISTAKES)  # kinds of notices that may explain a failure
+CULPRITS = (FELT_GRAVITY, MISTAKEN_TORQUE)  # they say what to write, and spoil everything else
 MOST = 3
 
 P = ParamSpec("P")
@@ -53,6 +56,8 @@ def names_notices(
         except SolveError as err:
             notices = [notice for recording in recordings for notice in screen_all(recording, robot)]
             message = with_notices(str(err), recordings, notices)
+            if any(notice.kind in CULPRITS for notice in notices):  # no effect is to blame
+                raise SolveError(f"{message}; mend that first") from err
             raise SolveError(next_commands(message, robot, recordings)) from err
 
     return named

@@ -29,6 +29,8 @@ from jointscope.graphs.judging.torque_rows import TorqueEquations
 from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowest_seen
 from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
+from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.errors import EffectError, JointscopeError, RecordingError
 from jointscope.robots.files.effect_editing import remove_effect
@@ -36,7 +38,6 @@ from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Recording
-from jointscope.robots.recordings.screening import screen
 
 BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
@@ -53,17 +54,17 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
         solver: minimises the cost of all samples.
 
     Raises:
-        RecordingError: a gyroscope is of the other hand: nothing fits it, and every effect would be judged by how
-            it bends.
+        RecordingError: a gyroscope is of the other hand, or an accelerometer feels another gravity: nothing fits it,
+            and every effect would be judged by how it bends.
     """
     for recording in recordings:
-        _refuse_mirrored(robot, recording)
+        _refuse_mistaken(robot, recording)
     return _as_sharp_as_told(_by_its_measure(robot, recordings, solver), solver)
 
 
-def _refuse_mirrored(robot: Robot, recording: Recording) -> None:
-    for notice in screen(recording, robot):
-        if notice.kind == MIRRORED:
+def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
+    for notice in screen_all(recording, robot):
+        if notice.kind in (MIRRORED, FELT_GRAVITY):
             raise RecordingError(
                 f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file, or leave "
                 f"{notice.stream} out of it, then search again"

@@ -137,7 +137,7 @@ def _link_encoder(name: str, section: Section, joints: tuple[str, ...]) -> LinkE
 
 
 def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> TorqueSensor:
-    source = topic(section, joints)
+    source = topic(section, joints, scaled=True)
     if source.unit != "N m":
         raise RobotError(f"{section.place}.unit: expected 'N m', got {source.unit!r}")
     return TorqueSensor(name, source, section.number("sigma", positive=True), joints)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compares every gyroscope with the rate that the encoders imply for its body, every accelerometer with gravity.
+"""Compares every gyroscope with the rate that the encoders imply for its body.
 
 Wrong units, swapped or flipped axes show, and whether an IMU has an accelerometer at all.
 
@@ -23,7 +23,6 @@ from jointscope.robots.units import UNITS, si_factor, si_unit
 
 Array = NDArray[np.float64]
 
-SAME_GRAVITY = 1.5  # a median size within this factor of gravity's is gravity with motion upon it
 ENOUGH_RATE = 0.05  # [rad/s] rms; below, noise decides
 SAME_RATE = 5.0  # ratios up to this are flexibility, not units
 UNIT_TOLERANCE = 2.4  # a unit explains a ratio that it meets within this factor
@@ -36,36 +35,19 @@ ENOUGH_INSTANTS = 10
 DEGREES = 180.0 / np.pi
 
 
-def check_accelerometers(recording: Recording, robot: Robot) -> list[Notice]:
-    """Checks all accelerometers.
-
-    Returns:
-        Notices about sizes that no unit explains.
+def check_accelerometers(recording: Recording, robot: Robot) -> None:
+    """Checks that all accelerometers are there.
 
     Raises:
-        RecordingError: an IMU without an accelerometer, or values in another unit than the robot file says.
+        RecordingError: an IMU without an accelerometer.
     """
-    notices = []
     for sensor in robot.accelerometers:
-        values, expected = recording.streams[sensor.name].values, float(np.linalg.norm(robot.gravity_at(sensor)))
+        values = recording.streams[sensor.name].values
         if not np.any(values):
             raise RecordingError(
                 f"{sensor.name} reads zero in all {len(values)} samples: the IMU on {sensor.source.topic} has no "
                 f"accelerometer; remove sensors.{sensor.name} and its lever from the robot file"
             )
-        seen, now = float(np.median(np.linalg.norm(values, axis=1))), sensor.source.unit
-        if expected == 0.0 or 1.0 / SAME_GRAVITY < seen / expected < SAME_GRAVITY:
-            continue
-        text = f"{sensor.name} feels {seen:.3g} m/s^2, expected about {expected:.3g} of gravity"
-        for unit in UNITS:
-            ratio = seen * si_factor(unit) / (si_factor(now) * expected)
-            if si_unit(unit) == si_unit(now) and 1.0 / SAME_GRAVITY < ratio < SAME_GRAVITY:
-                raise RecordingError(
-                    f"{text}; its values look like {unit}: set `unit` of sensors.{sensor.name} in the robot file "
-                    f"(now {now}) to {unit}"
-                )
-        notices.append(Notice(sensor.name, "unit", 0, f"{text}; check its unit and its topic"))
-    return notices
 
 
 def check_gyros(recording: Recording, robot: Robot, motion: JointMotion) -> list[Notice]:

@@ -123,9 +123,9 @@ class Notice:
 
     Attributes:
         stream: name of the stream.
-        kind: one of "unit", "axes", "mirrored", "limit", "saturation", "jump", "clock", "foreign", "glitch", "dropped",
-            "gap", "staircase", "posture", "mimic", "coarse", "clipping", "end_stop", "out_of_order", "duplicate",
-            "info", "jitter".
+        kind: one of "unit", "axes", "mirrored", "gravity", "torque", "limit", "saturation", "jump", "clock",
+            "foreign", "glitch", "dropped", "gap", "staircase", "posture", "mimic", "coarse", "clipping",
+            "end_stop", "out_of_order", "duplicate", "info", "jitter".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

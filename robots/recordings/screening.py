@@ -70,7 +70,7 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     _check_command(recording.command, robot)
     turned = joint_motion(recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero)
     motion = replace(turned, q=joint_angles(robot, turned.q), v=joint_angles(robot, turned.v))
-    notices += check_accelerometers(recording, robot)
+    check_accelerometers(recording, robot)
     for name in robot.sensors:
         _check_changes(recording, recording.streams[name], robot)
     for biased in robot.biased:

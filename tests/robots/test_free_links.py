@@ -114,3 +114,10 @@ def test_a_gear_in_the_command_is_read_and_must_fit_the_joints(tmp_path):
     assert load_robot("kr300").command.scale[1] == pytest.approx(1872 / 7)
     with pytest.raises(RobotError, match="scale"):
         load_robot(written(tmp_path, ("  unit: duty", "  unit: duty\n  scale: [1.0]")))
+
+
+def test_channels_of_a_torque_sensor_may_have_signs_and_units_of_their_own(tmp_path):
+    robot = load_robot(written(tmp_path, ("kind: joint_torque", "kind: joint_torque\n    scale: [-1, 0.001]")))
+    np.testing.assert_array_equal(robot.torque_sensor.source.factor, [-1.0, 0.001])
+    (tmp_path / "again.yaml").write_text(robot_text(robot, tmp_path), encoding="utf-8")
+    assert load_robot(tmp_path / "again.yaml").torque_sensor.source.scale == (-1.0, 0.001)

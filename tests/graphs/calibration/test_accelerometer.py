@@ -8,11 +8,11 @@ import pytest
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.comparison.compare import smooth
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.sensors import Accelerometer
-from jointscope.robots.recordings.screening import screen
 
 pytestmark = pytest.mark.slow
 
@@ -92,4 +92,4 @@ def test_a_wrong_unit_or_an_imu_without_accelerometer_is_said_in_one_line(robot,
     stream = made.recording.streams["acc"]
     streams = {**made.recording.streams, "acc": replace(stream, values=stream.values * factor)}
     with pytest.raises(RecordingError, match=message):
-        screen(replace(made.recording, streams=streams), robot)
+        screen_all(replace(made.recording, streams=streams), robot)

@@ -60,10 +60,24 @@ def test_a_robot_without_effects_gets_start_values_from_init(doggy):
     assert next_commands("try `jointscope add`", doggy, [recording()]) == "try `jointscope add`"
 
 
+@pytest.mark.parametrize("kind", ["gravity", "torque"])
+def test_no_effect_is_blamed_beside_a_sensor_that_is_plainly_wrong(monkeypatch, doggy, kind):
+    wrong = Notice("load", kind, 0, "load: write `scale: [-1, -1, -1]`")
+    monkeypatch.setattr(failures_with_notices, "screen_all", lambda recording, robot: [wrong])
+
+    @names_notices
+    def fails(robot, recordings):
+        raise SolveError("it ran away")
+
+    with pytest.raises(SolveError) as error:
+        fails(add_effect(doggy, "motor_stribeck@joint1"), [recording()])
+    assert str(error.value) == "it ran away; load: write `scale: [-1, -1, -1]`; mend that first"
+
+
 @pytest.mark.parametrize("verb", [diagnose, discover])
 def test_verbs_that_learn_name_what_looked_odd(monkeypatch, verb, doggy):
     monkeypatch.setattr(failures_with_notices, "screen_all", lambda recording, robot: [SWAPPED])
-    monkeypatch.setattr("jointscope.graphs.discovery.starting_model.screen", lambda recording, robot: [SWAPPED])
+    monkeypatch.setattr("jointscope.graphs.discovery.starting_model.screen_all", lambda recording, robot: [SWAPPED])
     place = {"diagnose": "jointscope.graphs.discovery.diagnose", "discover": "jointscope.graphs.discovery.search_kind"}[
         verb.__name__
     ]

@@ -29,7 +29,7 @@ def asked(monkeypatch):
         monkeypatch.setattr(module, "judged_by_loop", lambda robot, recordings: loop)
         monkeypatch.setattr(module, "torque_judge", lambda base: None if quiet is None else "judge")
         monkeypatch.setattr(module, "is_quiet", lambda judge: quiet)
-        monkeypatch.setattr(module, "screen", lambda recording, robot: [])
+        monkeypatch.setattr(module, "screen_all", lambda recording, robot: [])
         monkeypatch.setattr(module, "_as_sharp_as_told", lambda base, solver: base)
         return starting_model("robot", ["recording"]).by_torques, calibrated
 
@@ -43,8 +43,15 @@ def test_quiet_encoders_are_asked_of_torques(asked):
 def test_a_gyro_of_the_other_hand_ends_the_search_before_it_begins(asked, monkeypatch):
     assert asked(True)[0]
     notices = [Notice("imu2", "axes", 0, "turned"), Notice("imu2", "mirrored", 0, "imu2: no rotation does that")]
-    monkeypatch.setattr(module, "screen", lambda recording, robot: notices)
+    monkeypatch.setattr(module, "screen_all", lambda recording, robot: notices)
     with pytest.raises(RecordingError, match=r"a.mcap: imu2: no rotation does that; no effect .* leave imu2 out of it"):
+        starting_model("robot", [SimpleNamespace(path="a.mcap")])
+
+
+def test_an_accelerometer_that_feels_another_gravity_ends_it_too(asked, monkeypatch):
+    notices = [Notice("acc", "gravity", 0, "acc feels gravity the other way")]
+    monkeypatch.setattr(module, "screen_all", lambda recording, robot: notices)
+    with pytest.raises(RecordingError, match=r"a.mcap: acc feels gravity the other way; .* leave acc out of it"):
         starting_model("robot", [SimpleNamespace(path="a.mcap")])
 
 

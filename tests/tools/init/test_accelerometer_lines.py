@@ -11,10 +11,11 @@ from jointscope.tools.init.streams.signals import Signal
 from jointscope.tools.init.text.accelerometer_text import accelerometer_lines
 
 
-def lines(scale: float, gravity=(0.0, 0.0, -9.81)) -> list[str]:
+def lines(scale: float, gravity=(0.0, 0.0, -9.81), fast: float = 0.0) -> list[str]:
     rng = np.random.default_rng(1)
     values = scale * (np.array([0.0, 9.81, 0.0]) + 0.02 * rng.normal(size=(500, 3)))
     times = np.arange(500) * 1e-3
+    values[120:] += scale * fast * np.sin(90.0 * times[120:, None])
     signal = Signal("/imu1/data", "sensor_msgs/msg/Imu", "linear_acceleration", (), times, values, True, "acceleration")
     gyro = SimpleNamespace(name="imu1", mount=SimpleNamespace(left_handed=False), acceleration=signal)
     return accelerometer_lines(gyro, gravity)
@@ -27,6 +28,12 @@ def test_the_unit_is_the_one_in_which_gravity_has_its_size(scale, unit):
     assert "imu1_acceleration.lever_z: {value: 0.0, unit: m, positive: false, prior_sigma: 0.1}" in text
     assert all(line.startswith("  #") for line in text.splitlines())
     assert "GUESS" not in text  # nothing of it counts yet
+
+
+def test_fast_motion_does_not_hide_gravity():
+    """Four fifths of the time its readings are far from gravity's size, as an arm in fast motion has them."""
+    assert any("feels gravity in m/s^2" in line for line in lines(1.0, fast=40.0))
+    assert any("feels gravity in g" in line for line in lines(1.0 / 9.80665, fast=40.0))
 
 
 def test_what_remains_without_the_marks_is_a_section_of_a_robot_file():

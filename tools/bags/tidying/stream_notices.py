@@ -23,8 +23,9 @@ COARSE_STEP = 0.03  # of the rms, from which a step matters
 FEWEST_LEVELS, MOST_LEVELS = 8, 400  # fewer are a test signal, more are no steps
 EVEN = 1e-3  # [steps]
 IMPORTANCE = (
-    "unit", "axes", "mirrored", "saturation", "jump", "clock", "foreign", "glitch", "end_stop", "gap", "dropped",
-    "mimic", "posture", "staircase", "coarse", "clipping", "out_of_order", "duplicate", "info", "jitter",
+    "unit", "axes", "mirrored", "gravity", "torque", "saturation", "jump", "clock", "foreign", "glitch", "end_stop",
+    "gap", "dropped", "mimic", "posture", "staircase", "coarse", "clipping", "out_of_order", "duplicate", "info",
+    "jitter",
 )  # fmt: skip
 CLIPPED_RUN = 3  # equal extreme samples in a row
 LIMIT_SHARE = 0.2  # of the largest value of all channels: below it an extreme is no limit

@@ -14,10 +14,12 @@ from jointscope.robots.parts.sensors import AXES
 from jointscope.robots.units import si_factor
 from jointscope.tools.init.robot_guess import GuessedGyro
 from jointscope.tools.init.streams.sensor_noise import guess_noise
+from jointscope.tools.init.streams.signals import Signal
 from jointscope.tools.init.text.source_text import sigma_line, source_lines
 
 GRAVITY = 9.81  # [m/s^2]
-SAME = 1.5  # a median size within this factor of gravity's is gravity with motion upon it
+SAME = 1.5  # a size within this factor of gravity's is gravity with what is left of motion upon it
+WINDOW, QUIETEST = 0.1, 0.05  # [s], [1] of the windows: those in which the readings change least are nearest to rest
 UNITS = ("m/s^2", "g")
 
 
@@ -26,8 +28,8 @@ def accelerometer_lines(gyro: GuessedGyro, gravity: Sequence[float]) -> list[str
     signal = gyro.acceleration
     if signal is None:
         return []
-    size = float(np.median(np.linalg.norm(signal.values, axis=1)))
-    if size == 0.0:
+    size = _size_at_rest(signal)
+    if not np.any(signal.values):
         return [f"  # no accelerometer on {signal.topic}: linear_acceleration is zero"]
     unit = next((u for u in UNITS if 1.0 / SAME < size * si_factor(u) / GRAVITY < SAME), None)
     if unit is None:
@@ -51,3 +53,15 @@ def accelerometer_lines(gyro: GuessedGyro, gravity: Sequence[float]) -> list[str
         "  # and write where it sits on its link under parameters:",
         *(f"  # {text[2:]}" for text in places),
     ]
+
+
+def _size_at_rest(signal: Signal) -> float:
+    """Size of the mean reading in the quietest windows, in the unit of the signal: fast motion adds to its median."""
+    window = np.floor((signal.times - signal.times[0]) / WINDOW).astype(int)
+    edges = np.flatnonzero(np.diff(window, prepend=-1))
+    counts = np.diff(np.append(edges, len(window)))[:, None]
+    means = np.add.reduceat(signal.values, edges) / counts
+    spread = np.add.reduceat(signal.values**2, edges) / counts - means**2
+    full = np.flatnonzero(counts[:, 0] >= np.median(counts) / 2.0)
+    quiet = full[np.argsort(spread[full].sum(axis=1))[: max(int(QUIETEST * len(full)), 1)]]
+    return float(np.median(np.linalg.norm(means[quiet], axis=1)))
