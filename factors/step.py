@@ -95,6 +95,17 @@ class Steps:
         u, slopes = self.path.acting(values)
         return u[self.index], {name: slope[self.index] for name, slope in slopes.items()}
 
+    def rising(self, values: dict[str, float]) -> tuple[Array | None, dict[str, Array]]:
+        """By how much what acts rises over each step, shape (m, n), with derivatives; None where commands are constant.
+
+        Args:
+            values: parameters of the robot by full name.
+        """
+        if self.path is None or not self.path.runs_on:
+            return None, {}
+        u, slopes = self.path.acting(values)
+        return self.path.rises(u)[self.index], {name: self.path.rises(own)[self.index] for name, own in slopes.items()}
+
     @property
     def integrated(self) -> bool:
         """Whether the position noise follows from the velocity noise."""

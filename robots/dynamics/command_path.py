@@ -22,10 +22,14 @@ class CommandPath:
         u: logged commands, shape (m, n), SI unit of the command.
         effects: effects of the robot; others than those of commands are ignored.
         joints: names of the joints.
+        runs_on: whether the signal was measured, and changes within the steps, too; a command is constant over each.
     """
 
-    def __init__(self, edges: Array, u: Array, effects: Sequence[EffectAt], joints: tuple[str, ...]):
+    def __init__(
+        self, edges: Array, u: Array, effects: Sequence[EffectAt], joints: tuple[str, ...], runs_on: bool = False
+    ):
         self._edges, self._u, self._joints = edges, u, joints
+        self.runs_on = runs_on and len(u) > 1
         self._effects = [here for here in effects if isinstance(here.effect, CommandEffect)]
         self._cache: tuple[tuple[float, ...], tuple[Array, dict[str, Array]]] | None = None
 
@@ -49,6 +53,11 @@ class CommandPath:
         if known is None or known[0] != key:
             known = self._cache = (key, self._evaluate([dict(part) for part in own]))
         return known[1]
+
+    def rises(self, of_steps: Array) -> Array:
+        """By how much a signal rises from the beginning to the end of each step, from its means there, shape (m, n)."""
+        middle = 0.5 * (self._edges[:-1] + self._edges[1:])
+        return np.asarray(np.gradient(of_steps, middle, axis=0) * np.diff(self._edges)[:, None])
 
     def _evaluate(self, own: list[dict[str, float]]) -> tuple[Array, dict[str, Array]]:
         u, slopes = self._u.copy(), dict[str, Array]()
