@@ -119,9 +119,7 @@ class DynamicsFactor(ABC):
         u, rise = self.command(parameters), self.steps.rising(self.model.named(parameters))[0]
         return (u, u) if rise is None else (u - 0.5 * rise, u + 0.5 * rise)
 
-    def _add_commands(
-        self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations
-    ) -> None:
+    def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
         """Derivative of the defects by what effects do to the commands; positions feel h/2 less of what is constant."""
         values = self.model.named(calibration.values)
         slopes, rises = self.steps.acting(values)[1], self.steps.rising(values)[1]
