@@ -120,16 +120,11 @@ class DynamicsFactor(ABC):
         return (u, u) if rise is None else (u - 0.5 * rise, u + 0.5 * rise)
 
     def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
-        """Derivative of the defects by what effects do to the commands; positions feel h/2 less of what is constant."""
-        values = self.model.named(calibration.values)
-        slopes, rises = self.steps.acting(values)[1], self.steps.rising(values)[1]
+        """Derivative of the rate defects by what effects do to the commands; positions feel it h/2 less."""
+        slopes = self.steps.acting(self.model.named(calibration.values))[1]
         if not slopes:
             return
         response = self.steps.h[:, None, None] * self.model.command_response(middle, calibration.values)
         for name, slope in slopes.items():
             if name in self.model.names:
-                by_rate, by_position = (part[:, :, self.model.names.index(name)] for part in by_parameter)
-                by_rate -= (response @ slope[:, :, None])[:, :, 0]
-                if name in rises:
-                    risen = (response[:, : by_position.shape[1]] @ rises[name][:, :, None])[:, :, 0]
-                    by_position += self.steps.h[:, None] / 12.0 * risen
+                by_parameter[0][:, :, self.model.names.index(name)] -= (response @ slope[:, :, None])[:, :, 0]

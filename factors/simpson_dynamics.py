@@ -5,7 +5,8 @@
     q1 - q0 = h/2 (v0 + v1) + h^2/12 (a0 - a1), q_mid = (q0 + q1)/2 + h/8 (v0 - v1)
 
 Variables: X(k), X(k+1), dynamics. Local error of order h^5. The command is constant over a step, so a0 and a1 are
-taken with the command of this step, or linear, if it was measured; along a chain the rigid bodies are evaluated once per tick and once between.
+taken with the command of this step; a drive signal that was measured is linear over it. Along a chain the rigid bodies
+are evaluated once per tick and once between.
 """
 
 from __future__ import annotations
@@ -93,3 +94,18 @@ class SimpsonDynamics(DynamicsFactor):
             calibration,
             mid,
         )
+
+    def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
+        """With what effects do to the rise of a measured signal, which moves the middle and the positions."""
+        super()._add_commands(by_parameter, calibration, middle)
+        rises = self.steps.rising(self.model.named(calibration.values))[1]
+        if not rises:
+            return
+        weight = self.steps.h[:, None, None] ** 2 / 12.0
+        response = weight * self.model.command_response(middle, calibration.values)
+        by_rates = middle.by_state[:, :, self.model.layout.rates]
+        for name, slope in rises.items():
+            if name in self.model.names:
+                place, risen = self.model.names.index(name), response @ slope[:, :, None]
+                by_parameter[0][:, :, place] += (by_rates @ risen)[:, :, 0]
+                by_parameter[1][:, :, place] += risen[:, : by_parameter[1].shape[1], 0]

@@ -23,7 +23,7 @@ SURELY_BELOW = 3.5  # [sigma] below null from which a value of one sign has the 
 AT_BOUND = "at its bound: compatible with zero"
 NEAR_BOUND = "compatible with zero, its bound"
 WRONG_SIDE = "below zero, where it has no meaning: it stands for something else"
-STAMPED_LATE = "the drive signal is filtered or stamped late, by {} ms: it was measured, and the torque acts before"
+STAMPED_LATE = "the measured drive signal is filtered or stamped late"
 
 
 def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
@@ -75,12 +75,12 @@ def _measured_times(robot: Robot) -> set[str]:
 
 def _stamped_late(p: Parameter, value: float) -> str:
     """What a delay below its null value says of a measured drive signal [s]."""
-    return STAMPED_LATE.format(f"{1e3 * ((p.null or 0.0) - value):.3g}")
+    return f"{STAMPED_LATE}, by {1e3 * ((p.null or 0.0) - value):.3g} ms"
 
 
 def says_what_it_means(note: str) -> bool:
     """Whether a note explains a value that is in no doubt."""
-    return note.endswith(STAMPED_LATE.partition("{}")[2])
+    return note.startswith(STAMPED_LATE)
 
 
 def _note(p: Parameter, value: float, sigma: float, of_coordinate: float) -> str:

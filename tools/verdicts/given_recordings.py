@@ -39,7 +39,7 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
 
 
 def odd_trackers(result: CalibrationResult) -> str:
-    """Sentences about trackers that seem to be late or to have moved, and which the calibrated model does not explain."""
+    """Sentences on trackers that seem to be late or to have moved, and that the calibrated model does not explain."""
     off = {channel.rsplit(".", 1)[0] for channel, fit in result.channels.items() if fit.chi2 > CHI2_HIGH}
     return " ".join(_sentence(text) for name, text in result.odd_trackers.items() if name in off)
 
