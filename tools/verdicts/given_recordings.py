@@ -41,7 +41,7 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
 def odd_trackers(result: CalibrationResult) -> str:
     """Sentences on trackers that seem to be late or to have moved, and that the calibrated model does not explain."""
     off = {channel.rsplit(".", 1)[0] for channel, fit in result.channels.items() if fit.chi2 > CHI2_HIGH}
-    return " ".join(_sentence(text) for name, text in result.odd_trackers.items() if name in off)
+    return " ".join(f"{text}." for name, text in result.odd_trackers.items() if name in off)
 
 
 def _readings(result: CalibrationResult) -> str:
