@@ -29,7 +29,7 @@ MEASURED = (
     "`held: true` in the section command makes it a command that acts until the next one"
 )
 TOLD_HELD = "the motion says that each value on {} acts until the next one, as a command does: `held: true`"
-TOLD_MEASURED = "the motion says that the drive signal on {} was measured and runs on between its samples: `held: false`"
+TOLD_MEASURED = "the motion says that the drive signal on {} was measured, and runs on between samples: `held: false`"
 
 
 def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Robot:
