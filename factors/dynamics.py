@@ -98,7 +98,7 @@ class DynamicsFactor(ABC):
             calibration: where this is.
             middle: accelerations within the step; they tell how a change of the command acts.
         """
-        self._add_commands(by_parameter[0], calibration, middle)
+        self._add_commands(by_parameter, calibration, middle)
         dynamics = self.steps.combine(*by_parameter) * calibration.value_by_coordinate
         return Linearization(
             self.steps.combine(*defects),
@@ -110,7 +110,16 @@ class DynamicsFactor(ABC):
         """Commands that act in each step, shape (m, n), for values of the free parameters."""
         return self.steps.acting(self.model.named(parameters))[0]
 
-    def _add_commands(self, by_parameter: Array, calibration: Calibration, middle: Accelerations) -> None:
+    def commands_at_ends(self, parameters: Array) -> tuple[Array, Array]:
+        """Commands that act where each step begins and where it ends, shape (m, n) each.
+
+        A drive signal that was measured runs on within a step, and moves what it drives by h^2 / 12 of its rise
+        further than a constant of the same mean.
+        """
+        u, rise = self.command(parameters), self.steps.rising(self.model.named(parameters))[0]
+        return (u, u) if rise is None else (u - 0.5 * rise, u + 0.5 * rise)
+
+    def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
         """Derivative of the rate defects by what effects do to the commands; positions feel it h/2 less."""
         slopes = self.steps.acting(self.model.named(calibration.values))[1]
         if not slopes:
@@ -118,4 +127,4 @@ class DynamicsFactor(ABC):
         response = self.steps.h[:, None, None] * self.model.command_response(middle, calibration.values)
         for name, slope in slopes.items():
             if name in self.model.names:
-                by_parameter[:, :, self.model.names.index(name)] -= (response @ slope[:, :, None])[:, :, 0]
+                by_parameter[0][:, :, self.model.names.index(name)] -= (response @ slope[:, :, None])[:, :, 0]

@@ -5,7 +5,8 @@
     q1 - q0 = h/2 (v0 + v1) + h^2/12 (a0 - a1), q_mid = (q0 + q1)/2 + h/8 (v0 - v1)
 
 Variables: X(k), X(k+1), dynamics. Local error of order h^5. The command is constant over a step, so a0 and a1 are
-taken with the command of this step; along a chain the rigid bodies are evaluated once per tick and once between.
+taken with the command of this step; a drive signal that was measured is linear over it. Along a chain the rigid bodies
+are evaluated once per tick and once between.
 """
 
 from __future__ import annotations
@@ -26,18 +27,18 @@ class SimpsonDynamics(DynamicsFactor):
 
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
         """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
-        u, steps = self.command(parameters), self.steps
-        a0 = self.model.accelerations(x0, u, parameters, steps.begins)
-        a1 = self.model.accelerations(x1, u, parameters, steps.ends)
+        u, steps, (first, last) = self.command(parameters), self.steps, self.commands_at_ends(parameters)
+        a0 = self.model.accelerations(x0, first, parameters, steps.begins)
+        a1 = self.model.accelerations(x1, last, parameters, steps.ends)
         a_mid = self.model.accelerations(self.middle(x0, x1, a0, a1), u, parameters, steps.throughout)
         return self._defects(x0, x1, a0, a_mid, a1)
 
     def linearize_pairs(self, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
         """Defects and derivatives for m pairs of states."""
         values = calibration.values
-        u = self.command(values)
-        a0 = self.model.with_derivatives(x0, u, values, None, self.steps.begins)
-        a1 = self.model.with_derivatives(x1, u, values, None, self.steps.ends)
+        first, last = self.commands_at_ends(values)
+        a0 = self.model.with_derivatives(x0, first, values, None, self.steps.begins)
+        a1 = self.model.with_derivatives(x1, last, values, None, self.steps.ends)
         return self._linearize(x0, x1, a0, a1, calibration)
 
     def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
@@ -47,7 +48,7 @@ class SimpsonDynamics(DynamicsFactor):
         much), the residual not at all.
         """
         values = calibration.values
-        a0, a1, rigid = self.model.at_ticks(x, self.command(values), values, self.steps.at_ticks)
+        a0, a1, rigid = self.model.at_ticks(x, self.commands_at_ends(values), values, self.steps.at_ticks)
         return self._linearize(x[:-1], x[1:], a0, a1, calibration, rigid)
 
     def middle(self, x0: Array, x1: Array, a0: Array, a1: Array) -> Array:
@@ -93,3 +94,18 @@ class SimpsonDynamics(DynamicsFactor):
             calibration,
             mid,
         )
+
+    def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
+        """With what effects do to the rise of a measured signal, which moves the middle and the positions."""
+        super()._add_commands(by_parameter, calibration, middle)
+        rises = self.steps.rising(self.model.named(calibration.values))[1]
+        if not rises:
+            return
+        weight = self.steps.h[:, None, None] ** 2 / 12.0
+        response = weight * self.model.command_response(middle, calibration.values)
+        by_rates = middle.by_state[:, :, self.model.layout.rates]
+        for name, slope in rises.items():
+            if name in self.model.names:
+                place, risen = self.model.names.index(name), response @ slope[:, :, None]
+                by_parameter[0][:, :, place] += (by_rates @ risen)[:, :, 0]
+                by_parameter[1][:, :, place] += risen[:, : by_parameter[1].shape[1], 0]

@@ -40,6 +40,7 @@ class Steps:
             law tells, such as a hand, or friction that holds; 0 where the equation binds, None where all do.
         sliding: how sharply the dry friction of each joint turns over at the beginning and the end of each step, as a
             part of what its law says, shape (m, 2, n); None where all is as it says.
+        rise: by how much u rises over each step, shape (m, n), where no path says it; None where it is constant.
     """
 
     h: Array
@@ -51,6 +52,7 @@ class Steps:
     index: NDArray[np.intp] | None = None
     free: Array | None = None
     sliding: Array | None = None
+    rise: Array | None = None
 
     def __len__(self) -> int:
         return len(self.h)
@@ -62,7 +64,16 @@ class Steps:
         free = None if self.free is None else self.free[samples]
         sliding = None if self.sliding is None else self.sliding[samples]
         part = replace(self, h=self.h[samples], u=self.u[samples], weight=weight, index=index)
-        return replace(part, free=free, sliding=sliding)
+        return replace(part, free=free, sliding=sliding, rise=None if self.rise is None else self.rise[samples])
+
+    def halves(self, values: dict[str, float]) -> tuple[Steps, Steps]:
+        """The first and the second half of each step, with what acts there at values of the robot's parameters."""
+        (u, _), (rise, _), h = self.acting(values), self.rising(values), 0.5 * self.h
+        plain = replace(self, h=h, u=u, path=None, index=None)
+        if rise is None:
+            return plain, plain
+        first, second = (replace(plain, u=u + side * rise, rise=0.5 * rise) for side in (-0.25, 0.25))
+        return first, second
 
     @property
     def begins(self) -> Array | None:
@@ -94,6 +105,17 @@ class Steps:
             return self.u, {}
         u, slopes = self.path.acting(values)
         return u[self.index], {name: slope[self.index] for name, slope in slopes.items()}
+
+    def rising(self, values: dict[str, float]) -> tuple[Array | None, dict[str, Array]]:
+        """By how much what acts rises over each step, shape (m, n), with derivatives; None where commands are constant.
+
+        Args:
+            values: parameters of the robot by full name.
+        """
+        if self.path is None or not self.path.runs_on:
+            return self.rise, {}
+        u, slopes = self.path.acting(values)
+        return self.path.rises(u)[self.index], {name: self.path.rises(own)[self.index] for name, own in slopes.items()}
 
     @property
     def integrated(self) -> bool:

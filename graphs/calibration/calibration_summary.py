@@ -38,6 +38,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
+from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
 
 Array = NDArray[np.float64]
 
@@ -154,7 +155,9 @@ def summarize(
     )
     said = {notice.kind: notice.text for notice in reversed(notices)}
     exchanged, saturated = said.get(EXCHANGED, ""), said.get(SATURATION, "")
-    return replace(result, exchanged=exchanged, saturated=saturated, findings=findings(result, notices))
+    odd = {n.stream: n.text for n in reversed(notices) if n.kind in (LATE_TRACKER, MOVED_TRACKER)}
+    result = replace(result, exchanged=exchanged, saturated=saturated, odd_trackers=odd)
+    return replace(result, findings=findings(result, notices))
 
 
 def _bag_fit(solved: Solved, i: int, collector: BagResiduals, factor: Array) -> BagFit:

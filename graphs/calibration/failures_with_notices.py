@@ -15,8 +15,9 @@ from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
 
-SUSPICIOUS = ("gap", *PLAIN_MISTAKES)  # kinds of notices that may explain a failure
+SUSPICIOUS = ("gap", *PLAIN_MISTAKES, LATE_TRACKER, MOVED_TRACKER)  # kinds of notices that may explain a failure
 CULPRITS = (FELT_GRAVITY, MISTAKEN_TORQUE)  # they say what to write, and spoil everything else
 MOST = 3
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.model.derived_values import derived_value
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
@@ -22,6 +23,7 @@ SURELY_BELOW = 3.5  # [sigma] below null from which a value of one sign has the 
 AT_BOUND = "at its bound: compatible with zero"
 NEAR_BOUND = "compatible with zero, its bound"
 WRONG_SIDE = "below zero, where it has no meaning: it stands for something else"
+STAMPED_LATE = "the measured drive signal is filtered or stamped late"
 
 
 def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) -> list[ParameterEstimate]:
@@ -42,7 +44,7 @@ def dynamic_parameters(robot: Robot, calibration: Calibration, sigmas: Array) ->
         if note == AT_BOUND:  # near zero a logarithm's slope is as small as the value, and so would be its sigma
             sigma = float(sigmas[i]) * p.prior
         if not note and name in one_sided and value < one_sided[name] - SURELY_BELOW * sigma:
-            note = WRONG_SIDE
+            note = _stamped_late(p, value) if name in _measured_times(robot) else WRONG_SIDE
         found.append(ParameterEstimate(name, value, sigma, p.unit, p.value, p.prior, p.prior_sigma, p.published, note))
     return found
 
@@ -55,6 +57,30 @@ def _one_sided(robot: Robot) -> dict[str, float]:
         for p in here.effect.parameters_at(robot, here.owner)
         if p.sign == "+" and not p.is_shape
     }
+
+
+def _measured_times(robot: Robot) -> set[str]:
+    """Full names of the times by which effects make a drive signal late that was measured; none of commands.
+
+    What was measured may have been filtered, or sent late: the torque then acts before the stamp.
+    """
+    return {
+        here.parameter(p.name)
+        for here in robot.effects
+        if isinstance(here.effect, CommandEffect) and not robot.command_held
+        for p in here.effect.parameters
+        if p.unit == "s"
+    }
+
+
+def _stamped_late(p: Parameter, value: float) -> str:
+    """What a delay below its null value says of a measured drive signal [s]."""
+    return f"{STAMPED_LATE}, by {1e3 * ((p.null or 0.0) - value):.3g} ms"
+
+
+def says_what_it_means(note: str) -> bool:
+    """Whether a note explains a value that is in no doubt."""
+    return note.startswith(STAMPED_LATE)
 
 
 def _note(p: Parameter, value: float, sigma: float, of_coordinate: float) -> str:

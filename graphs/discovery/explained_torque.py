@@ -48,7 +48,7 @@ def _accelerations(robot: Robot, problem: BagProblem, x: Array) -> Array:
     layout, timeline = robot.layout, problem.timeline
     values = {name: parameter.value for name, parameter in robot.parameters.items()}
     model = ElasticJoints(robot)
-    u = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints).acting(values)[0]
+    u = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held).acting(values)[0]
     a = model.accelerations(x, _at_ticks(u), np.array([values[name] for name in model.names]))
     motor = np.zeros((len(x), len(robot.joints)))
     for i, joint in enumerate(robot.joints):

@@ -58,14 +58,14 @@ def inertia_shifts(problem: BagProblem, x: Array, calibration: Calibration) -> d
 def _missed(whole: SimpsonDynamics, x: Array, calibration: Calibration) -> Array:
     """What the steps miss in all their rows, whitened, shape (m, r); nothing where an equation does not bind."""
     steps, values = whole.steps, calibration.values
-    x0, x1, u = x[:-1], x[1:], whole.command(values)
-    a0 = whole.model.accelerations(x0, u, values, steps.begins)
-    a1 = whole.model.accelerations(x1, u, values, steps.ends)
+    x0, x1, (u0, u1) = x[:-1], x[1:], whole.commands_at_ends(values)
+    a0 = whole.model.accelerations(x0, u0, values, steps.begins)
+    a1 = whole.model.accelerations(x1, u1, values, steps.ends)
     middle = whole.middle(x0, x1, a0, a1)
-    half = replace(whole, steps=replace(steps, h=0.5 * steps.h))
+    first, second = (replace(whole, steps=half) for half in steps.halves(whole.model.named(values)))
     d_v, d_q = whole.defects(x0, x1, values)
-    first_v, first_q = half.defects(x0, middle, values)
-    second_v, second_q = half.defects(middle, x1, values)
+    first_v, first_q = first.defects(x0, middle, values)
+    second_v, second_q = second.defects(middle, x1, values)
     missed_v = first_v + second_v - d_v
     missed_q = first_q + second_q + 0.5 * steps.h[:, None] * first_v[:, : d_q.shape[1]] - d_q
     rows = np.asarray(steps.combine(missed_v, missed_q) / steps.sigmas)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PPoly
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 
 LONGEST_STEP = 2.5e-3  # [s] friction changes sign within a few milliseconds
 SHORTEST_STEP = 2e-5  # [s] below this two commands are one; the later one counts
+ALIKE = 1.5  # times its neighbours: a longer interval is a gap, over which no slope beside it tells anything
 MOST_TICKS, MOST_PER_SAMPLE = 20_000, 100  # states that no sample tells anything of take memory and time
 CUT = "with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`"
 
@@ -46,7 +48,7 @@ class Timeline:
 
         Args:
             recording: with its drive signal.
-            held: whether each value of it acts until the next one; otherwise it is linear between samples.
+            held: whether each value of it acts until the next one; otherwise it runs smoothly through its samples.
             between: times at which steps are divided further [s].
 
         Raises:
@@ -92,17 +94,31 @@ class Timeline:
 
 
 def _means(command: Stream, ticks: Array) -> Array:
-    """Mean of a signal that is linear between the samples of each channel over each step, shape (m, n).
+    """Mean over each step of a signal that runs smoothly through the samples of each channel, shape (m, n).
 
-    The last value goes on.
+    Straight lines make (2 pi f h)^2 / 12 too little of what has the frequency f: 0.2 % of 6 Hz at 250 Hz, which torque
+    constants then have too much. A cubic through four samples (Catmull, Rom 1974) has an error of the fourth order,
+    takes 59 % of a white noise instead of 50 % into a step, and goes astray by 4 % of a jump on each side of it. It is
+    a straight line across gaps and at both ends; the last value goes on.
     """
     found = []
     for j in range(command.values.shape[1]):
         own = command.channel(j)
         times = np.append(own.times, max(float(ticks[-1]), float(own.times[-1])) + 1.0)
         values = np.append(own.values[:, 0], own.values[-1:, 0])
-        reached = np.append(0.0, np.cumsum(0.5 * np.diff(times) * (values[:-1] + values[1:])))
-        k = np.clip(np.searchsorted(times, ticks, side="right") - 1, 0, len(times) - 2)
-        passed, slope = ticks - times[k], (np.diff(values) / np.diff(times))[k]
-        found.append(np.diff(reached[k] + passed * values[k] + 0.5 * slope * passed**2) / np.diff(ticks))
+        found.append(np.diff(_through(times, values).antiderivative()(ticks)) / np.diff(ticks))
     return np.column_stack(found)
+
+
+def _through(times: Array, values: Array) -> PPoly:
+    """A curve through samples: cubics between equally distant ones, else straight lines."""
+    h = np.diff(times)
+    straight = np.diff(values) / h
+    bend = np.zeros((2, len(h)))  # slopes at both ends of each interval, from its own straight line
+    if len(h) > 2:
+        slope = np.gradient(values, times)[1:-1]
+        longest, shortest = (extreme(np.stack([h[:-2], h[1:-1], h[2:]]), axis=0) for extreme in (np.max, np.min))
+        smooth = longest < ALIKE * shortest
+        bend[:, 1:-1] = np.where(smooth, np.stack([slope[:-1], slope[1:]]) - straight[1:-1], 0.0)
+    first, last = bend
+    return PPoly(np.array([(first + last) / h**2, -(2.0 * first + last) / h, straight + first, values[:-1]]), times)

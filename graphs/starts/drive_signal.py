@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 CLEARLY = 1.5  # times the missing torque, mean over the joints, that the wrong way leaves
 EXPLAINED = 0.1  # of the driving torque that may be missing where that is believed
 MEASURED = (
-    "the drive signal comes with the positions on {}, so it is taken for measured: linear between its samples; "
+    "the drive signal comes with the positions on {}, so it is taken for measured: it runs on between its samples; "
     "`held: true` in the section command makes it a command that acts until the next one"
 )
 TOLD_HELD = "the motion says that each value on {} acts until the next one, as a command does: `held: true`"
-TOLD_MEASURED = "the motion says that the drive signal on {} was measured, linear between its samples: `held: false`"
+TOLD_MEASURED = "the motion says that the drive signal on {} was measured, and runs on between samples: `held: false`"
 
 
 def with_known_drive_signal(robot: Robot, recordings: Sequence[Recording]) -> Robot:

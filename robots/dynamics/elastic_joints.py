@@ -102,13 +102,13 @@ class ElasticJoints:
         return self.with_command(self.without_command(x, parameters, rigid, sliding), u, parameters)
 
     def at_ticks(
-        self, x: Array, u: Array, parameters: Array, sliding: Array | None = None
+        self, x: Array, u: tuple[Array, Array], parameters: Array, sliding: Array | None = None
     ) -> tuple[Accelerations, Accelerations, RigidDerivatives | None]:
-        """Accelerations at the beginning and the end of m steps, with the command of each step.
+        """Accelerations at the beginning and the end of m steps, with the command of each step there.
 
         Args:
             x: states at the m + 1 ticks, shape (m + 1, d).
-            u: commands of the m steps, shape (m, n).
+            u: commands where the m steps begin and where they end, shape (m, n) each.
             parameters: values of the free parameters, shape (p,).
             sliding: as in `accelerations`, at the ticks.
 
@@ -117,12 +117,12 @@ class ElasticJoints:
         """
         if self._commands_move_links:
             begins, ends = (None, None) if sliding is None else (sliding[:-1], sliding[1:])
-            first = self._differentiate(x[:-1], parameters, None, u, begins)
-            last = self._differentiate(x[1:], parameters, None, u, ends)
+            first = self._differentiate(x[:-1], parameters, None, u[0], begins)
+            last = self._differentiate(x[1:], parameters, None, u[1], ends)
             return first, last, None
         free = self.without_command(x, parameters, sliding=sliding)
         parts = free.part(slice(None, -1)), free.part(slice(1, None))
-        first, last = (self.with_command(part, u, parameters) for part in parts)
+        first, last = (self.with_command(part, own, parameters) for part, own in zip(parts, u, strict=True))
         return first, last, free.rigid.between()
 
     def without_command(

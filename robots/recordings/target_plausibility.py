@@ -37,6 +37,10 @@ IN_PRIOR = 3.0  # [sigma] how far a calibration goes without being told
 LATEST, STEP = 0.2, 0.004  # [s] delays that are looked for
 FEW_ROUNDS = 30  # of a fit where only its delay is asked for
 MIRRORED = 0.5  # times what is left of right-handed positions may be left of mirrored ones
+LATE_TRACKER = "timing"  # kind of the notice about a tracker whose stamps are late or early
+MOVED_TRACKER = "moved"  # of that about one that was moved while it measured
+JUMP, USUAL_SHARE = 5.0, 0.98  # times what this share of the samples stay below: springs do not bend in a sample
+BESIDE = 5  # samples on each side of a jump that show whether it lasts
 DELAY = "encoder_delay"  # the effect of a late tracker
 BELOW_ZERO = ", below zero, as where the clocks of two computers differ"
 LATE = 0.7  # times what is left without a delay may be left with it
@@ -60,7 +64,7 @@ def check_targets(recording: Recording, robot: Robot, motion: JointMotion) -> li
             delay, told = _late(robot, target, motion, stream)
             if told:
                 q, seen = seen_beside(motion, stream, delay)
-            notices += told + _check_target(robot, target, q, seen)
+            notices += told + _check_target(robot, target, q, seen) + _moved(robot, target, motion, stream, delay)
     return notices
 
 
@@ -126,7 +130,35 @@ def _late(robot: Robot, target: PositionTarget, motion: JointMotion, stream: Str
         f"{1e3 * now:.3g} mm are left between tracker and motors (rms); put {DELAY}@{target.name} into the robot file "
         f"(`jointscope add`), and the calibration finds the delay{below}"
     )
-    return delay, [Notice(target.name, "timing", len(stream), text)]
+    return delay, [Notice(target.name, LATE_TRACKER, len(stream), text)]
+
+
+def _moved(robot: Robot, target: PositionTarget, motion: JointMotion, stream: Stream, delay: float) -> list[Notice]:
+    """What is said of a tracker that was moved: its positions jump against those of the link, and stay there."""
+    taken = stream.times - delay
+    inside = (taken >= motion.times[0]) & (taken <= motion.times[-1])
+    times, seen = stream.times[inside], stream.values[inside]
+    if len(times) < FEWEST_POINTS:
+        return []
+    q = np.column_stack([np.interp(taken[inside], motion.times, column) for column in motion.q.T])
+    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    places = body_point(robot.tree, target.body, target.seen(values)[0], q).value
+    T = base_from_tracker(places, seen)[0]
+    away, step = seen @ T[:3, :3].T + T[:3, 3] - places, np.diff(times)
+    moves = np.diff(away, axis=0)
+    jumps = np.linalg.norm(moves[1:-1] - 0.5 * (moves[:-2] + moves[2:]), axis=1)
+    jumps[step[1:-1] > 2.0 * np.median(step)] = 0.0  # after a gap it may be anywhere
+    k = int(np.argmax(jumps)) + 1
+    usual = max(JUMP * float(np.quantile(jumps, USUAL_SHARE)), NOISE * target.sigma)
+    before, after = away[max(k + 1 - BESIDE, 0) : k + 1], away[k + 1 : k + 1 + BESIDE]
+    lasting = float(np.linalg.norm(np.median(after, axis=0) - np.median(before, axis=0)))
+    if min(jumps[k - 1], lasting) < usual:
+        return []
+    text = (
+        f"{target.name} jumps by {1e3 * np.linalg.norm(moves[k]):.2g} mm against {target.body} at {times[k + 1]:.2f} s "
+        "and stays there: its tracker was moved, or the target slipped; use the part before or after it (--leave-out)"
+    )
+    return [Notice(target.name, MOVED_TRACKER, len(stream), text)]
 
 
 def _left_at(tree: RigidTree, target: PositionTarget, motion: JointMotion, stream: Stream, delay: float) -> float:

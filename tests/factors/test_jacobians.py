@@ -115,6 +115,9 @@ def _factors_with_effects():
         last = robot.effects[-1].effect if robot.effects else None
         if not isinstance(last, ReadingEffect | SmoothedReading | TimeShift):
             yield f"dynamics with {label}", SimpsonDynamics(ElasticJoints(robot), steps, robot.joints), robot
+            if path.changes or not label:
+                running = replace(steps, path=CommandPath(ticks, u, robot.effects, robot.joints, runs_on=True))
+                yield f"measured signal {label}", SimpsonDynamics(ElasticJoints(robot), running, robot.joints), robot
             gentle = replace(steps, sliding=rng.choice([0.1, 1.0], (M, 2, robot.n)))
             yield f"gentle friction, {label}", SimpsonDynamics(ElasticJoints(robot), gentle, robot.joints), robot
         for name, sensor in robot.sensors.items():

@@ -53,8 +53,8 @@ def pendulum(folder, sigma, topic="/cmd", held="", keep=""):
     return load_robot(folder / "pendulum.yaml")
 
 
-def swing(seconds, rate, smooth_drive=False):
-    """Stamps, currents and angles at a rate; the current is held between stamps, or a smooth function of time."""
+def swing(seconds, rate, smooth_drive=False, fast=0.0):
+    """Stamps, currents and angles at a rate; the current is held between stamps, or smooth; `fast` at 6 Hz [A]."""
     mu, inertia, k, b = TRUTH.values()
     total = inertia + 0.02 + 2.0 * 0.3**2
 
@@ -62,7 +62,12 @@ def swing(seconds, rate, smooth_drive=False):
         return (k * i - b * v - mu * math.tanh(200.0 * v) - 2.0 * 9.81 * 0.3 * math.sin(q)) / total
 
     def current(t):
-        return 2.2 * math.sin(4.4 * t) + 1.1 * math.sin(9.1 * t + 1.0) + 0.7 * math.sin(1.3 * t)
+        return (
+            2.2 * math.sin(4.4 * t)
+            + 1.1 * math.sin(9.1 * t + 1.0)
+            + 0.7 * math.sin(1.3 * t)
+            + fast * math.sin(37.7 * t)
+        )
 
     count, each = int(seconds * rate), round(1.0 / (rate * FINE))
     stamps = np.arange(count) / rate

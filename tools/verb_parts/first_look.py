@@ -12,6 +12,7 @@ from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
 from jointscope.tools.terminal.progress import ERASE_LINE
 
 LIMIT = "limit"
@@ -41,7 +42,7 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     kinds = set()
     for recording in recordings:
         for notice in _screened(recording, robot):
-            if notice.kind in (*PLAIN_MISTAKES, LIMIT):
+            if notice.kind in (*PLAIN_MISTAKES, LIMIT, LATE_TRACKER, MOVED_TRACKER):
                 seen.setdefault(notice.text, recording.path)
                 kinds.add(notice.kind)
     if not seen:

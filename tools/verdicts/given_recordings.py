@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What recordings are not of one robot that the model can be: drives that saturate, two loads, too few samples."""
+"""What recordings show that the model cannot be: saturated drives, two loads, odd trackers, too few samples."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.findings import CHI2_HIGH
 from jointscope.graphs.scoring.regression.changed_load import ChangedLoad
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
@@ -25,6 +26,8 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
         found.append(("Each joint with its own commands and positions", _sentence(result.exchanged)))
     if result.saturated:
         found.append(("Drives that give what is commanded", result.saturated))
+    if odd := odd_trackers(result):
+        found.append(("Trackers that stand still and stamp as encoders do", odd))
     if (changed := result.asked.changed) is not None:
         name, sentence = ("Nothing pushes", _push) if changed.push else ("One load throughout", _two_loads)
         found.append((name, sentence(changed, result)))
@@ -33,6 +36,12 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
     if rare := rare_samples(result):
         found.append(("Samples often enough", rare))
     return found
+
+
+def odd_trackers(result: CalibrationResult) -> str:
+    """Sentences on trackers that seem to be late or to have moved, and that the calibrated model does not explain."""
+    off = {channel.rsplit(".", 1)[0] for channel, fit in result.channels.items() if fit.chi2 > CHI2_HIGH}
+    return " ".join(f"{text}." for name, text in result.odd_trackers.items() if name in off)
 
 
 def _readings(result: CalibrationResult) -> str:

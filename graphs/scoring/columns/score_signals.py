@@ -69,13 +69,14 @@ class ScoreSignals:
     @staticmethod
     def of(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
         """From a solved recording, each tick with the command of the step that begins there."""
-        u, sliding = problem.dynamics.command(calibration.values), problem.dynamics.steps.at_ticks
-        return ScoreSignals._at(problem, problem.timeline.ticks, x, np.vstack([u, u[-1:]]), calibration, sliding)
+        first, last = problem.dynamics.commands_at_ends(calibration.values)
+        u, sliding = np.vstack([first, last[-1:]]), problem.dynamics.steps.at_ticks
+        return ScoreSignals._at(problem, problem.timeline.ticks, x, u, calibration, sliding)
 
     @staticmethod
     def at_ends(problem: BagProblem, x: Array, calibration: Calibration) -> ScoreSignals:
         """The same where each of the m steps ends, with the command of that step: accelerations jump with commands."""
-        u, sliding = problem.dynamics.command(calibration.values), problem.dynamics.steps.ends
+        u, sliding = problem.dynamics.commands_at_ends(calibration.values)[1], problem.dynamics.steps.ends
         return ScoreSignals._at(problem, problem.timeline.ticks[1:], x[1:], u, calibration, sliding)
 
     @staticmethod
@@ -87,8 +88,9 @@ class ScoreSignals:
         """
         model, ticks, dynamics = problem.dynamics.model, problem.timeline.ticks, problem.dynamics
         u, steps, p = dynamics.command(calibration.values), dynamics.steps, calibration.values
-        pairs = ((x[:-1], steps.begins), (x[1:], steps.ends))
-        ends = [model.accelerations(part, u, p, sliding) for part, sliding in pairs]
+        first, last = dynamics.commands_at_ends(p)
+        parts = ((x[:-1], first, steps.begins), (x[1:], last, steps.ends))
+        ends = [model.accelerations(part, own, p, sliding) for part, own, sliding in parts]
         assert isinstance(dynamics, SimpsonDynamics)
         middle, sliding = dynamics.middle(x[:-1], x[1:], *ends), steps.throughout
         found = model.with_derivatives(middle, u, p, None, sliding).by_state[:, :, model.layout.rates]

@@ -9,22 +9,29 @@ import numpy as np
 import pytest
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.calibration.found_values import AT_BOUND, NEAR_BOUND, WRONG_SIDE, dynamic_parameters
+from jointscope.graphs.calibration.found_values import (
+    AT_BOUND,
+    NEAR_BOUND,
+    STAMPED_LATE,
+    WRONG_SIDE,
+    dynamic_parameters,
+)
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 
 ROBOT = add_effect(load_robot("doggy"), "motor_viscous@joint1")
 FRICTION, VISCOUS = "joint1.coulomb_torque", "joint1.motor_viscous.coefficient"
 
 
-def note_of(name: str, value: float, sigma: float) -> str:
+def note_of(name: str, value: float, sigma: float, of: Robot = ROBOT) -> str:
     """The note of one parameter with a value and a standard deviation, both in its unit."""
-    robot = replace(ROBOT, parameters={**ROBOT.parameters, name: replace(ROBOT.parameter(name), value=value)})
+    robot = replace(of, parameters={**of.parameters, name: replace(of.parameter(name), value=value)})
     calibration = Calibration.of(robot)
     sigmas = np.full(len(calibration.names), 1e-4)
     place = calibration.names.index(name)
     sigmas[place] = sigma / calibration.value_by_coordinate[place]
-    return next(p.note for p in dynamic_parameters(ROBOT, calibration, sigmas) if p.name == name)
+    return next(p.note for p in dynamic_parameters(of, calibration, sigmas) if p.name == name)
 
 
 @pytest.mark.parametrize(
@@ -49,3 +56,11 @@ def test_a_value_that_fell_to_its_bound_has_no_smaller_sigma_than_at_its_prior()
 @pytest.mark.parametrize("value, sigma, note", [(0.4, 0.01, ""), (-0.01, 0.01, ""), (-0.4, 0.01, WRONG_SIDE)])
 def test_a_friction_that_drives_is_marked(value, sigma, note):
     assert note_of(VISCOUS, value, sigma) == note
+
+
+@pytest.mark.parametrize("held, note", [(True, WRONG_SIDE), (False, f"{STAMPED_LATE}, by 10 ms")])
+def test_only_of_a_measured_drive_signal_a_delay_below_zero_has_a_meaning(held, note):
+    robot = add_effect(ROBOT, "command_delay@robot")
+    robot = replace(robot, command=replace(robot.command, held=held))
+    assert note_of("robot.command_delay.delay", -0.01, 1e-5, robot) == note
+    assert note_of("robot.command_delay.delay", -1e-5, 1e-5, robot) == ""

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.robots.recordings.recording import Notice
+from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
 from jointscope.tools.verb_parts.first_look import first_look
@@ -49,6 +51,16 @@ def test_a_speed_beyond_the_limit_of_the_urdf_is_told_as_such_and_not_as_a_long_
     monkeypatch.setattr(type(doggy.tree), "velocity_limits", allowed)
     text = said(doggy, simulated.recording)
     assert "moves at" in text and "a limit of the URDF may be wrong" in text and "takes long" not in text
+
+
+@pytest.mark.parametrize("kind", [LATE_TRACKER, MOVED_TRACKER])
+def test_a_tracker_that_is_late_or_moved_is_told_before_the_calibration_takes_its_minutes(
+    kind, doggy, simulated, monkeypatch
+):
+    told = [Notice("tip", kind, 100, "tip is late, by about 20 ms"), Notice("imu1", "gap", 1, "a gap")]
+    monkeypatch.setattr("jointscope.tools.verb_parts.first_look.screen_all", lambda recording, robot: told)
+    text = said(doggy, simulated.recording)
+    assert "tip is late, by about 20 ms\n" in text and "a gap" not in text and "takes long to calibrate" in text
 
 
 def test_a_recording_that_cannot_be_used_is_named(doggy, simulated):

@@ -55,6 +55,13 @@ def test_only_residuals_that_are_too_large_speak_against_a_calibration(good, chi
     assert level(judge(with_chi2(good, chi2)), NOISE) == expected
 
 
+@pytest.mark.parametrize(("chi2", "expected"), [(1.0, []), (4.0, ["joint1 is late."])])
+def test_a_tracker_that_seemed_late_is_a_reason_only_where_the_model_does_not_explain_it(good, chi2, expected):
+    result = dataclasses.replace(with_chi2(good, chi2), odd_trackers={"joint1": "joint1 is late"})
+    checks = [c for c in judge(result).checks if c.name == "Trackers that stand still and stamp as encoders do"]
+    assert [check.text for check in checks] == expected and all(check.level == "bad" for check in checks)
+
+
 def test_a_memory_in_the_residuals_is_bad_unless_they_are_far_below_the_noise(good):
     assert level(judge(good), MEMORY) == "good"
     assert level(judge(coloured(good)), MEMORY) == "bad"

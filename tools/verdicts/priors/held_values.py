@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.calibration.found_values import says_what_it_means
 from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.robots.model.robot import Robot
 
@@ -29,7 +30,7 @@ def values_from_data(result: CalibrationResult) -> tuple[str, str]:
     "bad" where a guess of the robot file came back as a value, "warn" where a prior or a bound has a say, "info" where
     that is a sensor's mounting or what an effect leaves to its prior on purpose.
     """
-    noted = [p for p in result.parameters if p.note or is_held(p)]
+    noted = [p for p in result.parameters if (p.note and not says_what_it_means(p.note)) or is_held(p)]
     if not noted:
         return "good", "No parameter leans on its prior or lies on a bound."
     meant = left_to_priors(result.robot)
