@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.groups import group_of
 from jointscope.robots.errors import RobotError
+from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
+
+BY_CHANCE = 3.0  # [sigma] below zero that noise explains
 
 
 @dataclass(frozen=True)
@@ -69,3 +73,26 @@ def of_drives(robot: Robot, name: str) -> str:
     shared = {parameter.name for parameter in found.values()} == {f"motor.{name}"}
     named = {"each": robot.parameter(f"motor.{name}")} if shared else found
     return ", ".join(f"{owner} {parameter.value:.6g} {parameter.unit}" for owner, parameter in named.items())
+
+
+def without_noise_below_zero(robot: Robot, names: Iterable[str]) -> tuple[Robot, tuple[str, ...]]:
+    """The robot with zeros for values that noise has taken below zero where a format allows none, and a sentence on it.
+
+    Args:
+        robot: as calibrated.
+        names: of parameters that may not be negative.
+
+    Raises:
+        RobotError: one that is below zero beyond noise, with what to type.
+    """
+    below = [robot.parameters[name] for name in names if robot.parameters[name].value < 0.0]
+    for found in below:
+        if found.sigma is None or found.value < -BY_CHANCE * found.sigma:
+            owner, effect = found.name.split(".")[:2]
+            raise RobotError(
+                f"{found.name} is {found.value:g} {found.unit}, and no format allows it below zero: take it away with "
+                f"`jointscope remove {robot_argument(robot)} {effect}@{owner} -o OUT.yaml`, calibrate, and export again"
+            )
+    zeros = [found.name for found in below]
+    said = (f"{', '.join(zeros)}: below zero by noise, 0 in the file",) if zeros else ()
+    return robot.with_values(dict.fromkeys(zeros, 0.0)), said

@@ -15,6 +15,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.export.exported import Exported
 from jointscope.tools.export.mujoco_model import mujoco_model
 from jointscope.tools.export.urdf_model import urdf_model
+from jointscope.tools.writing.protected_files import check_robot_files
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
 WIDTH = 110
@@ -71,6 +72,7 @@ def export_files(
             "(in Python: export(robot, urdf=..., mjcf=...))"
         )
     check_outputs([urdf, mjcf, json], [robot.path])
+    check_robot_files({"urdf": urdf, "mjcf": mjcf, "json": json}, [robot.path])
     done = ExportedFiles(robot.name, paths, {kind: FORMATS[kind](robot) for kind in paths})
     with ExitStack() as stack:
         for kind, path in paths.items():

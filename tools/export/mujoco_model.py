@@ -8,6 +8,7 @@ are the armature. Effects that the engine has no element for are named instead.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +19,7 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
-from jointscope.tools.export.exported import Exported, need_masses, why_not
+from jointscope.tools.export.exported import Exported, need_masses, why_not, without_noise_below_zero
 from jointscope.tools.simulator.effects import simulated_effects
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
@@ -52,6 +53,7 @@ def mujoco_model(robot: Robot) -> Exported:
     need_masses(robot)
     settled = bodies_as_calibrated(robot)
     plain = replace(settled, effects=())
+    plain, zeroed = without_noise_below_zero(plain, _never_negative(settled.effects))
     kept = [(here, _simulated(here, plain)) for here in settled.effects]
     effects = [effect for _, effect in kept if effect is not None]
     T = transmission(plain)
@@ -74,7 +76,7 @@ def mujoco_model(robot: Robot) -> Exported:
     held = [here.label for here in robot.effects if here.label not in gone]
     text = _possible(spec.to_xml())
     _load(text, robot.name)
-    return Exported(text, (*_base_model(plain), *held), {**_choices(robot), **gone})
+    return Exported(text, (*_base_model(plain), *held), {**_choices(robot), **gone}, zeroed)
 
 
 def _load(text: str, name: str) -> None:
@@ -112,6 +114,17 @@ def _simulated(here: EffectAt, robot: Robot) -> SimulatedEffect | None:
     if form is None or not form.built_in:
         return None
     return form(here.owner, here.own({name: p.value for name, p in robot.parameters.items()}), robot)
+
+
+def _never_negative(effects: Sequence[EffectAt]) -> list[str]:
+    """Full names of the parameters that the engine allows no negative values for."""
+    forms = [(here, simulated_effects().get(here.effect.id)) for here in effects]
+    return [
+        here.parameter(name)
+        for here, form in forms
+        if form is not None and form.built_in
+        for name in form.never_negative
+    ]
 
 
 def _base_model(robot: Robot) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.structured_tree import inertia_changes
 from jointscope.robots.urdf.urdf_tree import read_urdf, urdf_text
 from jointscope.tools.export.bodies_as_calibrated import bodies_as_calibrated
-from jointscope.tools.export.exported import Exported, need_masses, of_drives, why_not
+from jointscope.tools.export.exported import Exported, need_masses, of_drives, why_not, without_noise_below_zero
 from jointscope.tools.export.urdf_inertia import inertia_of, write_inertial
 from jointscope.tools.export.urdf_readers import stumbling_blocks
 
@@ -52,7 +53,7 @@ def urdf_model(robot: Robot) -> Exported:
     joints = {element.get("name", ""): element for element in root.findall("joint")}
     links = {element.get("name", ""): element for element in root.findall("link")}
     _change_bodies(robot, joints, links)
-    settled = bodies_as_calibrated(robot)
+    settled, zeroed = without_noise_below_zero(*_frictions(bodies_as_calibrated(robot)))
     soft = [joint for joint in settled.joints if joint in settled.layout.motors]
     held = set()
     for joint in settled.joints:
@@ -66,12 +67,19 @@ def urdf_model(robot: Robot) -> Exported:
     named = [here.label for here in robot.effects if here.label not in gone]
     geometry = ("geometry",) if robot.poses is not None else ()
     holds = ("inertias", *geometry, "dry friction", *springs, *named)
-    return _exported(root, robot, holds, {**_sag(robot), **_drives(settled, soft), **gone})
+    exported = _exported(root, robot, holds, {**_sag(robot), **_drives(settled, soft), **gone})
+    return replace(exported, warnings=(*zeroed, *exported.warnings))
 
 
 def _exported(root: ET.Element, robot: Robot, holds: tuple[str, ...], lacks: dict[str, str]) -> Exported:
     text = urdf_text(root)
     return Exported(text, holds, lacks, stumbling_blocks(root, text, robot.tree.urdf))
+
+
+def _frictions(robot: Robot) -> tuple[Robot, list[str]]:
+    """A robot, and full names of what is damping or dry friction in a URDF."""
+    own = [(here, "torque" if here.effect.id == DRY else "coefficient") for here in robot.effects]
+    return robot, [here.parameter(name) for here, name in own if here.effect.id in (*VISCOUS, DRY)]
 
 
 def _effects(robot: Robot, held: set[str]) -> dict[str, str]:

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError
+from jointscope.tools.notebook.made_from import recorded_files, robot_files
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verb_parts.result_files import ResultFiles
+from jointscope.tools.writing.protected_files import check_robot_files
+from jointscope.tools.writing.whole_file import check_outputs
 
 Row = dict[str, Any]
 SHOWN_ROWS = 40  # in a notebook; the data frame has all
@@ -85,7 +88,11 @@ class Shown(ABC):
         Raises:
             JointscopeError: a file cannot be written.
         """
-        self.write(ResultFiles(*(None if path is None else Path(path) for path in (report, rrd, json, robot, figures))))
+        files = ResultFiles(*(None if path is None else Path(path) for path in (report, rrd, json, robot, figures)))
+        check_outputs(files.all, inputs=recorded_files(self))
+        named = {"output": files.robot, "report": files.report, "rrd": files.rrd, "json": files.json}
+        check_robot_files(named, robot_files(self))
+        self.write(files)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

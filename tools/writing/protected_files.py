@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from jointscope.robots.errors import JointscopeError
 
@@ -24,10 +25,22 @@ def check_protected(args: argparse.Namespace) -> None:
     Raises:
         JointscopeError: an output is the URDF of a robot file, or a result other than a robot is the robot file.
     """
-    for robot in _robot_files(args):
+    check_robot_files({option: getattr(args, option, None) for option in OUTPUTS}, _robot_files(args))
+
+
+def check_robot_files(outputs: Mapping[str, Any], robots: Iterable[Path]) -> None:
+    """Refuses outputs that would replace a part of some robots.
+
+    Args:
+        outputs: by what they are, one of OUTPUTS; what is no path is not written.
+        robots: their files.
+
+    Raises:
+        JointscopeError: an output is the URDF of a robot file, or a result other than a robot is the robot file.
+    """
+    for robot in robots:
         urdf = _urdf_of(robot)
-        for option in OUTPUTS:
-            target = getattr(args, option, None)
+        for option, target in outputs.items():
             if not isinstance(target, Path):
                 continue
             if urdf is not None and target.resolve() == urdf.resolve():

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robots as MuJoCo models against the equations that they were calibrated with."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +14,9 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effects_at_once import add_effects
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.tools.export.mujoco_model import _possible, mujoco_model
+from jointscope.tools.export.urdf_model import urdf_model
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo models need the extra jointscope[sim]")
 
@@ -160,3 +164,20 @@ def test_a_flat_body_is_still_one_after_rounding_to_six_digits():
 def test_limits_of_the_urdf_that_bound_the_drives_are_said(tmp_path):
     said = mujoco_model(arm_with(tmp_path)).lacks["torques beyond the limits of the URDF"]
     assert "shoulder 80 N m, elbow 40 N m" in said and "actuatorfrcrange" in said
+
+
+def test_friction_that_noise_took_below_zero_is_zero_in_both_files_and_said(tmp_path):
+    robot = with_effects(arm_with(tmp_path), {"elbow.motor_viscous.coefficient": -4e-6})
+    name = "elbow.motor_viscous.coefficient"
+    known = replace(robot, parameters=with_sigmas(robot.parameters, {name: 9e-5}))
+    said = (f"{name}: below zero by noise, 0 in the file",)
+    exported = mujoco_model(known)
+    assert exported.warnings == said
+    assert engine_of(known)[0].joint("elbow").damping == 0.0
+    urdf = urdf_model(known)
+    assert urdf.warnings[:1] == said and 'damping="0"' in urdf.text and 'damping="-' not in urdf.text
+    surely = replace(robot, parameters=with_sigmas(robot.parameters, {name: 1e-7}))
+    with pytest.raises(RobotError, match=rf"{name} is -4e-06 N m s/rad, .* `jointscope remove .* motor_viscous@elbow"):
+        mujoco_model(surely)
+    with pytest.raises(RobotError, match=name):
+        urdf_model(surely)

@@ -9,9 +9,11 @@ import json
 import numpy as np
 import pytest
 from fake_results import fake_recording, sinusoids
+from tilted_arm import arm_with
 
 import jointscope as js
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.robots.errors import JointscopeError
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
 
@@ -58,3 +60,12 @@ def test_info_says_whether_a_robot_can_use_a_bag(tmp_path, capsys):
     assert not other.usable
     assert main(["info", str(bag), "--robot", "hebi_5r"]) == 0
     assert capsys.readouterr().out == other.text() + "\n"
+
+
+def test_an_export_does_not_replace_the_urdf_of_its_robot(tmp_path):
+    robot = arm_with(tmp_path)
+    before = (tmp_path / "arm.urdf").read_bytes()
+    for kind in ("urdf", "mjcf"):
+        with pytest.raises(JointscopeError, match=r"arm\.urdf: it is the URDF of .*arm\.yaml; give it another name"):
+            js.export(robot, **{kind: tmp_path / "arm.urdf"})
+    assert (tmp_path / "arm.urdf").read_bytes() == before

@@ -204,3 +204,23 @@ def test_limits_are_shown_and_saved_with_the_result(lines, outcome, said, tmp_pa
     result.save(report=tmp_path / "r.html", json=tmp_path / "r.json")
     assert said in (tmp_path / "r.html").read_text()
     assert outcome in {line["outcome"] for line in json.loads((tmp_path / "r.json").read_text())["acceptance"]["doggy"]}
+
+
+def test_no_file_of_a_result_replaces_what_it_was_made_from(calibrated, tmp_path):
+    bag, file, urdf = tmp_path / "m.mcap", tmp_path / "arm.yaml", tmp_path / "arm.urdf"
+    bag.write_bytes(b"samples")
+    file.write_text("urdf: arm.urdf\n")
+    urdf.write_text("<robot/>")
+    (first, *others), start = calibrated.bags, dataclasses.replace(calibrated.start, path=file)
+    first = dataclasses.replace(first, recording=dataclasses.replace(first.recording, path=str(bag)))
+    result = dataclasses.replace(calibrated, bags=(first, *others), start=start)
+    for given, reason in (
+        ({"report": bag}, "it is also an input"),
+        ({"json": file}, "it is also an input"),
+        ({"robot": urdf}, f"it is the URDF of {file}"),
+        ({"robot": tmp_path / "a.yaml", "report": tmp_path / "a.yaml"}, "it is named for two outputs"),
+    ):
+        before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+        with pytest.raises(JointscopeError, match=f"^cannot write .*: {reason}; give it another name$"):
+            result.save(**given)
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
