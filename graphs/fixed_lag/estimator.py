@@ -77,6 +77,8 @@ class FixedLagEstimator(WindowAccess):
     ):
         if not (math.isfinite(lag) and lag > 0.0):
             raise EstimatorError(f"lag is {lag:g} s; expected a positive number of seconds, such as 0.1")
+        if not isinstance(robot, Robot):
+            raise EstimatorError(f"expected a Robot, as load_robot('doggy') gives one, got {robot!r}")
         robot.need_link_dynamics()
         self.robot = with_full_gyros(robot)
         self.layout, self.lag, self._listener = self.robot.layout, lag, listener

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
@@ -42,11 +43,19 @@ def recording_of(recording: AnyRecording, robot: Robot) -> Recording:
     Raises:
         RecordingError: a bag cannot be read, or something is no recording.
     """
-    if isinstance(recording, Simulation):
-        return recording.recording
-    if not isinstance(recording, Recording | str | Path):
+    if isinstance(recording, str | Path):
+        return read_recording(recording, robot)
+    given = recording.recording if isinstance(recording, Simulation) else recording
+    if not isinstance(given, Recording):
         raise RecordingError(f"expected a recording, the result of simulate, or a path, got {_told(recording)}")
-    return recording if isinstance(recording, Recording) else read_recording(recording, robot)
+    for name, sensor in robot.sensors.items():
+        channels = given.streams[name].channels if name in given.streams else sensor.channels
+        if len(channels) != len(sensor.channels):
+            raise RecordingError(
+                f"the recording is of another robot than {robot.name}: its {name} has {', '.join(channels)}; expected "
+                f"{', '.join(sensor.channels)}"
+            )
+    return given
 
 
 def recordings_of(recordings: AnyRecording | Sequence[AnyRecording], robot: Robot) -> list[Recording]:
@@ -92,8 +101,11 @@ def without_stretches(recordings: Sequence[Recording], leave_out: AnyStretches) 
         RecordingError: a stretch is none, or is meant for none or several of the recordings.
     """
     texts = []
+    if not isinstance(leave_out, Sequence):
+        raise RecordingError(f"leave_out: expected a list of (t0, t1) [s] or 'BAG:T0:T1', got {_told(leave_out)}")
     for stretch in leave_out:
-        if not isinstance(stretch, str) and not (isinstance(stretch, Sequence) and len(stretch) == 2):
+        times = stretch if isinstance(stretch, Sequence) else ()
+        if not isinstance(stretch, str) and not (len(times) == 2 and all(isinstance(t, Real) for t in times)):
             raise RecordingError(f"leave_out: expected (t0, t1) [s] or 'BAG:T0:T1', got {_told(stretch)}")
         texts.append(stretch if isinstance(stretch, str) else f"{float(stretch[0])!r}:{float(stretch[1])!r}")
     return leave_out_texts(recordings, texts)
@@ -126,4 +138,9 @@ def limits_of(limits: AnyLimits) -> tuple[Limit, ...]:
     Raises:
         RobotError: the file has a mistake.
     """
-    return read_limits(Path(limits)) if isinstance(limits, str | Path) else tuple(limits)
+    if isinstance(limits, str | Path):
+        return read_limits(Path(limits))
+    for line in limits if isinstance(limits, Sequence) else (limits,):
+        if not isinstance(line, Limit):
+            raise RobotError(f"accept: expected the path of a file of limits, or a list of Limit, got {_told(line)}")
+    return tuple(limits)

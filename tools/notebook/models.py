@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effects_at_once import add_effects, remove_effects
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.bag_description import BagDescription
@@ -23,7 +25,7 @@ def add(robot: AnyRobot, *effects: str) -> Robot:
     Raises:
         EffectError: an effect is unknown, is there already, or cannot act there.
     """
-    return add_effects(robot_of(robot), effects).robot
+    return add_effects(robot_of(robot), _labels(effects)).robot
 
 
 def remove(robot: AnyRobot, *effects: str) -> Robot:
@@ -36,7 +38,20 @@ def remove(robot: AnyRobot, *effects: str) -> Robot:
     Raises:
         EffectError: an effect is unknown or not there.
     """
-    return remove_effects(robot_of(robot), effects).robot
+    return remove_effects(robot_of(robot), _labels(effects)).robot
+
+
+def _labels(effects: Sequence[str]) -> Sequence[str]:
+    """Effects as they were given.
+
+    Raises:
+        EffectError: one is no text, or there is none.
+    """
+    odd = next((effect for effect in effects if not isinstance(effect, str)), None)
+    if odd is not None or not effects:
+        got = "none" if odd is None else repr(odd)
+        raise EffectError(f"expected effects as 'backlash@joint1', 'cogging@*', one after the other, got {got}")
+    return effects
 
 
 def export(robot: AnyRobot, *, urdf: str | Path | None = None, mjcf: str | Path | None = None) -> ExportedFiles:

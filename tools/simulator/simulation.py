@@ -119,6 +119,7 @@ def simulate_under(
     progress: Callable[[float], None] | None = None,
 ) -> Simulation:
     """As `simulate`, with all that is true of robot and sensors in one argument."""
+    robot.need_link_dynamics()
     occasion = Occasion(robot, motion, seconds, seed, conditions)
     schedule = make_motion(motion, robot, occasion.times, occasion.start, occasion.random("targets"))
     truth = occasion.truth

@@ -130,3 +130,42 @@ def test_verb_and_function_do_the_same_computation(verb, folder, monkeypatch, ca
         getattr(js, verb)("doggy", "good.mcap")
     assert main([verb, "doggy", "good.mcap", *(["-o", "o.yaml"] if verb in ("calibrate", "discover") else [])]) == 1
     assert "here it begins" in capsys.readouterr().err
+
+
+OTHER_TYPES = {
+    "recording of another robot": (
+        lambda recording: js.compare("biorob", recording),
+        r"of another robot than biorob: its motor_encoder has joint1\.motor_position, .*; expected .*joint4",
+    ),
+    "limits that are none": (
+        lambda recording: js.calibrate("doggy", recording, accept=[{}]),
+        "accept: .* got dict",
+    ),
+    "no limits": (lambda recording: js.calibrate("doggy", recording, accept=None), "accept: .* got NoneType"),
+    "stretches that are a number": (
+        lambda recording: js.calibrate("doggy", recording, leave_out=5),
+        r"leave_out: expected a list of \(t0, t1\) .*, got int 5",
+    ),
+    "times that are none": (
+        lambda recording: js.diagnose("doggy", recording, leave_out=[("a", "b")]),
+        r"leave_out: expected \(t0, t1\) \[s\] or 'BAG:T0:T1', got tuple",
+    ),
+    "a list of effects": (
+        lambda recording: js.add("doggy", ["cogging@joint1"]),
+        r"expected effects as .*, got \[",
+    ),
+    "an estimator by name": (lambda recording: js.FixedLagEstimator("doggy"), r"expected a Robot, as .*, got 'doggy'"),
+    "a simulation without masses": (lambda recording: js.simulate("hebi_2r", seconds=2), "has link_dynamics: free"),
+}
+
+
+@pytest.mark.parametrize("case", OTHER_TYPES)
+def test_what_is_of_another_type_is_said_in_one_line_before_any_work(case):
+    import numpy as np
+
+    robot, t = js.load_robot("doggy"), np.arange(0.0, 2.0, 0.01)
+    recording = fake_recording(robot, sinusoids(t, robot), t, np.random.default_rng(0))
+    call, said = OTHER_TYPES[case]
+    with pytest.raises(js.JointscopeError, match=said) as raised:
+        call(recording)
+    assert "\n" not in str(raised.value)
