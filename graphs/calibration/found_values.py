@@ -12,11 +12,11 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.model.derived_values import derived_value
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
-from jointscope.robots.parts.relative_sigma import KNOWN
 
 Array = NDArray[np.float64]
 
 HELD_BY_PRIOR = 0.7  # share of the prior's sigma from which a value is called held by its prior
+FROM_ZERO = 0.5  # sigma over a value of either sign up to which it differs from zero
 NEAR_ZERO = 0.5  # relative sigma from which a positive value is called compatible with zero
 FALLEN = 0.1  # of its prior, below which such a value has run into its bound
 SURELY_BELOW = 3.5  # [sigma] below null from which a value of one sign has the other one
@@ -96,8 +96,8 @@ def _note(p: Parameter, value: float, sigma: float, of_coordinate: float) -> str
 def share_of_value(robot: Robot, p: ParameterEstimate) -> float | None:
     """Standard deviation over the size of a value; None of a value near zero that is known well.
 
-    A lever of 0.0 +- 0.1 mm is known, as its sign is free and its prior has a say in it no more; one with a sigma as
-    large as that of its prior is not.
+    A lever of 0.1 +- 0.1 mm is known: its sign is free, zero is as likely, and its prior has a say in it no more. One
+    with a sigma as large as that of its prior is not.
 
     Args:
         robot: says which values have one sign.
@@ -106,7 +106,7 @@ def share_of_value(robot: Robot, p: ParameterEstimate) -> float | None:
     share = p.sigma / max(abs(p.value), 1e-300)
     one_sign = p.name in robot.parameters and robot.parameters[p.name].positive
     held = p.prior_sigma > 0.0 and p.sigma > HELD_BY_PRIOR * p.prior_sigma
-    return share if share <= KNOWN or one_sign or held else None
+    return share if share <= FROM_ZERO or one_sign or held else None
 
 
 def derived_results(robot: Robot, calibration: Calibration, covariance: Array) -> tuple[ParameterEstimate, ...]:

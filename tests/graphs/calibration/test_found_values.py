@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import (
     AT_BOUND,
     NEAR_BOUND,
     STAMPED_LATE,
     WRONG_SIDE,
     dynamic_parameters,
+    share_of_value,
 )
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
@@ -64,3 +66,13 @@ def test_only_of_a_measured_drive_signal_a_delay_below_zero_has_a_meaning(held, 
     robot = replace(robot, command=replace(robot.command, held=held))
     assert note_of("robot.command_delay.delay", -0.01, 1e-5, robot) == note
     assert note_of("robot.command_delay.delay", -1e-5, 1e-5, robot) == ""
+
+
+def test_a_share_is_told_of_values_that_differ_from_zero_or_are_not_known():
+    def share(value, sigma, prior_sigma=1.0, name="imu1.bias.x"):
+        return share_of_value(ROBOT, ParameterEstimate(name, value, sigma, "1", 0.0, 0.0, prior_sigma, None))
+
+    assert share(1e-3, 4e-4) == pytest.approx(0.4)
+    assert share(1.3e-4, 1.2e-4) is None
+    assert share(1e-3, 0.9) == pytest.approx(900.0)
+    assert share(1e-3, 8e-4, name="joint1.damping") == pytest.approx(0.8)
