@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.starts.drive_regression import Driven, load_of
+from jointscope.graphs.starts.golden_section import golden_section
 from jointscope.graphs.starts.motion_cells import MotionCells, mean_commands
 from jointscope.graphs.starts.windowed_sums import SIGNALS, joint_signals, windowed_rows
 from jointscope.robots.bodies.rigid_tree import RigidTree
@@ -30,7 +31,6 @@ TRIED = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995)  # 
 BETWEEN = 9  # levels between the neighbours of the best of them, and once more
 WIDTHS = (0.06, 0.12, 0.24)  # [s] of windows; the one that tells most about the excess counts
 REFINED = 12  # steps of a golden section
-GOLDEN = 0.6180339887498949
 HINT = 1.2  # times less is left open with a limit, in windows of a middle width, where others are tried
 BETTER = 2.0  # times less is left open with a limit than without
 OPEN = 0.01  # of the mean square of the command that may be left open where a limit is believed
@@ -172,20 +172,9 @@ def _best_level(windows: list[DrivenWindows], joint: int, grid: Array) -> tuple[
         grid = np.geomspace(near[0] if k else 0.5 * grid[0], near[-1], BETWEEN)
     found = [_left_open(windows, joint, float(level)) for level in grid]
     k = int(np.argmin(found))
-    low = np.log(grid[k - 1] if k else 0.5 * grid[0])
-    high = np.log(grid[min(k + 1, len(grid) - 1)])
-    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-    values = [_left_open(windows, joint, float(np.exp(x))) for x in inner]
-    for _ in range(REFINED):
-        if values[0] < values[1]:
-            high, inner[1], values[1] = inner[1], inner[0], values[0]
-            inner[0] = high - GOLDEN * (high - low)
-            values[0] = _left_open(windows, joint, float(np.exp(inner[0])))
-        else:
-            low, inner[0], values[0] = inner[0], inner[1], values[1]
-            inner[1] = low + GOLDEN * (high - low)
-            values[1] = _left_open(windows, joint, float(np.exp(inner[1])))
-    best = min([*zip(values, np.exp(inner), strict=True), (found[k], grid[k])])
+    low, high = grid[k - 1] if k else 0.5 * grid[0], grid[min(k + 1, len(grid) - 1)]
+    refined = golden_section(lambda level: _left_open(windows, joint, level), low, high, REFINED)
+    best = min([*refined, (found[k], grid[k])])
     return float(best[1]), float(best[0])
 
 

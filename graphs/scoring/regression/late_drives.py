@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.scoring.regression.evidence import evidence
 from jointscope.graphs.scoring.regression.joint_regression import JointRows, fit
+from jointscope.graphs.starts.golden_section import golden_section
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.recordings.recording import Stream
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 DELAY, LAG = "command_delay", "motor_lag"
 WIDTHS = (0.06, 0.12, 0.24)  # [s] of windows: in wider ones nothing is late
 TRIED = tuple(1e-3 * 2.0**k for k in range(7))  # [s]
-REFINED, GOLDEN = 7, 0.6180339887498949
+REFINED = 7  # steps of a golden section
 PARTS = 4  # of the time between two commands, in which a low-pass is taken as constant
 CLEARLY = 5.0  # by how much the evidence for one must be more than that for the other, as a logarithm
 
@@ -81,19 +82,8 @@ def _best(
 
     found = [worth(size) for size in TRIED]
     k = int(np.argmax(found))
-    low, high = np.log(TRIED[k] / 2.0), np.log(TRIED[k] * 2.0)
-    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
-    values = [worth(float(np.exp(x))) for x in inner]
-    for _ in range(REFINED):
-        if values[0] > values[1]:
-            high, inner[1], values[1] = inner[1], inner[0], values[0]
-            inner[0] = high - GOLDEN * (high - low)
-            values[0] = worth(float(np.exp(inner[0])))
-        else:
-            low, inner[0], values[0] = inner[0], inner[1], values[1]
-            inner[1] = low + GOLDEN * (high - low)
-            values[1] = worth(float(np.exp(inner[1])))
-    return max([*zip(values, np.exp(inner).tolist(), strict=True), (found[k], TRIED[k])])
+    refined = golden_section(lambda size: -worth(size), TRIED[k] / 2.0, TRIED[k] * 2.0, REFINED)
+    return max([*((-cost, size) for cost, size in refined), (found[k], TRIED[k])])
 
 
 def _left(rows: JointRows) -> dict[tuple[int, float], tuple[float, float]]:
