@@ -60,7 +60,7 @@ class Exchange:
 
     def _names(self, joints: Sequence[str], topic: Topic) -> list[str]:
         """The names of a topic in the order that mends it; of messages without names the places."""
-        names = list(topic.names) or [f'"{place}"' for place in range(len(joints))]
+        names = names_or_places(topic, len(joints))
         i, j = (joints.index(joint) for joint in self.joints)
         names[i], names[j] = names[j], names[i]
         return names
@@ -132,6 +132,11 @@ def exchanged_joints(robot: Robot, recordings: Sequence[Recording]) -> list[Noti
         if found is not None:
             return [Notice("command", EXCHANGED, len(driven.command), found.sentence(robot))]
     return []
+
+
+def names_or_places(topic: Topic, count: int) -> list[str]:
+    """The joints of a topic as `names` of a robot file has them; of messages without names the places."""
+    return list(topic.names) or [f'"{place}"' for place in range(count)]
 
 
 def _is_possible(equation: DriveEquation) -> bool:

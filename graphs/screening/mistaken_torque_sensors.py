@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.screening.exchanged_joints import names_or_places
 from jointscope.graphs.screening.windowed_motion import faded_mean, windowed_motion
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
@@ -52,12 +53,13 @@ def mistaken_torque_sensors(recording: Recording, robot: Robot) -> list[Notice]:
     drives = _Drives.of(*streams)
     if drives is None:
         return []
-    left = np.array([[drives.left(i, k) for i in range(robot.n)] for k in range(robot.n)])
+    now = drives.at()
+    left = np.array([[now.left(i, k) for i in range(robot.n)] for k in range(robot.n)])
     own = _belongs_to(left)
     said = [_exchanged(robot, sensor, own)] if np.any(own != np.arange(robot.n)) else []
     if all(left[k, joint] < FITS for k, joint in enumerate(own)):
         channels = np.argsort(own)  # of each joint
-        scale = drives.signs(channels) / _size(recording, robot, channels)
+        scale = now.signs(channels) / _size(recording, robot, channels)
         if np.any(scale != 1.0):
             said.append(_scaled(robot, sensor, scale))
         lag = drives.lag(channels)
@@ -98,48 +100,70 @@ class _Drives:
         _, speed, acceleration = windowed_motion(encoder, times, window)
         return _Drives(times, window, speed, acceleration, command, torque)
 
-    def left(self, joint: int, channel: int, late: float = 0.0, command_late: float = 0.0) -> float:
-        """Root mean square share of a channel that the drive of a joint leaves, at another time of one of them."""
-        y, A, found = self._fit(joint, channel, late, command_late)
-        size = float(np.std(y))
-        return float(np.std(y - A @ found)) / size if size > 0.0 else np.inf
-
-    def signs(self, channels: NDArray[np.intp]) -> Array:
-        """Sign of the channel of each joint: a motor's inertia resists, whichever way its command counts."""
-        signs = np.ones(len(channels))
-        for joint, channel in enumerate(channels):
-            _, A, found = self._fit(joint, int(channel))
-            inertia, share = found[1], np.std(A[:, 1] * found[1])
-            seen = share > CLEARLY * self.left(joint, int(channel)) * np.std(A @ found)
-            signs[joint] = -1.0 if inertia > 0.0 and seen and found[0] < 0.0 else 1.0
-        return signs
+    def at(self, late: float = 0.0, command_late: float = 0.0) -> _DriveSignals:
+        """The signals where the sensor, or the command, is taken from another time [s]."""
+        torque = faded_mean(self.torque, self.times + late, self.window)
+        command = faded_mean(self.command, self.times + command_late, self.window)
+        return _DriveSignals(self.speed, self.acceleration, command, torque)
 
     def lag(self, channels: NDArray[np.intp]) -> float:
         """How late the sensor is [s]; zero where it is in time, or a late command explains it as well."""
 
         def whole(late: float, command_late: float) -> float:
-            shares = [self.left(joint, int(channel), late, command_late) for joint, channel in enumerate(channels)]
+            there = self.at(late, command_late)
+            shares = [there.left(joint, int(channel)) for joint, channel in enumerate(channels)]
             return float(np.sqrt(np.mean(np.square(shares))))
 
         now, coarse = whole(0.0, 0.0), [float(lag) for lag in LAGS[::3]]
-        best = min(coarse, key=lambda lag: whole(lag, 0.0))
-        if best == 0.0 or whole(best, 0.0) > now / 2.0:
+        least, best = min((whole(lag, 0.0), lag) for lag in coarse)
+        if best == 0.0 or least > now / 2.0:
             return 0.0
-        lag = min((best + float(step) for step in (-2e-3, -1e-3, 0.0, 1e-3, 2e-3)), key=lambda lag: whole(lag, 0.0))
-        left = whole(lag, 0.0)
+        near = (best + float(step) for step in (-2e-3, -1e-3, 0.0, 1e-3, 2e-3))
+        left, lag = min((whole(lag, 0.0), lag) for lag in near)
         if abs(lag) < SHORTEST_LAG or left > now / CLEARLY:
             return 0.0
         return 0.0 if min(whole(0.0, other) for other in coarse) < BOTH * left else lag
 
-    def _fit(
-        self, joint: int, channel: int, late: float = 0.0, command_late: float = 0.0
-    ) -> tuple[Array, Array, Array]:
+
+@dataclass(frozen=True)
+class _DriveSignals:
+    """Signals of all drives at some instants: of the motors, of the command, and channels of the sensor.
+
+    Attributes:
+        speed, acceleration, command, torque: shape (m, n).
+    """
+
+    speed: Array
+    acceleration: Array
+    command: Array
+    torque: Array
+
+    def left(self, joint: int, channel: int) -> float:
+        """Root mean square share of a channel that the drive of a joint leaves."""
+        return _left(*self._fit(joint, channel))
+
+    def signs(self, channels: NDArray[np.intp]) -> Array:
+        """Sign of the channel of each joint: a motor's inertia resists, whichever way its command counts."""
+        signs = np.ones(len(channels))
+        for joint, channel in enumerate(channels):
+            y, A, found = self._fit(joint, int(channel))
+            inertia, share = found[1], np.std(A[:, 1] * found[1])
+            seen = share > CLEARLY * _left(y, A, found) * np.std(A @ found)
+            signs[joint] = -1.0 if inertia > 0.0 and seen and found[0] < 0.0 else 1.0
+        return signs
+
+    def _fit(self, joint: int, channel: int) -> tuple[Array, Array, Array]:
         """A channel, signals of a drive, shape (m, 5), and their factors."""
-        y = faded_mean(self.torque, self.times + late, self.window)[:, channel]
-        u = faded_mean(self.command, self.times + command_late, self.window)[:, joint]
+        y, u = self.torque[:, channel], self.command[:, joint]
         v, a = self.speed[:, joint], self.acceleration[:, joint]
         A = np.column_stack([u, a, v, np.tanh(v / REVERSAL), np.ones(len(v))])
         return y, A, np.linalg.lstsq(A, y, rcond=None)[0]
+
+
+def _left(y: Array, A: Array, found: Array) -> float:
+    """Root mean square share that a fit leaves."""
+    size = float(np.std(y))
+    return float(np.std(y - A @ found)) / size if size > 0.0 else np.inf
 
 
 def _belongs_to(left: Array) -> NDArray[np.intp]:
@@ -172,7 +196,7 @@ def _size(recording: Recording, robot: Robot, channels: NDArray[np.intp]) -> Arr
 
 
 def _exchanged(robot: Robot, sensor: TorqueSensor, own: NDArray[np.intp]) -> str:
-    names = list(sensor.source.names) or [f'"{place}"' for place in range(robot.n)]
+    names = names_or_places(sensor.source, robot.n)
     right = [names[channel] for channel in np.argsort(own)]
     wrong = [joint for k, joint in enumerate(robot.joints) if own[k] != k]
     return (
