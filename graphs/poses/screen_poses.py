@@ -116,19 +116,32 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
 
 def _check_joints(problem: PoseSet, target: Array, left: float) -> None:
     """Two joints may be exchanged, or one may turn the other way."""
-    joints = _exchanged(problem, target, left)
-    if joints:
-        raise RecordingError(
-            f"{problem.poses.path}: columns of {joints[0]} and {joints[1]} seem to be exchanged: with both the other "
-            f"way round the arm fits; check the names in the table, or `names` of "
-            f"poses.joint_states in {problem.robot.path.name}"
-        )
-    reversed_joint = _reversed(problem, target, left)
-    if reversed_joint:
-        raise RecordingError(
-            f"{problem.poses.path}: {reversed_joint} seems to turn the other way: with its sign reversed the arm fits; "
-            f"check its sign in the table or bag, and its axis in {problem.robot.tree.urdf.name}"
-        )
+    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
+    values = problem.values(calibration)
+
+    def fits(q: Array) -> bool:
+        """Whether other angles fit, and much better than those that were read, with a tracker anywhere."""
+        other = base_from_tracker(problem.arm.at(q, e, values).target, target)[1]
+        return other < LARGEST_ERROR and other < MUCH_BETTER * left
+
+    joints = problem.arm.chain.joints
+    for a, b in combinations(range(len(joints)), 2):
+        q = problem.q.copy()
+        q[:, [a, b]] = q[:, [b, a]]
+        if fits(q):
+            raise RecordingError(
+                f"{problem.poses.path}: columns of {joints[a]} and {joints[b]} seem to be exchanged: with both the "
+                f"other way round the arm fits; check the names in the table, or `names` of "
+                f"poses.joint_states in {problem.robot.path.name}"
+            )
+    for k, joint in enumerate(joints):
+        q = problem.q.copy()
+        q[:, k] *= -1.0
+        if fits(q):
+            raise RecordingError(
+                f"{problem.poses.path}: {joint} seems to turn the other way: with its sign reversed the arm fits; "
+                f"check its sign in the table or bag, and its axis in {problem.robot.tree.urdf.name}"
+            )
 
 
 def _check_single_poses(problem: PoseSet, predicted: Array, target: Array) -> None:
@@ -161,34 +174,6 @@ def _check_contacts(problem: PoseSet) -> None:
                 f"`contact_distance` in {problem.robot.path.name} is {said:.4g} m; expected metres, and two contacts "
                 "that are that far apart"
             )
-
-
-def _exchanged(problem: PoseSet, target: Array, left: float) -> tuple[str, str] | None:
-    """Two joints whose angles fit much better the other way round."""
-    joints = problem.arm.chain.joints
-    for a, b in combinations(range(len(joints)), 2):
-        q = problem.q.copy()
-        q[:, [a, b]] = q[:, [b, a]]
-        if _fits(problem, q, target, left):
-            return joints[a], joints[b]
-    return None
-
-
-def _reversed(problem: PoseSet, target: Array, left: float) -> str | None:
-    """A joint whose angles fit much better with the other sign."""
-    for k, joint in enumerate(problem.arm.chain.joints):
-        q = problem.q.copy()
-        q[:, k] *= -1.0
-        if _fits(problem, q, target, left):
-            return joint
-    return None
-
-
-def _fits(problem: PoseSet, q: Array, target: Array, left: float) -> bool:
-    """Whether other angles fit, and much better than those that were read, with a tracker anywhere."""
-    e, calibration = problem.start(Calibration.of(problem.robot).only([DYNAMICS]))
-    other = base_from_tracker(problem.arm.at(q, e, problem.values(calibration)).target, target)[1]
-    return other < LARGEST_ERROR and other < MUCH_BETTER * left
 
 
 def _check_number(problems: Sequence[PoseSet]) -> None:

@@ -108,23 +108,24 @@ def _possible(text: str) -> str:
     return INERTIA.sub(rounded, text)
 
 
-def _simulated(here: EffectAt, robot: Robot) -> SimulatedEffect | None:
-    """The engine's form of an effect of the robot; None where it needs more than elements of the model."""
+def _form(here: EffectAt) -> type[SimulatedEffect] | None:
+    """The engine's form of an effect; None where it needs more than elements of the model."""
     form = simulated_effects().get(here.effect.id)
-    if form is None or not form.built_in:
+    return form if form is not None and form.built_in else None
+
+
+def _simulated(here: EffectAt, robot: Robot) -> SimulatedEffect | None:
+    """The same with the values of the robot."""
+    form = _form(here)
+    if form is None:
         return None
     return form(here.owner, here.own({name: p.value for name, p in robot.parameters.items()}), robot)
 
 
 def _never_negative(effects: Sequence[EffectAt]) -> list[str]:
     """Full names of the parameters that the engine allows no negative values for."""
-    forms = [(here, simulated_effects().get(here.effect.id)) for here in effects]
-    return [
-        here.parameter(name)
-        for here, form in forms
-        if form is not None and form.built_in
-        for name in form.never_negative
-    ]
+    forms = [(here, form) for here in effects if (form := _form(here))]
+    return [here.parameter(name) for here, form in forms for name in form.never_negative]
 
 
 def _base_model(robot: Robot) -> tuple[str, ...]:

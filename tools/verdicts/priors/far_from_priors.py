@@ -26,6 +26,7 @@ NAME = "Values where their priors expect them"
 FAR = (5.0, 10.0)  # [sigma of the prior]: doubtful from the first, bad from the second
 SHOWN = 2
 RIGHT_ANGLES = 0.2  # [rad] within which a rotation is one of axes that were taken for others
+NONE_FAR = "None is further than a few sigma from its prior."
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def far_from_priors(result: CalibrationResult) -> tuple[str, str]:
     """A level of `judgement.LEVELS` and a sentence."""
     level, found = _level_of([*_parameters(result), *_biases(result)])
     if not found:
-        return level, "None is further than a few sigma from its prior."
+        return level, NONE_FAR
     # what readings at rest say of gravity explains whatever else was bent by it
     for sensor in result.robot.accelerometers:
         if said := gravity_instead(result, sensor):
@@ -90,7 +91,7 @@ def far_parameters(parameters: Mapping[str, Parameter], names: Iterable[str], fi
     values = [FarValue.of(p.name, p.value, p.prior, p.prior_sigma, p.unit, p.positive) for p in told]
     level, found = _level_of(values)
     if not found:
-        return level, "None is further than a few sigma from its prior."
+        return level, NONE_FAR
     return level, f"{_listed(found)}: {_by_name(found[0].name)}. {_correct(found[0].owner, file)}"
 
 
