@@ -10,7 +10,7 @@ from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.groups import group_of
 from jointscope.robots.errors import RobotError
-from jointscope.robots.model.command_words import robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 
 BY_CHANCE = 3.0  # [sigma] below zero that noise explains
@@ -89,9 +89,11 @@ def without_noise_below_zero(robot: Robot, names: Iterable[str]) -> tuple[Robot,
     for found in below:
         if found.sigma is None or found.value < -BY_CHANCE * found.sigma:
             owner, effect = found.name.split(".")[:2]
+            without = edited_argument(robot, "positive")
+            remove = f"jointscope remove {robot_argument(robot)} {effect}@{owner} -o {without}"
             raise RobotError(
                 f"{found.name} is {found.value:g} {found.unit}, and no format allows it below zero: take it away with "
-                f"`jointscope remove {robot_argument(robot)} {effect}@{owner} -o OUT.yaml`, calibrate, and export again"
+                f"`{remove}`, calibrate, and export again"
             )
     zeros = [found.name for found in below]
     said = (f"{', '.join(zeros)}: below zero by noise, 0 in the file",) if zeros else ()
