@@ -10,6 +10,7 @@ from typing import Concatenate, ParamSpec, TypeVar
 
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY
 from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE
+from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION
 from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.command_words import bag_arguments, edited_argument, init_command, robot_argument
@@ -18,7 +19,7 @@ from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
 
 SUSPICIOUS = ("gap", *PLAIN_MISTAKES, LATE_TRACKER, MOVED_TRACKER)  # kinds of notices that may explain a failure
-CULPRITS = (FELT_GRAVITY, MISTAKEN_TORQUE)  # they say what to write, and spoil everything else
+CULPRITS = (FELT_GRAVITY, MISTAKEN_TORQUE, MISTAKEN_TRANSMISSION)  # they say what to write, and spoil everything else
 MOST = 3
 
 P = ParamSpec("P")

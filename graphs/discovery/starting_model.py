@@ -30,6 +30,7 @@ from jointscope.graphs.problem.standstill import ADDED_SPRING, SATURATED, slowes
 from jointscope.graphs.refits.loop_validation import judged_by_loop
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY
+from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION
 from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.errors import EffectError, JointscopeError, RecordingError
@@ -42,6 +43,7 @@ from jointscope.robots.recordings.recording import Recording
 BANDS = (30.0, 15.0, 8.0, 4.0)  # [Hz]
 QUIET = 0.3  # of the missing torque: largest part that may be noise of the encoders
 FEWEST_ROWS = 100
+REFUSED = (MIRRORED, FELT_GRAVITY, MISTAKEN_TRANSMISSION)  # kinds of notices beside which nothing can be told
 SHARPER = 1.5  # times the sharpness that the robot file says, from which another one is tried
 
 
@@ -54,8 +56,8 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
         solver: minimises the cost of all samples.
 
     Raises:
-        RecordingError: a gyroscope is of the other hand, or an accelerometer feels another gravity: nothing fits it,
-            and every effect would be judged by how it bends.
+        RecordingError: a gyroscope is of the other hand, an accelerometer feels another gravity, or the transmission
+            is another one: nothing fits it, and every effect would be judged by how it bends.
     """
     for recording in recordings:
         _refuse_mistaken(robot, recording)
@@ -64,10 +66,11 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
 
 def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
     for notice in screen_all(recording, robot):
-        if notice.kind in (MIRRORED, FELT_GRAVITY):
+        if notice.kind in REFUSED:
+            instead = "" if notice.kind == MISTAKEN_TRANSMISSION else f", or leave {notice.stream} out of it"
             raise RecordingError(
-                f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file, or leave "
-                f"{notice.stream} out of it, then search again"
+                f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file{instead}, "
+                "then search again"
             )
 
 

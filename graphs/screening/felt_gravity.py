@@ -24,6 +24,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import RIGHT_FROM_LEFT, Accelerometer, Gyro
+from jointscope.robots.recordings.imu_plausibility import ALL_AXES, axes_matrix
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.units import UNITS, si_factor, si_unit
 
@@ -187,10 +188,8 @@ class Felt:
         for body in self.robot.tree.bodies:
             if body != now.body:
                 yield replace(now, rank=5, body=body)
-        for order in itertools.permutations(range(3)):
-            for signs in itertools.product((1.0, -1.0), repeat=3):
-                axes = np.diag(signs) @ np.eye(3)[list(order)]
-                yield replace(now, rank=6 if np.linalg.det(axes) > 0.0 else 7, axes=axes)
+        for axes in map(axes_matrix, ALL_AXES):
+            yield replace(now, rank=6 if np.linalg.det(axes) > 0.0 else 7, axes=axes)
 
 
 def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis) -> str:

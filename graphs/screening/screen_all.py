@@ -7,13 +7,24 @@ from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY, mistaken_accelerometers
 from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE, mistaken_torque_sensors
+from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION, mistaken_transmission
 from jointscope.graphs.screening.saturated_drives import SATURATION, saturated_drives
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.screening import screen
 
-PLAIN_MISTAKES = ("unit", "axes", MIRRORED, EXCHANGED, SATURATION, JUMP, FELT_GRAVITY, MISTAKEN_TORQUE)
+PLAIN_MISTAKES = (
+    "unit",
+    "axes",
+    MIRRORED,
+    EXCHANGED,
+    SATURATION,
+    JUMP,
+    FELT_GRAVITY,
+    MISTAKEN_TORQUE,
+    MISTAKEN_TRANSMISSION,
+)
 """Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
 
@@ -28,7 +39,11 @@ def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) ->
     Raises:
         RecordingError: as the screening says.
     """
-    odd = [*screen(recording, robot, every_joint), *jump_notices(recording, robot)]
+    odd, transmission = [], mistaken_transmission(recording, robot)
+    if transmission is not None:
+        odd = [Notice("transmission", MISTAKEN_TRANSMISSION, 0, transmission.sentence(robot))]
+        robot = transmission.mended(robot)  # a wrong matrix turns gyros and exceeds limits
+    odd += [*screen(recording, robot, every_joint), *jump_notices(recording, robot)]
     odd += mistaken_accelerometers(recording, robot)
     odd += mistaken_torque_sensors(recording, robot)
     return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]

@@ -157,15 +157,13 @@ def _units_that_explain(ratio: float, declared: str) -> list[tuple[str, float]]:
 def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
     """Looks for the signed permutation of the axes that fits best, if the expected one does not fit."""
     power = float(np.sum(pair.measured**2))
-    left = {
-        axes: float(np.sum((pair.measured - pair.implied @ _axes_matrix(axes).T) ** 2)) / power for axes in _ALL_AXES
-    }
-    expected, best = left[_ALL_AXES[0]], min(left.values())
+    left = {axes: float(np.sum((pair.measured - pair.implied @ axes_matrix(axes).T) ** 2)) / power for axes in ALL_AXES}
+    expected, best = left[ALL_AXES[0]], min(left.values())
     if expected < ODD_FIT or best > expected * (BETTER if expected > BAD_FIT else MUCH_BETTER):
         return []
     # axes without motion fit either way: of the equally good answers take the one closest to the robot file
-    good = [axes for axes in _ALL_AXES if left[axes] < best + 0.02]
-    axes = max(good, key=lambda candidate: float(np.trace(_axes_matrix(candidate))))
+    good = [axes for axes in ALL_AXES if left[axes] < best + 0.02]
+    axes = max(good, key=lambda candidate: float(np.trace(axes_matrix(candidate))))
     wrong = "; ".join(
         f"its {AXES[k]} looks like {'-' if sign < 0 else '+'}{AXES[axis]}"
         for k, (axis, sign) in enumerate(axes)
@@ -175,9 +173,9 @@ def _check_axes(gyro: Gyro, pair: RatePair) -> list[Notice]:
         f"{gyro.name}: the axes seem swapped or flipped against R_imu_body: {wrong}; as it stands "
         f"{100 * expected:.0f} % of the signal do not fit, with those axes {100 * best:.0f} %"
     )
-    mirrored = np.linalg.det(_axes_matrix(axes)) < 0
+    mirrored = np.linalg.det(axes_matrix(axes)) < 0
     if mirrored:
-        text += f"; no rotation does that: {_mirrored(gyro, _axes_matrix(axes))}, or a joint counts backwards"
+        text += f"; no rotation does that: {_mirrored(gyro, axes_matrix(axes))}, or a joint counts backwards"
     return [Notice(gyro.name, MIRRORED if mirrored else "axes", 0, text)]
 
 
@@ -193,7 +191,7 @@ def _mirrored(gyro: Gyro, axes: Array) -> str:
 
 
 Axes = tuple[tuple[int, int], ...]
-_ALL_AXES: list[Axes] = [
+ALL_AXES: list[Axes] = [
     tuple(zip(order, signs, strict=True))
     for order in itertools.permutations(range(3))
     for signs in itertools.product((1, -1), repeat=3)
@@ -201,7 +199,7 @@ _ALL_AXES: list[Axes] = [
 """For each sensor axis the expected axis and sign that it shows; the first entry changes nothing."""
 
 
-def _axes_matrix(axes: Axes) -> Array:
+def axes_matrix(axes: Axes) -> Array:
     """The signed permutation matrix, shape (3, 3)."""
     matrix = np.zeros((3, 3))
     for row, (column, sign) in enumerate(axes):

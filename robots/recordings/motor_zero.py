@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -24,6 +25,7 @@ def with_motor_zero(recording: Recording, robot: Robot) -> Recording:
     motor, link = recording.streams[encoder.name], recording.streams[other.name]
     if not len(motor) or not len(link):
         return recording
-    angles = np.column_stack([np.interp(motor.times, link.times, column) for column in (link.values - other.zero).T])
+    at_links = np.column_stack([np.interp(motor.times, link.times, column) for column in (link.values - other.zero).T])
+    angles = motor_angles(robot, at_links)
     shifted = replace(motor, values=motor.values - np.median(motor.values - angles, axis=0))
     return replace(recording, streams={**recording.streams, encoder.name: shifted})
