@@ -61,8 +61,8 @@ class Mistake:
         much = f"{100.0 * before:.0f} %" if before < 1.0 else "all"
         return (
             f"the transmission matrix seems {self.how}: as it stands the motors' motion leaves {much} of the signal of "
-            f"{self.sensors} unexplained, so {100.0 * after:.0f} %; if that is so, write `transmission: {{matrix: [{rows}]"
-            f"}}`{values} in {robot_argument(robot)} (joint angles = matrix times motor angles)"
+            f"{self.sensors} unexplained, so {100.0 * after:.0f} %; if that is so, write "
+            f"`transmission: {{matrix: [{rows}]}}`{values} in {robot_argument(robot)} (joint angles = matrix times motor angles)"
         )
 
     def is_calibrated(self, robot: Robot) -> bool:
