@@ -62,7 +62,8 @@ class Mistake:
         return (
             f"the transmission matrix seems {self.how}: as it stands the motors' motion leaves {much} of the signal of "
             f"{self.sensors} unexplained, so {100.0 * after:.0f} %; if that is so, write "
-            f"`transmission: {{matrix: [{rows}]}}`{values} in {robot_argument(robot)} (joint angles = matrix times motor angles)"
+            f"`transmission: {{matrix: [{rows}]}}`{values} in {robot_argument(robot)} (joint angles = matrix times "
+            "motor angles)"
         )
 
     def is_calibrated(self, robot: Robot) -> bool:
