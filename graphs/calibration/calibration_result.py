@@ -182,6 +182,7 @@ class CalibrationResult:
             `graphs.problem.step_errors`; None where it was not asked.
         exchanged: sentence about joints that have each other's commands or positions.
         odd_trackers: sentences about targets whose stamps seem to be late or early, or whose tracker moved, by sensor.
+        misdescribed: sentence about a transmission or a drive signal that is another one than the robot file says.
         saturated: sentence about drives that give less than was commanded, which the model takes for what acted.
         rests: what rests in the same estimate say, a `graphs.rests.seen_rests.SeenRests`; None without.
         regressed: parameters of drives as regression on the same recordings has them, where it applies.
@@ -215,6 +216,7 @@ class CalibrationResult:
     torque_readings: tuple[TorqueReading, ...] = ()
     inertia_shifts: Mapping[str, float] | None = None
     exchanged: str = ""
+    misdescribed: str = ""
     saturated: str = ""
     odd_trackers: dict[str, str] = field(default_factory=dict)
     rests: object = None

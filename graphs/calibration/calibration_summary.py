@@ -28,6 +28,8 @@ from jointscope.graphs.noise.noise_estimation import NoiseEvidence
 from jointscope.graphs.noise.robust_sigma import inflation
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED
+from jointscope.graphs.screening.mistaken_hold import MISTAKEN_HOLD
+from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION
 from jointscope.graphs.screening.saturated_drives import SATURATION
 from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution
@@ -155,8 +157,9 @@ def summarize(
     )
     said = {notice.kind: notice.text for notice in reversed(notices)}
     exchanged, saturated = said.get(EXCHANGED, ""), said.get(SATURATION, "")
+    misdescribed = said.get(MISTAKEN_TRANSMISSION, said.get(MISTAKEN_HOLD, ""))
     odd = {n.stream: n.text for n in reversed(notices) if n.kind in (LATE_TRACKER, MOVED_TRACKER)}
-    result = replace(result, exchanged=exchanged, saturated=saturated, odd_trackers=odd)
+    result = replace(result, exchanged=exchanged, saturated=saturated, misdescribed=misdescribed, odd_trackers=odd)
     return replace(result, findings=findings(result, notices))
 
 

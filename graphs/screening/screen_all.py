@@ -6,6 +6,7 @@ from __future__ import annotations
 from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY, mistaken_accelerometers
+from jointscope.graphs.screening.mistaken_hold import MISTAKEN_HOLD, mistaken_hold
 from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE, mistaken_torque_sensors
 from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION, mistaken_transmission
 from jointscope.graphs.screening.saturated_drives import SATURATION, saturated_drives
@@ -24,6 +25,7 @@ PLAIN_MISTAKES = (
     FELT_GRAVITY,
     MISTAKEN_TORQUE,
     MISTAKEN_TRANSMISSION,
+    MISTAKEN_HOLD,
 )
 """Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
@@ -46,4 +48,5 @@ def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) ->
     odd += [*screen(recording, robot, every_joint), *jump_notices(recording, robot)]
     odd += mistaken_accelerometers(recording, robot)
     odd += mistaken_torque_sensors(recording, robot)
+    odd += mistaken_hold(recording, robot)
     return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]

@@ -14,6 +14,7 @@ from jointscope.graphs.scoring.regression.changed_load import ChangedLoad
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.half_a_sample import fitted_half_sample
 
 MOST_READINGS = 4
 RARE = 0.05  # [s] between samples: a drive's controller is ten times as fast, and what it did between them is not known
@@ -24,6 +25,8 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
     found = []
     if result.exchanged:
         found.append(("Each joint with its own commands and positions", _sentence(result.exchanged)))
+    if misdescribed := result.misdescribed or fitted_half_sample(result):
+        found.append(("Transmission and drive signal as the robot file says", _sentence(misdescribed.rstrip("."))))
     if result.saturated:
         found.append(("Drives that give what is commanded", result.saturated))
     if odd := odd_trackers(result):

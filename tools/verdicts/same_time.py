@@ -13,6 +13,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.regression.late_drives import LAG
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.one_step import would_be
+from jointscope.tools.verdicts.half_a_sample import NEAR_STEP, how_to_hold, is_half_a_sample
 
 FAR = 0.02  # share of a value by which a delay that is not in the model may change it
 
@@ -43,6 +44,8 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
         side = "after" if timing.delay > 0.0 and not timing.joint else "before"
         what = f"The {timing.what} {significant(1e3 * delay, 2)} ± {significant(1e3 * sigma, 1)} ms {side} its stamp"
         cure = timing.cure(result.start)
+        if not timing.joint and is_half_a_sample(result, timing.delay, NEAR_STEP):
+            cure = f"about half a sample, {how_to_hold(result)}, then calibrate; if it is not so, {cure}"
     return (
         "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
         f"{what}, with which {would_be(worst.name, worst.value, other, worst.unit)}: {cure}.",
