@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from weakref import ref
+
 from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY, mistaken_accelerometers
@@ -29,9 +32,12 @@ PLAIN_MISTAKES = (
 )
 """Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
+LATEST = 32  # screenings whose notices are kept, for all that ask for the same objects after one another
+_known: deque[tuple[ref[Recording], ref[Robot], list[int], list[Notice]]] = deque(maxlen=LATEST)
+
 
 def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
-    """What `screen` says, encoders on links that jump, joints that are exchanged, and else drives that saturate.
+    """What `screen` says, and all else that looks odd; a recording is screened once for a robot.
 
     Args:
         recording: what was measured.
@@ -41,6 +47,16 @@ def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) ->
     Raises:
         RecordingError: as the screening says.
     """
+    streams = [id(stream) for stream in recording.streams.values()]
+    for recorded, modelled, of_streams, notices in tuple(_known):
+        if recorded() is recording and modelled() is robot and of_streams == streams and not every_joint:
+            return list(notices)
+    notices = _screened(recording, robot, every_joint)
+    _known.append((ref(recording), ref(robot), streams, notices))
+    return list(notices)
+
+
+def _screened(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:
     odd, transmission = [], mistaken_transmission(recording, robot)
     if transmission is not None:
         odd = [Notice("transmission", MISTAKEN_TRANSMISSION, 0, transmission.sentence(robot))]
