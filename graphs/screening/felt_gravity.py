@@ -39,6 +39,8 @@ ODD = 0.35  # of gravity that a right file may leave; more is looked into
 CLEARLY = 3.0  # times less that a mistake must leave to be named
 AS_GOOD = 1.3  # times the least, and
 SHARE = 0.03  # of gravity more: what leaves no more is as good, and the plainest of them is named
+EARTH, ALIKE = 9.81, 0.07  # [m/s^2], share within which a size is its gravity: a bias of half a m/s^2
+ALONG = 0.95  # cosine of the angle within which two vectors have one direction
 FARTHEST = 1.0  # [m] of a lever that counts as 1 m/s^2 of misfit
 
 
@@ -141,7 +143,7 @@ class Felt:
         least = min(left)
         if least > now / CLEARLY:
             return None
-        good = [k for k, x in enumerate(left) if x < AS_GOOD * least + SHARE * size]
+        good = [k for k, x in enumerate(left) if x < AS_GOOD * least + SHARE * EARTH]
         return tried[min(good, key=lambda k: (tried[k].rank, -np.trace(tried[k].axes), k))]
 
     def left(self, hypotheses: list[Hypothesis]) -> list[float]:
@@ -175,6 +177,14 @@ class Felt:
         A = np.vstack([A, np.diag([1.0 / FARTHEST] * 3 + [1.0] * 3)])
         return axes, weights, motion.value, A, np.linalg.pinv(A)
 
+    def _gravity(self, body: str) -> Array:
+        """Gravity in the base frame that explains the readings best, shape (3,) [m/s^2]."""
+        axes, weights, moved, A, projector = self._fit(body)
+        directions = np.vstack([(weights[:, None, None] * axes).reshape(-1, 3), np.zeros((6, 3))])
+        y = np.concatenate([(weights[:, None] * (self.readings - moved)).ravel(), np.zeros(6)])
+        left = directions - A @ (projector @ directions)
+        return np.asarray(np.linalg.lstsq(left, y, rcond=None)[0])
+
     def _tried(self, now: Hypothesis) -> Iterator[Hypothesis]:
         """All that may be otherwise, one at a time."""
         source, size = self.sensor.source, float(np.linalg.norm(now.gravity))
@@ -182,6 +192,8 @@ class Felt:
             if si_unit(unit) == si_unit(source.unit) and unit != source.unit:
                 yield replace(now, rank=1, unit=unit)
         yield replace(now, rank=2, gravity=-now.gravity)
+        if abs(size - EARTH) > ALIKE * EARTH:
+            yield replace(now, rank=2, gravity=now.gravity * EARTH / size)
         yield replace(now, rank=3, axes=-np.eye(3))
         for axis, sign in itertools.product(np.eye(3), (1.0, -1.0)):
             yield replace(now, rank=4, gravity=sign * size * axis)
@@ -190,6 +202,9 @@ class Felt:
                 yield replace(now, rank=5, body=body)
         for axes in map(axes_matrix, ALL_AXES):
             yield replace(now, rank=6 if np.linalg.det(axes) > 0.0 else 7, axes=axes)
+        felt = self._gravity(now.body)
+        if abs(float(np.linalg.norm(felt)) - EARTH) < ALIKE * EARTH:
+            yield replace(now, rank=8, gravity=felt.round(2))
 
 
 def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis) -> str:
@@ -205,12 +220,14 @@ def _sentence(robot: Robot, sensor: Accelerometer, gyro: Gyro, found: Hypothesis
             f"{name} feels gravity as on {found.body}, not as on {gyro.body}; if that is so, write "
             f"`body: {found.body}` in sensors.{gyro.name} of {file}"
         )
-    if found.rank in (2, 4):
+    if not np.array_equal(found.gravity, robot.gravity_at(sensor)):
         vector = ", ".join(f"{x:.12g}" for x in found.gravity + 0.0)
         place = file if sensor.gravity is None else f"sensors.{name} of {file}"
-        kind = "the other way" if found.rank == 2 else "along another axis"
+        along = float(found.gravity @ robot.gravity_at(sensor))
+        turned = abs(along) < ALONG * float(np.linalg.norm(found.gravity) * np.linalg.norm(robot.gravity_at(sensor)))
+        kind = "along another axis" if turned else "the other way" if along < 0.0 else "of another size"
         text = f"{name} feels gravity {kind} than the robot file says: if that is so, write `gravity: [{vector}]` in"
-        return f"{text} {place}" + f"; or {name} reads minus what accelerometers do" * (found.rank == 2)
+        return f"{text} {place}" + f"; or {name} reads minus what accelerometers do" * (kind == "the other way")
     return _axes_sentence(sensor, gyro, found.axes, file)
 
 

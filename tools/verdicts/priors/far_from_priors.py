@@ -16,11 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.found_values import AT_BOUND, NEAR_BOUND
+from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY
+from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.sensors import AXES
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.verdicts.priors.felt_gravity import gravity_instead
 
 NAME = "Values where their priors expect them"
 FAR = (5.0, 10.0)  # [sigma of the prior]: doubtful from the first, bad from the second
@@ -77,10 +78,11 @@ def far_from_priors(result: CalibrationResult) -> tuple[str, str]:
     if not found:
         return level, NONE_FAR
     # what readings at rest say of gravity explains whatever else was bent by it
-    for sensor in result.robot.accelerometers:
-        if said := gravity_instead(result, sensor):
-            own = sorted(found, key=lambda far: not far.name.startswith(f"{sensor.name}.bias."))
-            return level, f"{_listed(own)}: {said}. {_correct(sensor.name, result.start.path.name)}"
+    recordings = [bag.recording for bag in result.bags if bag.recording.streams and result.start.accelerometers]
+    for notice in (notice for recording in recordings for notice in screen_all(recording, result.start)):
+        if notice.kind == FELT_GRAVITY:
+            own = sorted(found, key=lambda far: not far.name.startswith(f"{notice.stream}.bias."))
+            return level, f"{_listed(own)}: {notice.text}."
     first, file = found[0], result.start.path.name
     return level, f"{_listed(found)}: {_likely(result, first)}. {_correct(first.owner, file)}"
 
