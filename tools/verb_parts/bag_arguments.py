@@ -12,11 +12,34 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
-from jointscope.tools.verb_parts.first_look import first_look
-from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, add_holdout_frequency_option
-from jointscope.tools.verb_parts.pose_runs import add_holdout_poses_option, add_poses_option, check_one_kind
-from jointscope.tools.verb_parts.rest_runs import add_holdout_rests_option, add_rests_option, check_rests_alone
+from jointscope.tools.verb_parts.pose_runs import check_one_kind
+from jointscope.tools.verb_parts.rest_runs import check_rests_alone
 from jointscope.tools.verb_parts.user_effects import add_effects_option
+
+KINDS = {
+    "poses": ("TABLE-or-BAG", "poses of the arm at rest with a measured target (docs/poses.md)", "poses"),
+    "rests": (
+        "BAG",
+        "recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
+        "recordings of rests",
+    ),
+    "frequency": (
+        "BAG",
+        "recordings of the arm shaken in one pose each (docs/frequency.md)",
+        "recordings of the arm shaken",
+    ),
+}
+"""Recordings beside motion: what a user gives, what they are, and a word for them."""
+
+
+def add_kind_options(parser: argparse.ArgumentParser, held_out: bool = False) -> None:
+    """Adds an option for each kind of recordings beside motion, and one for those that are held out."""
+    for kind, (metavar, what, word) in KINDS.items():
+        options = {f"--{kind}": what}
+        if held_out:
+            options[f"--holdout-{kind}"] = f"{word} that are scored once per step, but never influence the choice"
+        for option, text in options.items():
+            parser.add_argument(option, nargs="+", type=Path, default=[], metavar=metavar, help=text)
 
 
 def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,12 +56,7 @@ def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
         help="hold out the last part of the only BAG instead, for example 0.33; zeros of encoders and biases of gyros "
         "are fitted again there",
     )
-    add_poses_option(parser)
-    add_holdout_poses_option(parser)
-    add_frequency_option(parser)
-    add_holdout_frequency_option(parser)
-    add_rests_option(parser)
-    add_holdout_rests_option(parser)
+    add_kind_options(parser, held_out=True)
     add_leave_out_option(parser)
     add_effects_option(parser)
 
@@ -82,6 +100,8 @@ def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tup
         RecordingError: a bag cannot be read or cannot be a measurement of this robot, the held-out one is also a
             training recording, or what is to be left out is not there.
     """
+    from jointscope.tools.verb_parts.first_look import first_look
+
     recordings, holdout = _read(args, robot, progress)
     first_look(robot, [*recordings, *([holdout] if holdout is not None else [])])
     return recordings, holdout

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -20,30 +19,6 @@ from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_f
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_report, write_still
 from jointscope.tools.writing.origin import made_from
 from jointscope.tools.writing.whole_file import whole_file, write_json
-
-
-def add_frequency_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --frequency."""
-    parser.add_argument(
-        "--frequency",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="BAG",
-        help="recordings of the arm shaken in one pose each (docs/frequency.md)",
-    )
-
-
-def add_holdout_frequency_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --holdout-frequency."""
-    parser.add_argument(
-        "--holdout-frequency",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="BAG",
-        help="recordings of the arm shaken that are scored once per step, but never influence the choice",
-    )
 
 
 def run_frequency_calibration(

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,30 +17,6 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from
-
-
-def add_poses_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --poses."""
-    parser.add_argument(
-        "--poses",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="TABLE-or-BAG",
-        help="poses of the arm at rest with a measured target (docs/poses.md)",
-    )
-
-
-def add_holdout_poses_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --holdout-poses."""
-    parser.add_argument(
-        "--holdout-poses",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="TABLE-or-BAG",
-        help="poses that are scored once per step, but never influence the choice",
-    )
 
 
 def check_one_kind(

@@ -19,30 +19,6 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from, other_kinds
 
 
-def add_rests_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --rests."""
-    parser.add_argument(
-        "--rests",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="BAG",
-        help="recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
-    )
-
-
-def add_holdout_rests_option(parser: argparse.ArgumentParser) -> None:
-    """Adds --holdout-rests."""
-    parser.add_argument(
-        "--holdout-rests",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="BAG",
-        help="recordings of rests that are scored once per step, but never influence the choice",
-    )
-
-
 def check_rests_alone(args: argparse.Namespace) -> None:
     """Rests are searched alone.
 

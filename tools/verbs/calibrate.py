@@ -15,13 +15,13 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out, recording_arguments
 from jointscope.tools.terminal.progress import Progress, progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
+from jointscope.tools.verb_parts.bag_arguments import add_kind_options
 from jointscope.tools.verb_parts.frequency_runs import (
-    add_frequency_option,
     run_frequency_calibration,
     run_kinds_calibration,
 )
-from jointscope.tools.verb_parts.pose_runs import add_poses_option, check_one_kind, run_pose_calibration, urdf_files
-from jointscope.tools.verb_parts.rest_runs import add_rests_option, run_rest_calibration
+from jointscope.tools.verb_parts.pose_runs import check_one_kind, run_pose_calibration, urdf_files
+from jointscope.tools.verb_parts.rest_runs import run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
 from jointscope.tools.verb_parts.workers import add_spreading_option, check_one_choice, check_workers, workers_of
@@ -67,9 +67,7 @@ def add_parser(subparsers: Any) -> None:
         help="solve stretch after stretch with iSAM2 and print what is known after each; the end is that of the batch",
     )
     add_spreading_option(parser)
-    add_poses_option(parser)
-    add_rests_option(parser)
-    add_frequency_option(parser)
+    add_kind_options(parser)
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry found from poses")
     add_accept_option(parser)
     add_leave_out_option(parser)

@@ -14,9 +14,10 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
-from jointscope.tools.verb_parts.frequency_runs import add_frequency_option, run_frequency_comparison
-from jointscope.tools.verb_parts.pose_runs import add_poses_option, compare_poses
-from jointscope.tools.verb_parts.rest_runs import add_rests_option, compare_rests
+from jointscope.tools.verb_parts.bag_arguments import add_kind_options
+from jointscope.tools.verb_parts.frequency_runs import run_frequency_comparison
+from jointscope.tools.verb_parts.pose_runs import compare_poses
+from jointscope.tools.verb_parts.rest_runs import compare_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
@@ -40,9 +41,7 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_models_and_bag(parser)
-    add_poses_option(parser)
-    add_rests_option(parser)
-    add_frequency_option(parser)
+    add_kind_options(parser)
     add_accept_option(parser)
     add_result_options(parser)
     parser.set_defaults(run=run)

@@ -83,16 +83,6 @@ def unseen_sentences(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -
     return [f"{', '.join(ids)} not testable by {WORDS[kind]}: {why}" for (kind, why), ids in found.items() if ids]
 
 
-def size_sentence(candidate: ArmCandidate) -> str:
-    """The sizes that a linear step gives."""
-    kind = candidate.hypothesis.kind
-    unit = "rad/(N m)" if kind.soft else kind.unit
-    names = [n.replace("stiffness", "compliance") if kind.soft else n for n in candidate.hypothesis.names]
-    sizes = zip(names, candidate.sizes, candidate.sigmas, strict=True)
-    parts = [f"{name} = {significant(value, 3)} +- {significant(sigma, 2)} {unit}" for name, value, sigma in sizes]
-    return f"{candidate.hypothesis.label}: {', '.join(parts)}"
-
-
 def arm_discovery_text(found: ArmDiscovery) -> str:
     """The steps, and what was looked at last."""
     head, rows = step_table(found)
