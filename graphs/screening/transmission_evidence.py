@@ -33,6 +33,7 @@ PERIODS = 3.0  # of the slowest stream, which a window is at least long
 INSTANTS, FEWEST_WINDOWS = 800, 8
 ODD = 0.2  # of what was measured that a right matrix may leave; more is looked into
 REVERSAL = 0.02  # [rad/s] within which dry friction turns over
+MOST_CHANGES = 1000  # of what is zero in a fit
 
 
 def stated_matrix(robot: Robot) -> Array:
@@ -113,7 +114,7 @@ class Told:
             z = z - z.mean(axis=0)
             rows = A.reshape(-1, A.shape[-1])
             scale = np.linalg.norm(rows, axis=0) + 1e-300
-            found = nnls(rows / scale, z.ravel())[0] / scale
+            found = nnls(rows / scale, z.ravel(), maxiter=MOST_CHANGES)[0] / scale
             z = z - A @ found
             for half in range(2):
                 part = np.array_split(np.arange(len(y)), 2)[half]

@@ -42,6 +42,7 @@ Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
 SMALLEST = 1e-12  # damping that is as good as none
+PATIENCE = 4  # refusals in a row: far from the minimum the longest step that lowers the cost may lead astray
 LEAST_FACTOR = 2.0  # by which damping changes at the least
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
@@ -139,7 +140,8 @@ class _Descent:
     """The iterations of one solve; as in `Solution`, `costs` by tick, their damping, whether a step was rejected.
 
     Damping falls by a factor with every step that is taken. In a curved valley the smaller one is refused and the old
-    one taken again and again, while one between them goes much further: after a refusal the factor is its square root.
+    one taken again and again, while one between them goes much further: after some refusals in a row the factor is its
+    square root.
     """
 
     graph: CondensedGraph
@@ -152,6 +154,7 @@ class _Descent:
     flat: bool = False
     rejected: bool = False
     factor: float = LAMBDA_FACTOR
+    refused: int = 0
 
     def run(self, most: int, tolerance: float, measured: int, progress: Progress | None, damping: float) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
@@ -166,7 +169,8 @@ class _Descent:
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
-            self.factor = LAMBDA_FACTOR if accepted <= damping else max(self.factor**0.5, LEAST_FACTOR)
+            self.refused = 0 if accepted <= damping else self.refused + 1
+            self.factor = max(self.factor**0.5, LEAST_FACTOR) if self.refused > PATIENCE else LAMBDA_FACTOR
             damping = _next(accepted, self.factor)
             self.bends.relaxed()
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
