@@ -42,8 +42,6 @@ Progress = Callable[[str, float], None]
 First = Callable[[CondensedGraph, gtsam.Values], gtsam.Values | None]
 
 SMALLEST = 1e-12  # damping that is as good as none
-PATIENCE = 4  # refusals in a row: far from the minimum the longest step that lowers the cost may lead astray
-LEAST_FACTOR = 2.0  # by which damping changes at the least
 STEP_TOLERANCE = 0.1  # [sigma] a shared value whose last step was smaller has arrived: the next is far smaller still
 
 
@@ -137,12 +135,7 @@ def solve(
 
 @dataclass
 class _Descent:
-    """The iterations of one solve; as in `Solution`, `costs` by tick, their damping, whether a step was rejected.
-
-    Damping falls by a factor with every step that is taken. In a curved valley the smaller one is refused and the old
-    one taken again and again, while one between them goes much further: after some refusals in a row the factor is its
-    square root.
-    """
+    """The iterations of one solve; as in `Solution`, `costs` by tick, their damping, whether a step was rejected."""
 
     graph: CondensedGraph
     values: gtsam.Values
@@ -153,8 +146,6 @@ class _Descent:
     converged: bool = False
     flat: bool = False
     rejected: bool = False
-    factor: float = LAMBDA_FACTOR
-    refused: int = 0
 
     def run(self, most: int, tolerance: float, measured: int, progress: Progress | None, damping: float) -> None:
         """Iterates until the step is short, nothing is gained, or `most` linearizations were made."""
@@ -169,18 +160,15 @@ class _Descent:
             self.flat = not self.converged and is_flat(self.iterations, measured)
             if self.converged or self.flat:
                 return
-            self.refused = 0 if accepted <= damping else self.refused + 1
-            self.factor = max(self.factor**0.5, LEAST_FACTOR) if self.refused > PATIENCE else LAMBDA_FACTOR
-            damping = _next(accepted, self.factor)
+            damping = _next(accepted)
             self.bends.relaxed()
         self.flat = bool(self.iterations) and is_crawling(self.iterations, measured)
 
     def _lowered(self, damping: float, tolerance: float, measured: int) -> float | None:
         """Takes a step that lowers the cost; returns its damping, or None where the minimum is reached."""
-        factor = self.factor
         while True:
             step = damped_step(self.graph, self.values, damping, self.bends.values)
-            self.graph.expect(damping_of_states(_next(damping, self.factor)), self.bends.later)
+            self.graph.expect(damping_of_states(_next(damping)), self.bends.later)
             cost, costs = self.graph.cost(step.values), self.graph.costs
             if np.isfinite(cost) and cost <= self.cost * (1.0 + 1e-12):
                 self.iterations.append(Iteration(self.cost, cost, damping, step.in_sigmas))
@@ -195,8 +183,7 @@ class _Descent:
                 # there already: only states at a kink of the friction keep the cost from falling
                 self.converged = True
                 return None
-            damping *= factor
-            factor = LAMBDA_FACTOR  # the small one did not help
+            damping *= LAMBDA_FACTOR
             if damping > LARGEST:
                 self._end_stuck(step.in_sigmas, tolerance)
                 return None
@@ -211,9 +198,9 @@ class _Descent:
         self.converged = True
 
 
-def _next(damping: float, factor: float) -> float:
+def _next(damping: float) -> float:
     """Damping after a step that was accepted."""
-    return max(damping / factor, SMALLEST)
+    return max(damping / LAMBDA_FACTOR, SMALLEST)
 
 
 @dataclass(frozen=True)
