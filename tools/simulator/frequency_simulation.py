@@ -44,7 +44,9 @@ class Shaking:
         f0: distance of the lines [Hz].
         highest: no line is above it [Hz].
         rate: of the samples [Hz].
-        friction: "smooth" or "dry".
+        friction: "smooth" or "dry"; of an arm with a section `frequency`.
+        share: of what drives can give beside the weight, that the largest of the excitation takes; of robots whose
+            file has no section `frequency`.
     """
 
     poses: Sequence[Array] = ()
@@ -55,6 +57,7 @@ class Shaking:
     highest: float = 100.0
     rate: float = 1000.0
     friction: str = "smooth"
+    share: float = 0.4
 
 
 @dataclass(frozen=True)
@@ -103,10 +106,9 @@ def simulate_frequency(
     conditions, shaking = conditions or PoseConditions(), shaking or Shaking()
     if robot.frequency is None:
         raise RobotError(no_frequency(robot))
-    _check(robot, shaking)
+    poses = checked_poses(robot, shaking, seed, session, STEP)
     values = true_values(robot, seed, conditions.values, conditions.perfect)
     effects = pose_effects(conditions.effects, robot.joints)
-    poses = list(shaking.poses) or _drawn_poses(robot, shaking.count, seed, session)
     arms = [ShakenArm(robot, values, effects, np.asarray(pose), shaking.friction) for pose in poses]
     rms = ACCELERATION * np.max([arm.inertias for arm in arms], axis=0)
     dry = np.array([values.get(f"{joint}.coulomb_torque", 0.0) for joint in robot.frequency.joints])
@@ -135,17 +137,36 @@ def _share(told: Callable[[float], None], done: int, of: int, share: float) -> N
     told((done + share) / of)
 
 
-def _check(robot: Robot, shaking: Shaking) -> None:
+def checked_poses(robot: Robot, shaking: Shaking, seed: int, session: str, step: float) -> list[Array]:
+    """The poses in which a robot is shaken, shape (n,) each.
+
+    Args:
+        robot: to be shaken.
+        shaking: how.
+        seed: of the robot.
+        session: of the recordings.
+        step: of the simulator [s].
+
+    Raises:
+        SimulationError: a pose or a number cannot be.
+    """
     wrong = next((pose for pose in shaking.poses if len(pose) != robot.n), None)
     if wrong is not None:
         raise SimulationError(f"a pose of {robot.name} has {robot.n} angles [rad], got {len(wrong)}")
     if min(shaking.count, shaking.realisations, shaking.periods) < 1:
         raise SimulationError("numbers of poses, realisations and periods: expected 1 or more")
-    every = 1.0 / (shaking.rate * STEP)
+    every = 1.0 / (shaking.rate * step)
     if abs(every - round(every)) > 1e-6 or every < 0.5:
-        raise SimulationError(f"rate {shaking.rate:g} Hz: expected {1.0 / STEP:g} Hz over a whole number")
+        raise SimulationError(f"rate {shaking.rate:g} Hz: expected {1.0 / step:g} Hz over a whole number")
+    if not shaking.f0 > 0.0 or abs(shaking.rate / shaking.f0 - round(shaking.rate / shaking.f0)) > 1e-6:
+        raise SimulationError(
+            f"f0 {shaking.f0:g} Hz: expected a period of a whole number of samples of {1e3 / shaking.rate:g} ms"
+        )
+    if shaking.highest < shaking.f0:
+        raise SimulationError(f"lines up to {shaking.highest:g} Hz: the lowest is at f0, {shaking.f0:g} Hz")
     if shaking.highest > 0.45 * shaking.rate:
         raise SimulationError(f"lines up to {shaking.highest:g} Hz need samples at {shaking.highest / 0.45:.4g} Hz")
+    return list(shaking.poses) or _drawn_poses(robot, shaking.count, seed, session)
 
 
 def _drawn_poses(robot: Robot, count: int, seed: int, session: str) -> list[Array]:

@@ -60,15 +60,16 @@ class Multisine:
         spectrum[self.lines] = (sign * self.amplitude[:, None] * np.exp(1j * turned)).T
         return np.asarray(np.fft.irfft(0.5 * count * spectrum, count, axis=0))
 
-    def excitation(self, periods: int, between: float) -> Excitation:
+    def excitation(self, periods: int, between: float, settle: int = 0) -> Excitation:
         """All experiments of one pose one after another, each with both signs.
 
         Args:
             periods: that are kept of each.
             between: from the end of one to the begin of the next [s].
+            settle: periods before those that are kept, which are recorded, too.
         """
         count, n, _ = self.phases.shape
         each = [(r, e, sign) for r in range(count) for e in range(n) for sign in (1, -1)]
-        apart = periods / self.f0 + between
-        rows = tuple(Experiment(*key, start=k * apart, periods=periods) for k, key in enumerate(each))
+        apart = (settle + periods) / self.f0 + between
+        rows = tuple(Experiment(*key, k * apart, settle + periods, settle) for k, key in enumerate(each))
         return Excitation(self.f0, self.lines, rows, CARRIER * self.f0, "the simulator")
