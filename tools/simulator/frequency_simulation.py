@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,13 +16,15 @@ from jointscope.robots.files.frequency_section import no_frequency
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.tools.simulator.arm.arm_bodies import true_values
-from jointscope.tools.simulator.arm.multisine import CARRIER, Multisine
+from jointscope.tools.simulator.arm.multisine import Multisine
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.arm.shaken_arm import STEP, ShakenArm
+from jointscope.tools.simulator.arm.strength import largest_amplitude
 from jointscope.tools.simulator.pose_simulation import PoseConditions
 from jointscope.tools.simulator.world.random_streams import random_stream
 
 Array = NDArray[np.float64]
+SHARE = 0.4  # of what a drive can give beside the weight, that the largest of the excitation takes
 SETTLE = 2  # periods before those that are kept
 BETWEEN = 2.0  # [s] from experiment to experiment, in which nothing is recorded
 SWING = 0.05  # [rad] of the motion that carries the excitation
@@ -45,8 +47,8 @@ class Shaking:
         highest: no line is above it [Hz].
         rate: of the samples [Hz].
         friction: "smooth" or "dry"; of an arm with a section `frequency`.
-        share: of what drives can give beside the weight, that the largest of the excitation takes; of robots whose
-            file has no section `frequency`.
+        share: of what drives can give beside the weight, that the largest of the excitation takes; None: an arm with a
+            section `frequency` is accelerated with 0.7 rad/s^2, others take 0.4.
     """
 
     poses: Sequence[Array] = ()
@@ -57,7 +59,7 @@ class Shaking:
     highest: float = 100.0
     rate: float = 1000.0
     friction: str = "smooth"
-    share: float = 0.4
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -110,11 +112,14 @@ def simulate_frequency(
     values = true_values(robot, seed, conditions.values, conditions.perfect)
     effects = pose_effects(conditions.effects, robot.joints)
     arms = [ShakenArm(robot, values, effects, np.asarray(pose), shaking.friction) for pose in poses]
-    rms = ACCELERATION * np.max([arm.inertias for arm in arms], axis=0)
+    inertias = np.array([arm.inertias for arm in arms])
     dry = np.array([values.get(f"{joint}.coulomb_torque", 0.0) for joint in robot.frequency.joints])
-    multisine = Multisine.drawn(
-        shaking.f0, shaking.highest, np.maximum(rms, OVER_FRICTION * dry), shaking.realisations, seed, session
-    )
+    rms = np.maximum(ACCELERATION * inertias.max(axis=0), OVER_FRICTION * dry)
+    multisine = Multisine.drawn(shaking.f0, shaking.highest, rms, shaking.realisations, seed, session)
+    if shaking.share is not None:
+        left = np.min([arm.left for arm in arms], axis=0)
+        amplitude = largest_amplitude(multisine, shaking.share, left, inertias.min(axis=0))
+        multisine = replace(multisine, amplitude=amplitude)
     excitation = multisine.excitation(shaking.periods, BETWEEN)
     found, told = [], progress or (lambda share: None)
     for k, (arm, pose) in enumerate(zip(arms, poses, strict=True)):
@@ -180,7 +185,7 @@ def _experiments(
     arm: ShakenArm, multisine: Multisine, excitation: Excitation, shaking: Shaking, told: Callable[[float], None]
 ) -> tuple[Array, Array, Array, Array]:
     """Times, angles, torques and commands of all experiments of a pose."""
-    every, speed = round(1.0 / (shaking.rate * STEP)), 2.0 * np.pi * CARRIER * multisine.f0
+    every, speed = round(1.0 / (shaking.rate * STEP)), 2.0 * np.pi * excitation.carrier
     times, angles, torques, commands = [], [], [], []
     for k, e in enumerate(excitation.experiments):
         wave = multisine.torque(e.realisation, e.number, e.sign, 0.5 * STEP)

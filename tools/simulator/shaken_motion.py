@@ -15,19 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.robots.recordings.signals import Excitation
-from jointscope.tools.simulator.arm.multisine import CARRIER, Multisine
-from jointscope.tools.simulator.frequency_simulation import SETTLE, SWING, Shaking, checked_poses
-from jointscope.tools.simulator.loop.shaker import SERVO, HeldPose, Shaker
+from jointscope.tools.simulator.arm.multisine import Multisine
+from jointscope.tools.simulator.arm.strength import largest_amplitude
+from jointscope.tools.simulator.frequency_simulation import SETTLE, SHARE, SWING, Shaking, checked_poses
+from jointscope.tools.simulator.loop.shaker import HeldPose, Shaker
 from jointscope.tools.simulator.occasion import Conditions, Occasion
 from jointscope.tools.simulator.world.engine import TICK
 
 Array = NDArray[np.float64]
-SHARE = 0.4  # of what a drive can give beside the weight, that the largest of the excitation takes
-DISPLACEMENT = 0.02  # [rad or m] rms of a motor, at most: the response is that of the pose
+SLOW = 0.75  # [Hz] of the slow sine, about
 SWING_SHARE = 0.05  # of a joint's range that the slow sine takes, at most
 
 
@@ -85,19 +84,19 @@ def simulate_shaken_motion(
     }
     held = [HeldPose(occasions[name].truth, pose) for name, pose in of_pose.items()]
     multisine = _multisine(held, shaking, seed, session)
-    excitation = multisine.excitation(shaking.periods, 0.0, SETTLE)
+    swing = _swing(occasions["frequency_1"].truth)
+    excitation = multisine.excitation(shaking.periods, 0.0, SETTLE, _carrier(shaking.f0) * int(np.any(swing > 0.0)))
     torque = np.concatenate(
         [
             np.tile(multisine.torque(e.realisation, e.number, e.sign, TICK), (e.periods, 1))
             for e in excitation.experiments
         ]
     )
-    swing, speed = np.minimum(SWING, SWING_SHARE * _range(robot)), 2.0 * np.pi * CARRIER * multisine.f0
     runs: list[ShakenRun] = []
     for (name, pose), still in zip(of_pose.items(), held, strict=True):
         occasion = occasions[name]
         occasion.start = pose
-        controller = Shaker(still, torque, swing, speed, occasion.encoder())
+        controller = Shaker(still, torque, swing, 2.0 * np.pi * excitation.carrier, occasion.encoder())
         trajectory = occasion.run(controller, partial(_share, told, len(runs), len(poses)))
         runs.append(ShakenRun(name, occasion.recording(trajectory, controller.commands), pose))
     truth = occasion.told() | {"session": session, "poses": {run.name: run.pose.tolist() for run in runs}}
@@ -108,24 +107,21 @@ def _share(told: Callable[[float], None], done: int, of: int, share: float) -> N
     told((done + share) / of)
 
 
-def _range(robot: Robot) -> Array:
+def _carrier(f0: float) -> int:
+    """Line of the slow sine: odd, so that what it mixes falls on even lines."""
+    return max(1, 2 * round((SLOW / f0 - 1.0) / 2.0) + 1)
+
+
+def _swing(robot: Robot) -> Array:
+    """Amplitude of the slow sine of each motor [rad or m]: it keeps dry friction from sticking, where there is some."""
     low, high = np.nan_to_num(robot.tree.limits.T, posinf=np.pi, neginf=-np.pi)
-    return np.asarray(np.minimum(high - low, 2.0 * np.pi))
+    dry = np.array([robot.parameter(f"{joint}.coulomb_torque").value > 0.0 for joint in robot.joints])
+    return np.asarray(np.minimum(SWING, SWING_SHARE * (high - low)) * dry)
 
 
 def _multisine(held: list[HeldPose], shaking: Shaking, seed: int, session: str) -> Multisine:
     """As large as the drives give and the response stays that of the pose, in all poses the same."""
-    n = len(held[0].inertia)
-    unit = Multisine.drawn(shaking.f0, shaking.highest, np.ones(n), shaking.realisations, seed, session)
-    numbers = range(n)
-    peaks = np.max(
-        [np.abs(unit.torque(r, e, 1, TICK)).max(axis=0) for r in range(shaking.realisations) for e in numbers], axis=0
-    )
-    w = 2.0 * np.pi * shaking.f0 * unit.lines
-    moves = unit.amplitude * np.sqrt(0.5 * np.sum((SERVO**2 + w**2) ** -2.0))  # of unit inertia, under the controller
-    of_drives = shaking.share * np.min([one.left for one in held], axis=0) / peaks
-    of_motion = DISPLACEMENT * np.min([one.inertia for one in held], axis=0) / moves
-    rms = np.minimum(of_drives, of_motion)
-    if not np.all(rms > 0.0):
-        raise SimulationError("the share of the drives that shakes: expected more than 0 and less than 1")
-    return replace(unit, amplitude=unit.amplitude * rms)
+    left, inertia = (np.min([getattr(one, part) for one in held], axis=0) for part in ("left", "inertia"))
+    unit = Multisine.drawn(shaking.f0, shaking.highest, np.ones(len(left)), shaking.realisations, seed, session)
+    share = SHARE if shaking.share is None else shaking.share
+    return replace(unit, amplitude=largest_amplitude(unit, share, left, inertia))

@@ -73,6 +73,18 @@ def test_a_file_in_place_of_a_folder_and_poses_that_are_none_are_refused(tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_robot_that_does_not_say_what_is_shaken_is_refused(tmp_path, capsys):
-    assert main(["simulate", "doggy", "--kind", "frequency", "-o", str(tmp_path / "arm")]) == 1
-    assert "has no section `frequency`" in capsys.readouterr().err
+def test_a_robot_that_cannot_be_shaken_is_refused_with_what_to_do(tmp_path, capsys):
+    out = ["--kind", "frequency", "-o", str(tmp_path / "arm")]
+    heavy = ["--pose", "0,1.5,0"]
+    for robot, more, text in (
+        ("doggy", ["--share", "1.5"], "share 1.5 of the drives: expected more than 0 and less than 1"),
+        ("doggy", ["--f0", "0.7"], "f0 0.7 Hz: expected a period of a whole number of samples of 1 ms"),
+        ("doggy", ["--f0", "200"], "lines up to 100 Hz: the lowest is at f0, 200 Hz"),
+        ("doggy", ["--pose", "0,1"], "a pose of doggy has 3 angles"),
+        (_with_weak_drives(tmp_path), heavy, "gives 20 N m, and needs 1470 N m to hold the pose [0.0, 1.5, 0.0]; name another --pose"),
+        (_without_springs(tmp_path), [], "has neither `command` and `sensors` nor a drive with a stiffness; add"),
+    ):
+        assert main(["simulate", str(robot), *out, *more]) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and text in error
+    assert not (tmp_path / "arm").exists()

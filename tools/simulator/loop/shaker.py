@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.simulator.loop.controller import drive_gains, full_command
+from jointscope.tools.simulator.arm.strength import SERVO
+from jointscope.tools.simulator.loop.controller import drive_gains, effort_limits, full_command
 from jointscope.tools.simulator.loop.online_encoder import OnlineEncoder
 from jointscope.tools.simulator.world.engine import TICK
 from jointscope.tools.simulator.world.specification import transmission
 from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
-SERVO = 2.0 * np.pi * 2.0  # [rad/s] of the position controller
 DIFFERENCE = 20  # ticks between the angles of which a speed is made
 
 
@@ -36,7 +36,7 @@ class HeldPose:
         motors: angles of the motors there, shape (n,).
         inertia: what each motor moves with the others standing, shape (n,) [kg m2 or kg].
         weight: torques that hold it, shape (n,) [N m or N].
-        most: torques that the drives can give, shape (n,).
+        most: torques that the drives can give, shape (n,); infinite where the URDF does not say.
         gains: torque per unit of the command, shape (n,).
     """
 
@@ -48,7 +48,8 @@ class HeldPose:
         self.inertia = np.diagonal(T.T @ robot.tree.mass_matrix(pose[None])[0] @ T) + rotors
         self.weight = T.T @ robot.tree.torque(pose[None], still, still)[0]
         self.gains = np.abs(drive_gains(robot))
-        self.most = full_command(robot) * self.gains
+        by_volts = robot.command.unit in ("duty", "V")
+        self.most = full_command(robot) * self.gains if by_volts else effort_limits(robot)
         short = next((i for i in range(robot.n) if abs(self.weight[i]) >= self.most[i]), None)
         if short is not None:
             raise SimulationError(

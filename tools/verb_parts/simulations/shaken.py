@@ -41,10 +41,9 @@ def add_shaking_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--share",
         type=float,
-        default=0.4,
         metavar="P",
-        help="of what each drive can give beside the weight, that shakes at most; without a section frequency; "
-        "default 0.4",
+        help="of what each drive can give beside the weight, that shakes at most; default 0.4, and with a section "
+        "frequency 0.7 rad/s^2",
     )
 
 
@@ -54,12 +53,10 @@ def simulate_shaken(robot: Robot, args: argparse.Namespace, truth_file: Path) ->
     Raises:
         SimulationError: a file in place of a folder, or a pose that is none.
     """
-    from jointscope.tools.simulator.frequency_simulation import Shaking
+    from jointscope.tools.simulator.frequency_simulation import SHARE, Shaking
 
     if args.output.suffix:
         raise SimulationError(f"{args.output}: a bag of each pose goes into a folder; expected a name without ending")
-    if not 0.0 < args.share < 1.0:
-        raise SimulationError(f"--share {args.share:g}: expected more than 0 and less than 1")
     own = robot.frequency is not None or not robot.motion
     shaking = Shaking(
         poses=[_pose(text) for text in args.pose],
@@ -69,7 +66,7 @@ def simulate_shaken(robot: Robot, args: argparse.Namespace, truth_file: Path) ->
         f0=F0[own] if args.f0 is None else args.f0,
         highest=args.highest,
         friction=args.friction,
-        share=args.share,
+        share=SHARE if args.share is None and robot.frequency is None else args.share,
     )
     bags, lines, truth, hint = (_arm if own else _of_motion)(robot, args, shaking)
     write_json(truth_file, truth)
