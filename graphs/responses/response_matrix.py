@@ -133,7 +133,7 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
         total += part.reshape(total.shape) / R**2
     sizes = _sizes(inverses, ny)
     across = sizes[:, :, None] * sizes[:, None, :]
-    return over_neighbours(total / across) * across
+    return np.asarray(over_neighbours(np.asarray(total / across, dtype=complex)) * across)
 
 
 def over_neighbours(covariance: Complex, each_side: int = NEIGHBOURS) -> Complex:

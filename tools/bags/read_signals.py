@@ -16,7 +16,12 @@ import numpy as np
 from jointscope.graphs.responses.find_excitation import find_excitation
 from jointscope.graphs.responses.settled_periods import settled
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.excitation_file import Connections, excitation_beside, read_connections, read_excitation
+from jointscope.robots.recordings.excitation_file import (
+    Connections,
+    excitation_beside,
+    read_connections,
+    read_excitation,
+)
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.fitting_messages import read_columns

@@ -19,7 +19,7 @@ from jointscope.tools.simulator.arm.arm_bodies import true_values
 from jointscope.tools.simulator.arm.multisine import Multisine
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.arm.shaken_arm import STEP, ShakenArm
-from jointscope.tools.simulator.arm.strength import largest_amplitude
+from jointscope.tools.simulator.arm.strength import OVER_FRICTION, largest_amplitude
 from jointscope.tools.simulator.pose_simulation import PoseConditions
 from jointscope.tools.simulator.world.random_streams import random_stream
 
@@ -29,7 +29,6 @@ SETTLE = 2  # periods before those that are kept
 BETWEEN = 2.0  # [s] from experiment to experiment, in which nothing is recorded
 SWING = 0.05  # [rad] of the motion that carries the excitation
 ACCELERATION = 0.7  # [rad/s^2] rms with which a motor is shaken
-OVER_FRICTION = 2.0  # rms of the excitation over dry friction, at least
 REACH = 0.5  # share of each joint's range that poses fill
 ENCODER, TORQUE = 1e-6, 0.05  # [rad], [N m] noise of each sample
 
@@ -118,7 +117,7 @@ def simulate_frequency(
     multisine = Multisine.drawn(shaking.f0, shaking.highest, rms, shaking.realisations, seed, session)
     if shaking.share is not None:
         left = np.min([arm.left for arm in arms], axis=0)
-        amplitude = largest_amplitude(multisine, shaking.share, left, inertias.min(axis=0))
+        amplitude = largest_amplitude(multisine, shaking.share, left, inertias.min(axis=0), dry)
         multisine = replace(multisine, amplitude=amplitude)
     excitation = multisine.excitation(shaking.periods, BETWEEN)
     found, told = [], progress or (lambda share: None)

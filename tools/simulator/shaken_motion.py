@@ -124,4 +124,4 @@ def _multisine(held: list[HeldPose], shaking: Shaking, seed: int, session: str) 
     left, inertia = (np.min([getattr(one, part) for one in held], axis=0) for part in ("left", "inertia"))
     unit = Multisine.drawn(shaking.f0, shaking.highest, np.ones(len(left)), shaking.realisations, seed, session)
     share = SHARE if shaking.share is None else shaking.share
-    return replace(unit, amplitude=largest_amplitude(unit, share, left, inertia))
+    return replace(unit, amplitude=largest_amplitude(unit, share, left, inertia, held[0].dry))

@@ -18,8 +18,8 @@ from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect
-from jointscope.tools.simulator.arm.strength import SERVO
 from jointscope.tools.simulator.loop.controller import effort_limits
+from jointscope.tools.simulator.loop.shaker import SERVO
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.specification import (
     add_dry_friction,
@@ -103,7 +103,9 @@ class ShakenArm:
         left = effort_limits(self._robot)[places] - np.abs(self._at_rest())
         if np.any(left <= 0.0):
             joint = self.joints[int(np.argmin(left))]
-            raise SimulationError(f"{joint} of {self._robot.name} cannot hold its weight in a pose; name another --pose")
+            raise SimulationError(
+                f"{joint} of {self._robot.name} cannot hold the weight in a pose; name another --pose"
+            )
         return left
 
     def shaken(self, torque: Array, swing: float, speed: float, settle: int, periods: int, every: int) -> Array:

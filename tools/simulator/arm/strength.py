@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.tools.simulator.arm.multisine import Multisine
+from jointscope.tools.simulator.loop.shaker import SERVO
 
 Array = NDArray[np.float64]
-SERVO = 2.0 * np.pi * 2.0  # [rad/s] of the position controller, critically damped
+OVER_FRICTION = 2.0  # rms of the excitation over dry friction, at least
 DISPLACEMENT = 0.02  # [rad or m] rms of a motor, at most: the response is that of the pose
 
 
-def largest_amplitude(unit: Multisine, share: float, left: Array, inertia: Array) -> Array:
+def largest_amplitude(unit: Multisine, share: float, left: Array, inertia: Array, dry: Array) -> Array:
     """Amplitude of each line of each input, shape (n,) [N m or N].
 
     Args:
@@ -22,6 +23,7 @@ def largest_amplitude(unit: Multisine, share: float, left: Array, inertia: Array
         share: of what is left to a drive that the largest of its multisine takes.
         left: torque of each drive beside the weight, shape (n,); infinite where it is not known.
         inertia: that each motor moves, shape (n,).
+        dry: friction of each motor, shape (n,) [N m or N], which its excitation exceeds even if it moves farther then.
 
     Raises:
         SimulationError: a share that is none.
@@ -35,4 +37,5 @@ def largest_amplitude(unit: Multisine, share: float, left: Array, inertia: Array
     peaks = np.max(np.abs(waves), axis=(0, 1)) / unit.amplitude
     w = 2.0 * np.pi * unit.f0 * unit.lines
     moves = np.sqrt(0.5 * np.sum((SERVO**2 + w**2) ** -2.0)) / inertia  # rms under the controller, of amplitude one
-    return np.asarray(np.minimum(share * left / peaks, DISPLACEMENT / moves))
+    over_friction = OVER_FRICTION * dry * np.sqrt(2.0 / len(unit.lines))
+    return np.asarray(np.minimum(share * left / peaks, np.maximum(DISPLACEMENT / moves, over_friction)))

@@ -54,8 +54,8 @@ def with_usual_drives(robot: Robot) -> tuple[Robot, str]:
     shaken = replace(robot, frequency=setup, parameters={**robot.parameters, **added})
     first = f"{joints[0]}.{INERTIA}"
     said = (
-        f"\n  {robot.path.name} does not say how heavy rotors are and how strong dampers: they are made up, and stand in "
-        f"the truth; --set {first}={shaken.parameter(first).value:.3g} sets one"
+        f"\n  {robot.path.name} does not say how heavy rotors are and how strong dampers: they are made up, and stand "
+        f"in the truth; --set {first}={shaken.parameter(first).value:.3g} sets one"
         "\n  `calibrate --frequency` needs them and a section `frequency` in the robot file, as `jointscope robots "
         "tx90l` has"
     )

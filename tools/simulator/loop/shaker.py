@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.simulator.arm.strength import SERVO
 from jointscope.tools.simulator.loop.controller import drive_gains, effort_limits, full_command
 from jointscope.tools.simulator.loop.online_encoder import OnlineEncoder
 from jointscope.tools.simulator.world.engine import TICK
@@ -22,6 +21,7 @@ from jointscope.tools.simulator.world.specification import transmission
 from jointscope.tools.simulator.world.trajectory import Trajectory
 
 Array = NDArray[np.float64]
+SERVO = 2.0 * np.pi * 2.0  # [rad/s] of the position controller, critically damped
 DIFFERENCE = 20  # ticks between the angles of which a speed is made
 
 
@@ -37,12 +37,14 @@ class HeldPose:
         inertia: what each motor moves with the others standing, shape (n,) [kg m2 or kg].
         weight: torques that hold it, shape (n,) [N m or N].
         most: torques that the drives can give, shape (n,); infinite where the URDF does not say.
+        dry: friction of each, shape (n,) [N m or N].
         gains: torque per unit of the command, shape (n,).
     """
 
     def __init__(self, robot: Robot, pose: Array):
         T = transmission(robot)
         rotors = np.array([robot.drive_parameter(joint, "inertia").value for joint in robot.joints])
+        self.dry = np.array([robot.parameter(f"{joint}.coulomb_torque").value for joint in robot.joints])
         still = np.zeros((1, robot.n))
         self.motors = np.linalg.solve(T, pose)
         self.inertia = np.diagonal(T.T @ robot.tree.mass_matrix(pose[None])[0] @ T) + rotors

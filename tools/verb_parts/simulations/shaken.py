@@ -27,7 +27,7 @@ def add_shaking_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="Q1,Q2,...",
-        help="positions of all joints [rad], [m] of a pose in which the robot is shaken; may be repeated; default: drawn",
+        help="positions of all joints of a pose in which the robot is shaken [rad]; may be repeated; default: drawn",
     )
     group.add_argument("--realisations", type=int, default=2, metavar="N", help="sets of random phases; default 2")
     group.add_argument("--periods", type=int, default=2, metavar="N", help="that are kept of each; default 2")
@@ -99,7 +99,12 @@ def _arm(robot: Robot, args: argparse.Namespace, shaking: Any) -> Written:
         )
     said = _said(multisine, truth["poses"], "N m")
     recordings = [(r.name, r.signals, r.command) for r in found]
-    return write_shaken(args.output, shaken, recordings, found[0].excitation, said), len(multisine.lines), truth, made_up
+    return (
+        write_shaken(args.output, shaken, recordings, found[0].excitation, said),
+        len(multisine.lines),
+        truth,
+        made_up,
+    )
 
 
 def _of_motion(robot: Robot, args: argparse.Namespace, shaking: Any) -> Written:
