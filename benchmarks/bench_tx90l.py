@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways | systems] [--json FILE] [--folder DIR] [--table]
+Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways | systems] [--json FILE] [--folder DIR]
+[--table]
 
 With `kinds` poses and frequency responses in one graph, with `search` what is found with both, with `coverage` how
-often sigmas hold the truth, with `ways` the same recordings in three ways, with `systems` response matrices of a
-motor bench and a mirror, in sections of their own; an interrupted search goes on where it stopped. Recordings that another program simulated lie in ../shared/data; arms with effects are
-simulated by MuJoCo.
+often sigmas hold the truth, with `ways` the same recordings in three ways, with `systems` response matrices of a motor
+bench and a mirror, in sections of their own; an interrupted search goes on where it stopped. Recordings that another
+program simulated lie in ../shared/data; arms with effects are simulated by MuJoCo.
 """
 
 from __future__ import annotations

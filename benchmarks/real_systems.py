@@ -50,9 +50,8 @@ def bench_rows(tell: Tell) -> dict[str, Any]:
     tell("| motor bench | anti-resonance, motor side | resonance, motor side | load side |\n| --- | --- | --- | --- |")
     for found in (A, B):
         roots = {(r.output, r.anti): f"{r.frequency:.2f} ± {r.frequency_sigma:.2f} Hz" for r in found.resonances}
-        tell(
-            f"| {found.spectra.path} | {' | '.join(roots.get(key, '-') for key in ((0, True), (0, False), (1, False)))} |"
-        )
+        cells = [roots.get(key, "-") for key in ((0, True), (0, False), (1, False))]
+        tell(f"| {found.spectra.path} | {' | '.join(cells)} |")
     d = B.distortions
     assert d is not None
     levels = [d.noise, d.even, d.odd]
@@ -69,9 +68,9 @@ def bench_rows(tell: Tell) -> dict[str, Any]:
     floor = float(np.linalg.norm(B.matrix.sigmas(B.matrix.total)[:, :, 0]) / np.linalg.norm(own))
     miss = {way: float(np.linalg.norm(G - own) / np.linalg.norm(own)) for way, G in ways.items()}
     tell(
-        f"A predicts the angles of B to {100.0 * miss['model of two masses']:.1f} % (one model of two masses, fitted to "
-        f"A with chi-square {misfit:.1f} per equation) and {100.0 * miss['matrix of A']:.1f} % (the matrix of A itself); "
-        f"B is known to {100.0 * floor:.1f} %.\n"
+        f"A predicts the angles of B to {100.0 * miss['model of two masses']:.1f} % (one model of two masses, fitted "
+        f"to A with chi-square {misfit:.1f} per equation) and {100.0 * miss['matrix of A']:.1f} % (the matrix of A "
+        f"itself); B is known to {100.0 * floor:.1f} %.\n"
     )
     return {"levels_mrad_s": sizes, "misfit": misfit, "miss": miss, "floor": floor, "values": x.tolist()}
 
@@ -133,8 +132,8 @@ def mirror_row(size: str, tell: Tell) -> dict[str, Any]:
     miss = 100.0 * float(np.linalg.norm(np.einsum("lij,ljr->lir", matrix.G, U) - Y) / np.linalg.norm(Y))
     linear, nonlinear = PUBLISHED[size]
     tell(
-        f"Mirror, {size.replace('mV', ' mV')}: {len(excitation.lines)} lines, {len(excitation.experiments)} experiments; "
-        f"entries differ by {periods.min():.1f} to {periods.max():.1f} % between periods (median "
+        f"Mirror, {size.replace('mV', ' mV')}: {len(excitation.lines)} lines, {len(excitation.experiments)} experiments"
+        f"; entries differ by {periods.min():.1f} to {periods.max():.1f} % between periods (median "
         f"{np.median(periods):.1f} %) and {blocks.min():.0f} to {blocks.max():.0f} % between blocks; the response "
         f"predicts the test part to {miss:.1f} % (published: linear {linear:.1f}, nonlinear {nonlinear:.1f} %)."
     )
