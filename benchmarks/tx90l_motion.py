@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shaken TX90L as motion in the time domain: the first seconds of a pose, with rigid bearings and with soft ones."""
+"""The shaken TX90L as motion in the time domain: the first seconds of a pose, with bearings rigid or soft."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -47,7 +49,8 @@ def motion_row(robot: Robot, bag: Path, seconds: float) -> tuple[dict[str, float
     with tempfile.TemporaryDirectory() as folder:
         rigid, soft = Path(folder) / "rigid.yaml", Path(folder) / "soft.yaml"
         rigid.write_text(HEAD.format(urdf=robot.tree.urdf) + _parameters(robot), encoding="utf-8")
-        main(["add", str(rigid), *SOFT, "-o", str(soft)])
+        with contextlib.redirect_stdout(io.StringIO()):
+            main(["add", str(rigid), *SOFT, "-o", str(soft)])
         arm = load_robot(rigid)
         values = calibrate(arm, [_first(read_recording(bag, arm), seconds)]).robot.parameters
         arm = _as_table(load_robot(soft), robot)

@@ -25,7 +25,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
 Tell = Callable[[str], None]
-SECONDS = 8.0  # of a pose as motion
+SECONDS = 2.0  # of a pose as motion
 STEP = 1e-3  # [s] from sample to sample of the bags
 
 
