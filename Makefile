@@ -76,6 +76,7 @@ bench-tx90l: $(VENV)/sim $(VENV)/code
 	$(BIN)/python benchmarks/bench_tx90l.py search
 	$(BIN)/python benchmarks/bench_tx90l.py coverage
 	$(BIN)/python benchmarks/bench_tx90l.py ways
+	$(BIN)/python benchmarks/bench_tx90l.py systems
 
 bench-biorob: $(VENV)/code
 	$(BIN)/python benchmarks/bench_biorob.py

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of calibrations from poses and frequency responses beside what is measured.
 
-Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways] [--json FILE] [--folder DIR] [--table]
+Usage: python benchmarks/bench_tx90l.py [kinds | search | coverage | ways | systems] [--json FILE] [--folder DIR]
+[--table]
 
 With `kinds` poses and frequency responses in one graph, with `search` what is found with both, with `coverage` how
-often sigmas hold the truth, with `ways` the same recordings in three ways, in sections of their own; an interrupted
-search goes on where it stopped. Recordings that another program simulated lie in ../shared/data; arms with effects are
-simulated by MuJoCo.
+often sigmas hold the truth, with `ways` the same recordings in three ways, with `systems` response matrices of a motor
+bench and a mirror, in sections of their own; an interrupted search goes on where it stopped. Recordings that another
+program simulated lie in ../shared/data; arms with effects are simulated by MuJoCo.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from measured_page import environment, write_section
+from real_systems import system_rows
 from tx90l_coverage import coverage_rows
 from tx90l_frequency import frequency_rows
 from tx90l_kinds import kinds_rows
@@ -100,12 +102,14 @@ PARTS: dict[str, Callable[[Robot, argparse.Namespace], dict[str, Any]]] = {
     "kinds": lambda robot, _: kinds_rows(robot, DATA, _tell),
     "search": lambda robot, given: search_rows(robot, given.folder, _tell, not given.table),
     "ways": lambda robot, _: ways_rows(robot, DATA, _tell),
+    "systems": lambda robot, _: system_rows(_tell),
     "coverage": lambda robot, given: coverage_rows(robot, given.folder, _tell, not given.table),
 }
 TITLES = {
     "kinds": "Poses and frequency responses in one graph",
     "search": "Poses and frequency responses together: what is missing",
     "ways": "Frequency responses in three ways",
+    "systems": "Response matrices of real systems",
     "coverage": "Frequency responses alone: twenty arms",
 }
 

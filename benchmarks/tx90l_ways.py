@@ -2,7 +2,8 @@
 """Drives and bearings of a TX90L simulated elsewhere, from the same recordings in three ways.
 
 The logarithm of the response matrix (Neubauer et al. 2015, eq. 27), the torque balance line by line, which is the
-default, and motion in the time domain, for which the fastest mode of the arm is told beside the sampling of the bags.
+default, and motion in the time domain, with rigid bearings and with soft ones; the fastest mode of the arm is told
+beside the sampling of the bags.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tx90l_motion import motion_row
 
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.frequency.settled_stages import logarithm_begin
@@ -23,6 +25,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.at_poses.read_shaken import read_shaken
 
 Tell = Callable[[str], None]
+SECONDS = 2.0  # of a pose as motion
 STEP = 1e-3  # [s] from sample to sample of the bags
 
 
@@ -56,6 +59,14 @@ def ways_rows(robot: Robot, data: Path, tell: Tell) -> dict[str, Any]:
         groups = [_largest(error, ".stiffness"), _largest(error, "bearing.stiffness"), _largest(error, ".damping")]
         tell(f"| {way} | {' | '.join(f'{100.0 * each:.2f} %' for each in groups)} |")
         found[way] = groups
+    values, ends = motion_row(robot, data / "frequency" / "frequency_P1", SECONDS)
+    found["motion"] = [
+        max(abs(values[f"joint{j}.{part}"] / truth[f"joint{j}.{part}"] - 1.0) for j in (1, 2, 3))
+        for part in ("stiffness", "damping")
+    ]
+    drives, dampers = (f"{100.0 * each:.2f} %" for each in found["motion"])
+    tell(f"| motion, {SECONDS:g} s of one pose, bearings rigid | {drives} | not in the model | {dampers} |")
+    tell(f"\nMotion with `bearing_flexibility` at three joints, from Table 1, {ends}.")
     arm, values = FlexibleArm(robot), {n: p.value for n, p in robot.parameters.items()} | truth
     fastest = max(_fastest(arm, pose.pose.q, values) for pose in problems)
     turn = 2.0 * np.pi * fastest * STEP

@@ -46,7 +46,7 @@ class MeasuredResponse:
         else:
             found = spectra(signals, excitation)
             matrix = response_matrix(found)
-        peaks = resonances(matrix.frequencies, matrix.G, matrix.sigmas(matrix.total))
+        peaks = resonances(matrix.frequencies, matrix.G, matrix.sigmas(matrix.total), signals.inputs.step)
         odd = None if excitation is None else distortions(found, matrix)
         return MeasuredResponse(found, matrix, odd, tuple(peaks))
 

@@ -75,18 +75,30 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
     G = each.mean(axis=0)
     noise = None if found.periods < 2 else _noise(found, G, inverses)
     R = len(each)
+    sizes = _sizes(inverses, len(found.outputs))
     if R > 1:
         miss = (each - G).reshape(R, len(lines), -1)
+        if R < MANY:
+            miss = miss / sizes
         total = np.einsum("rla,rlb->lab", miss, miss.conj()) / ((R - 1) * R)
         if R < MANY:
-            total = over_neighbours(total)
+            total = over_neighbours(total) * sizes[:, :, None] * sizes[:, None, :]
         text = f"the scatter of {R} realisations" + (f", {2 * NEIGHBOURS + 1} lines together" if R < MANY else "")
     else:
-        total = _about_neighbours(G)
+        total = _about_neighbours(G, sizes)
         text = "the scatter of neighbouring lines, as there is one realisation; record others with other random phases"
     return ResponseMatrix(
         found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text
     )
+
+
+def _sizes(inverses: list[Complex], ny: int) -> Array:
+    """How far each entry moves with what is left of an output, shape (l, ny nu).
+
+    What is left changes little from line to line, inputs may: a controller takes most of a slow excitation away.
+    """
+    by_input = np.sqrt(np.mean([np.sum(np.abs(inverse) ** 2, axis=1) for inverse in inverses], axis=0))
+    return np.asarray(np.tile(by_input, (1, ny)))
 
 
 def _check_blocks(found: Spectra, U: Complex) -> None:
@@ -119,7 +131,9 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
         by_output = np.einsum("epli,eplj->elij", E[block], E[block].conj()) / ((P - 1) * P)
         part = np.einsum("elij,lea,leb->liajb", by_output, inverse, inverse.conj())
         total += part.reshape(total.shape) / R**2
-    return over_neighbours(total)
+    sizes = _sizes(inverses, ny)
+    across = sizes[:, :, None] * sizes[:, None, :]
+    return np.asarray(over_neighbours(np.asarray(total / across, dtype=complex)) * across)
 
 
 def over_neighbours(covariance: Complex, each_side: int = NEIGHBOURS) -> Complex:
@@ -139,11 +153,11 @@ def _window(lines: int, each_side: int) -> tuple[NDArray[np.intp], NDArray[np.in
     return np.maximum(np.arange(lines) - each_side, 0), np.minimum(np.arange(lines) + each_side + 1, lines)
 
 
-def _about_neighbours(G: Complex) -> Complex:
+def _about_neighbours(G: Complex, sizes: Array) -> Complex:
     """Covariance of G by its scatter about fractions (b0 + b1 d + b2 d^2) / (1 + a d) through neighbouring lines d.
 
     A fraction follows a resonance between two lines, which a polynomial does not (local rational method, McKelvey and
-    Guerin, 2012).
+    Guerin, 2012). What is left of an entry is as large as its `sizes`, shape (l, ny nu), say.
     """
     n, width = len(G), 2 * NEIGHBOURS + 1
     if n < width:
@@ -157,9 +171,10 @@ def _about_neighbours(G: Complex) -> Complex:
     for k in range(n):
         first = min(max(k - NEIGHBOURS, 0), n - width)
         left = np.empty((width, flat.shape[1]), dtype=complex)
+        near = sizes[first : first + width]
         for c, g in enumerate(flat[first : first + width].T):
             A = np.column_stack([powers, -g * d])
-            x = np.linalg.lstsq(A, g, rcond=None)[0]
-            left[:, c] = (g - A @ x) / (1.0 + x[3] * d)
-        found[k] = left.T @ left.conj() / (width - 4)
+            x = np.linalg.lstsq(A / near[:, c : c + 1], g / near[:, c], rcond=None)[0]
+            left[:, c] = (g - A @ x) / (1.0 + x[3] * d) / near[:, c]
+        found[k] = left.T @ left.conj() / (width - 4) * np.outer(sizes[k], sizes[k])
     return found

@@ -3,7 +3,8 @@
 
 X(k) = 1/N sum_n x(n) exp(-2 pi j k n / N) of each period; a cosine of amplitude a has |X| = a / 2. Two experiments that
 differ in the sign of the excitation count as one, half their difference: what does not change its sign with the
-excitation (gravity, a motion that carries it, even distortion) is not in it.
+excitation (gravity, a motion that carries it, even distortion) is not in it. Of values that are held until the next one
+the spectrum is that of the steps, which is later by half a sample and smaller.
 """
 
 from __future__ import annotations
@@ -116,7 +117,9 @@ def steady_spectra(
         x = x if change is None else change(x)
         X = np.fft.rfft(x, axis=1) / x.shape[1]
         late = np.exp(-2j * np.pi * excitation.f0 * np.arange(X.shape[1]) * (first - begin))  # phases as of its start
-        found[e.realisation, e.number][e.sign] = X * late[None, :, None]
+        turns = np.arange(X.shape[1]) / N  # of each line from one sample to the next
+        steps = np.sinc(turns) * np.exp(-1j * np.pi * turns) if signal.held else 1.0
+        found[e.realisation, e.number][e.sign] = X * (late * steps)[None, :, None]
     pairs = list(found.values())
     if len(pairs[0]) == 1:
         return np.array([sign * X for pair in pairs for sign, X in pair.items()]), None

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +18,45 @@ from jointscope.robots.yaml_section import Section
 FILE = "excitation.yaml"
 
 
+@dataclass(frozen=True)
+class Connections:
+    """What a description says of the signals.
+
+    Attributes:
+        inputs, outputs: TOPIC:FIELD or TOPIC:FIELD:NAME,NAME; empty where it does not say.
+        held: whether inputs act until the next one, as commands do.
+    """
+
+    inputs: str = ""
+    outputs: str = ""
+    held: bool = False
+
+
 def excitation_beside(bag: Path) -> Path | None:
     """The file that stands in the folder of a bag, or in the one above; None where there is none."""
     folders = [bag, bag.parent] if bag.is_dir() else [bag.parent]
     return next((folder / FILE for folder in folders if (folder / FILE).is_file()), None)
+
+
+def read_connections(path: Path) -> Connections:
+    """What goes in and what comes out, as a file says.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    with _content(path) as top:
+        return Connections(top.text("inputs", ""), top.text("outputs", ""), top.flag("held", False))
+
+
+@contextmanager
+def _content(path: Path) -> Iterator[Section]:
+    """What stands in a file; whatever is wrong with it becomes one line."""
+    try:
+        yield Section(YAML(typ="safe").load(path.read_text(encoding="utf-8")), str(path))
+    except (YAMLError, UnicodeDecodeError, ValueError, TypeError) as err:
+        raise RecordingError(f"{path}: not a description of an excitation: {' '.join(str(err).split())}") from err
+    except RobotError as err:
+        raise RecordingError(f"{err}; docs/frequency.md shows such a file") from err
 
 
 def read_excitation(path: Path, bag: Path, step: float) -> Excitation:
@@ -32,18 +70,13 @@ def read_excitation(path: Path, bag: Path, step: float) -> Excitation:
     Raises:
         RecordingError: it cannot be read, or says nothing of this bag, or has another sampling time.
     """
-    try:
-        top = Section(YAML(typ="safe").load(path.read_text(encoding="utf-8")), str(path))
+    with _content(path) as top:
         f0, lines = top.number("f0", positive=True), np.array(top.raw("lines"), dtype=np.intp)
         said = top.number("sample_time", step, positive=True)
         listed = top.raw("experiments")
         rows = [Section(row, f"{path}: experiments[{i}]") for i, row in enumerate(listed or [])]
         every = [(row.text("bag", bag.stem), _experiment(row)) for row in rows]
         carrier = top.section("reference").number("frequency") if "reference" in top else 0.0
-    except (YAMLError, UnicodeDecodeError, ValueError, TypeError) as err:
-        raise RecordingError(f"{path}: not a description of an excitation: {' '.join(str(err).split())}") from err
-    except RobotError as err:
-        raise RecordingError(f"{err}; docs/frequency.md shows such a file") from err
     own = tuple(experiment for name, experiment in every if name == bag.stem)
     if not own:
         names = ", ".join(dict.fromkeys(name for name, _ in every)) or "no bag"
@@ -56,7 +89,7 @@ def read_excitation(path: Path, bag: Path, step: float) -> Excitation:
             f"{path}: sample_time {said:g} s, but {bag} is sampled every {step:.6g} s; the file belongs to another bag"
         )
     if not len(lines) or lines.min() < 1:
-        raise RecordingError(f"{path}: lines: expected whole numbers from 1 on, got {top.raw('lines')}")
+        raise RecordingError(f"{path}: lines: expected whole numbers from 1 on, got {lines.tolist()}")
     if f0 * lines.max() > 0.5 / step:
         raise RecordingError(
             f"{path}: line {lines.max()} is at {f0 * lines.max():g} Hz, above half the sampling rate of "

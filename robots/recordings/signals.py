@@ -25,11 +25,13 @@ class Signal:
         times: since the first stamp of the bag, shape (n,) [s].
         values: shape (n, c).
         names: of the channels, shape (c,).
+        held: whether each value acts until the next one, as a command does; else it was measured.
     """
 
     times: Array
     values: Array
     names: tuple[str, ...]
+    held: bool = False
 
     @cached_property
     def step(self) -> float:

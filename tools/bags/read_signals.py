@@ -2,7 +2,7 @@
 """Inputs and outputs of any system from a bag, and how they were excited.
 
 A signal is named TOPIC:FIELD or TOPIC:FIELD:NAME,NAME; where nothing is named, it is the motors of /joint_states,
-torque in and position out, of the joints that /motor_command names.
+torque in and position out, of the joints that /motor_command names, or what excitation.yaml beside the bag names.
 """
 
 from __future__ import annotations
@@ -16,7 +16,12 @@ import numpy as np
 from jointscope.graphs.responses.find_excitation import find_excitation
 from jointscope.graphs.responses.settled_periods import settled
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.excitation_file import excitation_beside, read_excitation
+from jointscope.robots.recordings.excitation_file import (
+    Connections,
+    excitation_beside,
+    read_connections,
+    read_excitation,
+)
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.bags.fitting_messages import read_columns
@@ -26,7 +31,9 @@ from jointscope.tools.bags.messages.open_bag import Bag, RawTopic, bag_sha256, o
 INPUT, OUTPUT, COMMAND = "/joint_states:effort", "/joint_states:position", "/motor_command:effort"
 
 
-def read_signals(path: Path, source: str = "", target: str = "", led: bool = False) -> tuple[Signals, Signal]:
+def read_signals(
+    path: Path, source: str = "", target: str = "", led: bool = False, file: Path | None = None
+) -> tuple[Signals, Signal]:
     """The signals of a bag, and the one that drives them: the command where there is one and nothing was named.
 
     Args:
@@ -34,10 +41,14 @@ def read_signals(path: Path, source: str = "", target: str = "", led: bool = Fal
         source: what goes in.
         target: what comes out.
         led: whether the command drives although signals are named.
+        file: that describes the excitation, and may name signals; by default the one beside the bag.
 
     Raises:
         RecordingError: the bag cannot be read, or has no such signal.
     """
+    file = file or excitation_beside(path)
+    said = Connections() if file is None else read_connections(file)
+    source, target = source or said.inputs, target or said.outputs
     with open_bag(path) as bag:
         specs = [source or INPUT, target or OUTPUT]
         led = (led or not source + target) and COMMAND.partition(":")[0] in bag.topics
@@ -60,6 +71,7 @@ def read_signals(path: Path, source: str = "", target: str = "", led: bool = Fal
             starts.insert(0, first)
     moved = [replace(s, times=s.times + (first - min(starts)) / 1e9) for s, first in zip(found, starts, strict=True)]
     inputs, outputs = moved[:2]
+    inputs = replace(inputs, held=said.held and _same_field(source or INPUT, said.inputs or INPUT))
     return Signals(str(path), bag_sha256(path), inputs, outputs), moved[-1] if led else inputs
 
 
@@ -76,6 +88,11 @@ def excitation_of(path: Path, signals: Signals, drive: Signal, file: Path | None
     if file is not None:
         return read_excitation(file, path, drive.step)
     return settled(signals, find_excitation(drive, len(signals.inputs.names), str(path)))
+
+
+def _same_field(one: str, other: str) -> bool:
+    """Whether two specifications mean the same field of the same topic, whichever names they list."""
+    return one.split(":")[:2] == other.split(":")[:2]
 
 
 def _signal(bag: Bag, raws: Mapping[str, RawTopic], spec: str, names: Sequence[str]) -> tuple[Signal, int]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,18 +16,19 @@ from jointscope.robots.files.frequency_section import no_frequency
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.tools.simulator.arm.arm_bodies import true_values
-from jointscope.tools.simulator.arm.multisine import CARRIER, Multisine
+from jointscope.tools.simulator.arm.multisine import Multisine
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.arm.shaken_arm import STEP, ShakenArm
+from jointscope.tools.simulator.arm.strength import OVER_FRICTION, largest_amplitude
 from jointscope.tools.simulator.pose_simulation import PoseConditions
 from jointscope.tools.simulator.world.random_streams import random_stream
 
 Array = NDArray[np.float64]
+SHARE = 0.4  # of what a drive can give beside the weight, that the largest of the excitation takes
 SETTLE = 2  # periods before those that are kept
 BETWEEN = 2.0  # [s] from experiment to experiment, in which nothing is recorded
 SWING = 0.05  # [rad] of the motion that carries the excitation
 ACCELERATION = 0.7  # [rad/s^2] rms with which a motor is shaken
-OVER_FRICTION = 2.0  # rms of the excitation over dry friction, at least
 REACH = 0.5  # share of each joint's range that poses fill
 ENCODER, TORQUE = 1e-6, 0.05  # [rad], [N m] noise of each sample
 
@@ -44,7 +45,9 @@ class Shaking:
         f0: distance of the lines [Hz].
         highest: no line is above it [Hz].
         rate: of the samples [Hz].
-        friction: "smooth" or "dry".
+        friction: "smooth" or "dry"; of an arm with a section `frequency`.
+        share: of what drives can give beside the weight, that the largest of the excitation takes; None: an arm with a
+            section `frequency` is accelerated with 0.7 rad/s^2, others take 0.4.
     """
 
     poses: Sequence[Array] = ()
@@ -55,6 +58,7 @@ class Shaking:
     highest: float = 100.0
     rate: float = 1000.0
     friction: str = "smooth"
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -103,16 +107,18 @@ def simulate_frequency(
     conditions, shaking = conditions or PoseConditions(), shaking or Shaking()
     if robot.frequency is None:
         raise RobotError(no_frequency(robot))
-    _check(robot, shaking)
+    poses = checked_poses(robot, shaking, seed, session, STEP)
     values = true_values(robot, seed, conditions.values, conditions.perfect)
     effects = pose_effects(conditions.effects, robot.joints)
-    poses = list(shaking.poses) or _drawn_poses(robot, shaking.count, seed, session)
     arms = [ShakenArm(robot, values, effects, np.asarray(pose), shaking.friction) for pose in poses]
-    rms = ACCELERATION * np.max([arm.inertias for arm in arms], axis=0)
+    inertias = np.array([arm.inertias for arm in arms])
     dry = np.array([values.get(f"{joint}.coulomb_torque", 0.0) for joint in robot.frequency.joints])
-    multisine = Multisine.drawn(
-        shaking.f0, shaking.highest, np.maximum(rms, OVER_FRICTION * dry), shaking.realisations, seed, session
-    )
+    rms = np.maximum(ACCELERATION * inertias.max(axis=0), OVER_FRICTION * dry)
+    multisine = Multisine.drawn(shaking.f0, shaking.highest, rms, shaking.realisations, seed, session)
+    if shaking.share is not None:
+        left = np.min([arm.left for arm in arms], axis=0)
+        amplitude = largest_amplitude(multisine, shaking.share, left, inertias.min(axis=0), dry)
+        multisine = replace(multisine, amplitude=amplitude)
     excitation = multisine.excitation(shaking.periods, BETWEEN)
     found, told = [], progress or (lambda share: None)
     for k, (arm, pose) in enumerate(zip(arms, poses, strict=True)):
@@ -135,17 +141,36 @@ def _share(told: Callable[[float], None], done: int, of: int, share: float) -> N
     told((done + share) / of)
 
 
-def _check(robot: Robot, shaking: Shaking) -> None:
+def checked_poses(robot: Robot, shaking: Shaking, seed: int, session: str, step: float) -> list[Array]:
+    """The poses in which a robot is shaken, shape (n,) each.
+
+    Args:
+        robot: to be shaken.
+        shaking: how.
+        seed: of the robot.
+        session: of the recordings.
+        step: of the simulator [s].
+
+    Raises:
+        SimulationError: a pose or a number cannot be.
+    """
     wrong = next((pose for pose in shaking.poses if len(pose) != robot.n), None)
     if wrong is not None:
         raise SimulationError(f"a pose of {robot.name} has {robot.n} angles [rad], got {len(wrong)}")
     if min(shaking.count, shaking.realisations, shaking.periods) < 1:
         raise SimulationError("numbers of poses, realisations and periods: expected 1 or more")
-    every = 1.0 / (shaking.rate * STEP)
+    every = 1.0 / (shaking.rate * step)
     if abs(every - round(every)) > 1e-6 or every < 0.5:
-        raise SimulationError(f"rate {shaking.rate:g} Hz: expected {1.0 / STEP:g} Hz over a whole number")
+        raise SimulationError(f"rate {shaking.rate:g} Hz: expected {1.0 / step:g} Hz over a whole number")
+    if not shaking.f0 > 0.0 or abs(shaking.rate / shaking.f0 - round(shaking.rate / shaking.f0)) > 1e-6:
+        raise SimulationError(
+            f"f0 {shaking.f0:g} Hz: expected a period of a whole number of samples of {1e3 / shaking.rate:g} ms"
+        )
+    if shaking.highest < shaking.f0:
+        raise SimulationError(f"lines up to {shaking.highest:g} Hz: the lowest is at f0, {shaking.f0:g} Hz")
     if shaking.highest > 0.45 * shaking.rate:
         raise SimulationError(f"lines up to {shaking.highest:g} Hz need samples at {shaking.highest / 0.45:.4g} Hz")
+    return list(shaking.poses) or _drawn_poses(robot, shaking.count, seed, session)
 
 
 def _drawn_poses(robot: Robot, count: int, seed: int, session: str) -> list[Array]:
@@ -159,7 +184,7 @@ def _experiments(
     arm: ShakenArm, multisine: Multisine, excitation: Excitation, shaking: Shaking, told: Callable[[float], None]
 ) -> tuple[Array, Array, Array, Array]:
     """Times, angles, torques and commands of all experiments of a pose."""
-    every, speed = round(1.0 / (shaking.rate * STEP)), 2.0 * np.pi * CARRIER * multisine.f0
+    every, speed = round(1.0 / (shaking.rate * STEP)), 2.0 * np.pi * excitation.carrier
     times, angles, torques, commands = [], [], [], []
     for k, e in enumerate(excitation.experiments):
         wave = multisine.torque(e.realisation, e.number, e.sign, 0.5 * STEP)

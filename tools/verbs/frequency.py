@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     with progress_bar() as progress:
         for i, bag in enumerate(args.bags):
             progress(f"reading {bag.name}", i / len(args.bags))
-            signals, drive = read_signals(bag, args.source, args.target)
+            signals, drive = read_signals(bag, args.source, args.target, file=args.excitation)
             try:
                 excitation = excitation_of(bag, signals, drive, args.excitation)
             except NoPeriodsError:

@@ -37,8 +37,35 @@ def test_a_dip_beside_a_peak_is_found_where_the_equations_have_it(apart):
     sigma = np.full(G.shape, 1e-8)  # as of an encoder: the same at all lines
     rng = np.random.default_rng(3)
     noisy = G + sigma * (rng.normal(size=G.shape) + 1j * rng.normal(size=G.shape)) / np.sqrt(2.0)
-    found = {r.anti: r for r in resonances(f, noisy, sigma)}
+    found = {r.anti: r for r in resonances(f, noisy, sigma, 1e-3)}
     for anti, (frequency, damping) in zip((False, True), true_roots(), strict=True):
         r = found[anti]
         assert abs(r.frequency - frequency) < 3.0 * r.frequency_sigma and abs(r.frequency / frequency - 1.0) < 0.002
         assert abs(r.damping - damping) < 3.0 * r.damping_sigma and r.damping_sigma < 0.003
+
+
+@pytest.mark.parametrize("apart", [0.25, 1.0])
+def test_commands_that_are_held_and_taken_for_measured_do_not_damp_a_dip(apart):
+    """A value that is held acts half a sample later: the phase of that is not the damping of a zero."""
+    f = np.arange(apart, 60.0, apart)
+    held = np.sinc(f * 1e-3) * np.exp(-1j * np.pi * f * 1e-3)
+    G = motor_angle_per_torque(f) * held[:, None, None]
+    sigma = np.full(G.shape, 3e-9)
+    rng = np.random.default_rng(4)
+    noisy = G + sigma * (rng.normal(size=G.shape) + 1j * rng.normal(size=G.shape)) / np.sqrt(2.0)
+    found = {r.anti: r for r in resonances(f, noisy, sigma, 1e-3)}
+    for anti, (frequency, damping) in zip((False, True), true_roots(), strict=True):
+        r = found[anti]
+        assert abs(r.frequency - frequency) < 3.0 * r.frequency_sigma and r.frequency_sigma < 0.001 * frequency
+        assert abs(r.damping - damping) < 3.0 * r.damping_sigma and r.damping_sigma < 0.02 * damping
+
+
+def test_lines_below_the_noise_are_no_resonances():
+    f = np.arange(0.1, 60.0, 0.1)
+    G = motor_angle_per_torque(f)
+    sigma = np.full(G.shape, 1e-5)  # what comes out above 20 Hz is less
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        noisy = G + sigma * (rng.normal(size=G.shape) + 1j * rng.normal(size=G.shape)) / np.sqrt(2.0)
+        found = resonances(f, noisy, sigma, 1e-3)
+        assert all(13.0 < r.frequency < 18.0 for r in found) and len(found) <= 2

@@ -99,7 +99,7 @@ def test_resonances_are_those_of_the_system_within_their_sigmas(linear):
 def test_a_flat_response_has_no_resonance():
     rng = np.random.default_rng(3)
     G = 1.0 + 0.1 * (rng.standard_normal((80, 1, 1)) + 1j * rng.standard_normal((80, 1, 1)))
-    assert resonances(np.arange(1.0, 81.0), G, np.full((80, 1, 1), 0.15)) == []
+    assert resonances(np.arange(1.0, 81.0), G, np.full((80, 1, 1), 0.15), 1e-3) == []
 
 
 def test_period_lines_pairs_and_realisations_are_found_from_the_signal_alone():

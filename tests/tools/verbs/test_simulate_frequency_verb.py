@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -73,6 +74,56 @@ def test_a_file_in_place_of_a_folder_and_poses_that_are_none_are_refused(tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_robot_that_does_not_say_what_is_shaken_is_refused(tmp_path, capsys):
-    assert main(["simulate", "doggy", "--kind", "frequency", "-o", str(tmp_path / "arm")]) == 1
-    assert "has no section `frequency`" in capsys.readouterr().err
+def robot_like(folder, ready, *changes):
+    """A copy of a ready robot with other texts in its URDF and robot file."""
+    robot = load_robot(ready)
+    for path in (robot.path, robot.tree.urdf):
+        text = path.read_text()
+        for old, new in changes:
+            text = re.sub(old, new, text)
+        (folder / path.name).write_text(text)
+    return folder / robot.path.name
+
+
+def test_a_robot_that_cannot_be_shaken_is_refused_with_what_to_do(tmp_path, capsys):
+    for name in ("weak", "weak_volts", "stiff"):
+        (tmp_path / name).mkdir()
+    weak = robot_like(tmp_path / "weak", "panda", ('effort="87.0"', 'effort="8.0"'))
+    low = ("motor.supply_voltage: [0-9.]+", "motor.supply_voltage: 0.01")
+    weak_volts = robot_like(tmp_path / "weak_volts", "biorob", low)
+    stiff = robot_like(tmp_path / "stiff", "panda", (r"  panda_joint[0-9].stiffness: .*\n", ""))
+    for robot, more, text in (
+        ("doggy", ["--share", "1.5"], "share 1.5 of the drives: expected more than 0 and less than 1"),
+        ("doggy", ["--f0", "0.7"], "f0 0.7 Hz: expected a period of a whole number of samples of 1 ms"),
+        ("doggy", ["--f0", "200"], "lines up to 100 Hz: the lowest is at f0, 200 Hz"),
+        ("doggy", ["--pose", "0,1"], "a pose of doggy has 3 angles"),
+        ("kr300", [], "link_dynamics: free"),
+        (weak, [], "cannot hold the weight in a pose; name another --pose"),
+        (weak_volts, ["--pose", "0,1.5,0,0"], "N m to hold the pose [0.0, 1.5, 0.0, 0.0]; name another --pose"),
+        (stiff, [], "has neither `command` and `sensors` nor a drive with a stiffness; add"),
+    ):
+        assert main(["simulate", str(robot), "--kind", "frequency", "-o", str(tmp_path / "arm"), *more]) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and text in error
+    assert not (tmp_path / "arm").exists()
+
+
+def test_a_file_says_what_goes_in_and_out_and_that_commands_are_held(tmp_path, capsys):
+    folder = tmp_path / "doggy"
+    options = ["--f0", "2", "--highest", "40", "--realisations", "1", "--periods", "3", "--seed", "3"]
+    assert main(["simulate", "doggy", "--kind", "frequency", "-o", str(folder), *options]) == 0
+    told = yaml.safe_load((folder / "excitation.yaml").read_text())
+    assert told["inputs"] == "/motor_command:effort:joint1,joint2,joint3" and told["held"] is True
+    assert told["outputs"] == "/joint_states:position:joint1,joint2,joint3"
+    assert told["lines"] == list(range(1, 21, 2)) and len(told["experiments"]) == 6
+    assert all(e["periods"] == 5 and e["transient"] == 2 for e in told["experiments"])
+    signals, _ = read_signals(folder / "frequency_1.mcap")
+    assert signals.inputs.held and not signals.outputs.held and signals.inputs.names == ("joint1", "joint2", "joint3")
+    own, _ = read_signals(folder / "frequency_1.mcap", "/motor_command:effort:joint2")
+    assert own.inputs.held and own.inputs.names == ("joint2",)  # named by the user: the same field
+    other, _ = read_signals(folder / "frequency_1.mcap", "/joint_states:position:joint2")
+    assert not other.inputs.held
+    (folder / "excitation.yaml").write_text("held: perhaps")
+    capsys.readouterr()
+    assert main(["frequency", str(folder / "frequency_1.mcap")]) == 1
+    assert "excitation.yaml: held: expected true or false" in capsys.readouterr().err

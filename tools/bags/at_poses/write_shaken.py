@@ -14,8 +14,9 @@ from jointscope.robots.files.frequency_section import no_frequency
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.excitation_file import FILE
+from jointscope.robots.recordings.recording import Recording
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
-from jointscope.tools.bags.write_bag import joint_states, write_topics
+from jointscope.tools.bags.write_bag import joint_states, write_bag, write_topics
 from jointscope.tools.writing.whole_file import whole_file
 
 Array = NDArray[np.float64]
@@ -67,10 +68,47 @@ def write_shaken(
         )
         paths.append(folder / f"{name}.mcap")
         write_topics(paths[-1], topics)
-    with whole_file(folder / FILE) as path:
-        text = _description(excitation, [name for name, _, _ in recordings], recordings[0][1].outputs.step)
-        path.write_text(FOREWORD + text + said, encoding="utf-8")
+    text = _description(excitation, [name for name, _, _ in recordings], recordings[0][1].outputs.step)
+    _write_description(folder, FOREWORD + text + said)
     return paths
+
+
+def write_described(
+    folder: Path, robot: Robot, recordings: Sequence[tuple[str, Recording]], excitation: Excitation, said: str
+) -> list[Path]:
+    """Writes bags as the robot itself records them, and the description, which names inputs and outputs.
+
+    Args:
+        folder: becomes one with a bag NAME.mcap for each recording.
+        robot: with commands and encoders, which are what goes in and what comes out.
+        recordings: name and streams.
+        excitation: the same in all of them.
+        said: more lines of the description.
+
+    Raises:
+        RecordingError: a bag cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{name}.mcap" for name, _ in recordings]
+    for path, (_, recording) in zip(paths, recordings, strict=True):
+        write_bag(path, recording, robot)
+    step = float(np.median(np.diff(recordings[0][1].streams["command"].times)))
+    signals = (
+        f"inputs: {_signal(robot.command)}  # the whole command, with what holds the pose\n"
+        f"held: true  # each command acts until the next one\noutputs: {_signal(robot.motor_encoder.source)}\n"
+    )
+    text = _description(excitation, [name for name, _ in recordings], step)
+    _write_description(folder, FOREWORD + signals + text + said)
+    return paths
+
+
+def _signal(topic: Topic) -> str:
+    return f"{topic.topic}:{topic.field}" + (f":{','.join(topic.names)}" if topic.names else "")
+
+
+def _write_description(folder: Path, text: str) -> None:
+    with whole_file(folder / FILE) as path:
+        path.write_text(text, encoding="utf-8")
 
 
 def _in_unit(topic: Topic, values: Array) -> Array:

@@ -60,15 +60,17 @@ class Multisine:
         spectrum[self.lines] = (sign * self.amplitude[:, None] * np.exp(1j * turned)).T
         return np.asarray(np.fft.irfft(0.5 * count * spectrum, count, axis=0))
 
-    def excitation(self, periods: int, between: float) -> Excitation:
+    def excitation(self, periods: int, between: float, settle: int = 0, carrier: int = CARRIER) -> Excitation:
         """All experiments of one pose one after another, each with both signs.
 
         Args:
             periods: that are kept of each.
             between: from the end of one to the begin of the next [s].
+            settle: periods before those that are kept, which are recorded, too.
+            carrier: line of the motion that carries the excitation; 0 for none.
         """
         count, n, _ = self.phases.shape
         each = [(r, e, sign) for r in range(count) for e in range(n) for sign in (1, -1)]
-        apart = periods / self.f0 + between
-        rows = tuple(Experiment(*key, start=k * apart, periods=periods) for k, key in enumerate(each))
-        return Excitation(self.f0, self.lines, rows, CARRIER * self.f0, "the simulator")
+        apart = (settle + periods) / self.f0 + between
+        rows = tuple(Experiment(*key, k * apart, settle + periods, settle) for k, key in enumerate(each))
+        return Excitation(self.f0, self.lines, rows, carrier * self.f0, "the simulator")

@@ -18,6 +18,8 @@ from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect
+from jointscope.tools.simulator.loop.controller import effort_limits
+from jointscope.tools.simulator.loop.shaker import SERVO
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 from jointscope.tools.simulator.world.specification import (
     add_dry_friction,
@@ -30,7 +32,6 @@ from jointscope.tools.simulator.world.specification import (
 
 Array = NDArray[np.float64]
 STEP = 5e-4  # [s] of the integration, fourth order
-SERVO = 2.0  # [Hz] of the position controller, critically damped
 ROUNDS = 6  # of the equilibrium at which an experiment begins
 WRIST_LOSS = 2e-4  # [s] damping over stiffness of a locked joint that gives way
 
@@ -91,6 +92,22 @@ class ShakenArm:
                 found[i] += column[place]
         return found
 
+    @property
+    def left(self) -> Array:
+        """Torque of each drive beside the weight, shape (n,) [N m]; infinite where the URDF does not limit it.
+
+        Raises:
+            SimulationError: the weight is more.
+        """
+        places = [self._robot.joints.index(joint) for joint in self.joints]
+        left = effort_limits(self._robot)[places] - np.abs(self._at_rest())
+        if np.any(left <= 0.0):
+            joint = self.joints[int(np.argmin(left))]
+            raise SimulationError(
+                f"{joint} of {self._robot.name} cannot hold the weight in a pose; name another --pose"
+            )
+        return left
+
     def shaken(self, torque: Array, swing: float, speed: float, settle: int, periods: int, every: int) -> Array:
         """Angles and torques of the motors while they are shaken.
 
@@ -109,8 +126,8 @@ class ShakenArm:
             SimulationError: the integration breaks down.
         """
         inertia, hold = self.inertias, self._at_rest()
-        stiff = inertia * (2.0 * np.pi * SERVO) ** 2
-        damp = 2.0 * inertia * 2.0 * np.pi * SERVO
+        stiff = inertia * (SERVO) ** 2
+        damp = 2.0 * inertia * SERVO
         t = 0.5 * STEP * np.arange((settle + periods) * len(torque) + 1)
         wave, rate = swing * np.sin(speed * t)[:, None], swing * speed * np.cos(speed * t)[:, None]
         middle = np.array([self._pose[joint] for joint in self.joints])

@@ -62,10 +62,16 @@ def full_command(robot: Robot) -> Array:
         if "motor.supply_voltage" not in robot.constants:
             raise SimulationError(f"robot {robot.name!r}: simulating needs the constant 'motor.supply_voltage'")
         return np.full(robot.n, robot.constants["motor.supply_voltage"])
-    effort = robot.tree.effort_limits
-    if not np.all(np.isfinite(effort) & (effort > 0) & (effort < 1e9)):
+    effort = effort_limits(robot)
+    if not np.all(np.isfinite(effort)):
         raise SimulationError(f"robot {robot.name!r}: simulating needs an effort limit of every joint in the URDF")
     return effort / drive_gains(robot)
+
+
+def effort_limits(robot: Robot) -> Array:
+    """What the URDF says that each joint can give, shape (n_joints,) [N m or N]; infinite where it does not say."""
+    effort = robot.tree.effort_limits
+    return np.where((effort > 0.0) & (effort < 1e9), effort, np.inf)
 
 
 def drive_gains(robot: Robot) -> Array:
