@@ -154,8 +154,8 @@ def urdf_files(robot: Robot, urdf: Path | None) -> dict[Path, str]:
 
 def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[str, dict[str, Any]]:
     """Errors of some models on poses, for the screen and for JSON."""
-    from jointscope.graphs.poses.calibrate_poses import placed
     from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary
+    from jointscope.graphs.poses.tracker_start import placed
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.poses_text import pose_errors_text
 
