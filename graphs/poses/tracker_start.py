@@ -78,7 +78,7 @@ def _known_points(problem: PoseSet) -> tuple[Array, Array]:
     point, (first, *others) = problem.arm.at(problem.q, np.zeros_like(problem.q), values), mounts(robot).items()
     predicted = {first[0]: point.target}
     for name, mount in others:
-        if not _is_open(robot, mount.owner):
+        if not is_open(robot, mount.owner):
             predicted[name] = point.target + point.turn @ (mount.place(values) - first[1].place(values))
     seen = [sighting for sighting in problem.targets.sightings if sighting.name in predicted]
     known = [(predicted[s.name], s.place, np.isfinite(s.place[:, 0])) for s in seen]
@@ -90,7 +90,7 @@ def _known_points(problem: PoseSet) -> tuple[Array, Array]:
     return np.concatenate([p[there] for p, _, there in known]), np.concatenate([x[there] for _, x, there in known])
 
 
-def _is_open(robot: Robot, owner: str) -> bool:
+def is_open(robot: Robot, owner: str) -> bool:
     """Whether the place of a further target on the tool is not known."""
     parameters = [robot.parameters[f"{owner}.{part}"] for part in LENGTHS]
     return all(not p.fixed and p.prior_sigma > TOOL_KNOWN and abs(p.value) < TOOL_KNOWN for p in parameters)
@@ -101,11 +101,11 @@ def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
     (_, first), *others = mounts(robot).items()
     values: dict[str, float] = {}
     for name, mount in others:
-        if not _is_open(robot, mount.owner):
+        if not is_open(robot, mount.owner):
             continue
         shifts = [np.zeros((0, 3))]
         for problem, sighting in _sightings(problems, name):
-            tool, known = _tool(problem)
+            tool, known = tool_seen(problem)
             away = np.einsum("mji,mj->mi", tool.turn, sighting.place - tool.target)
             shifts.append((away + first.place(known) - mount.at) @ mount.R_link)
         seen = np.concatenate(shifts)
@@ -141,7 +141,7 @@ def on_tool(problems: Sequence[PoseSet], name: str, mount: Mount) -> Array:
     for problem, sighting in _sightings(problems, name):
         if sighting.turn is not None:
             seen = np.isfinite(sighting.turn[:, 0, 0])
-            R_tracker_link = _tool(problem)[0].turn @ mount.R_link
+            R_tracker_link = tool_seen(problem)[0].turn @ mount.R_link
             found.append((np.swapaxes(R_tracker_link, 1, 2) @ sighting.turn)[seen])
     return np.concatenate(found)
 
@@ -152,7 +152,7 @@ def mean_rotation(R: Array) -> Array:
     return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
 
 
-def _tool(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:
+def tool_seen(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:
     """The tool in the axes of the tracker at the robot's values, and these."""
     values = problem.values(Calibration.of(problem.robot))
     point = problem.arm.at(problem.q, np.zeros_like(problem.q), values)

@@ -65,8 +65,8 @@ def orientations(path: Path | str, xyzw: Array, places: Sequence[str], target: s
         )
     first = xyzw[there][0]
     if np.count_nonzero(there) > 1 and np.abs(xyzw[there] - first).max() < SAME:
-        what = "the identity" if abs(first[3]) > 1.0 - SAME else "always the same"
-        text = f"{path}: the orientation of {target} is {what} in every pose, as of a tracker that gives none; it is not used"
+        what = "the identity" if abs(first[3]) > 1.0 - SAME else "the same"
+        text = f"{path}: the orientation of {target} is {what} in all poses, as if the tracker gave none; not used"
         return Orientations(None, (Notice("poses", "info", int(there.sum()), text),))
     x, y, z, w = (xyzw / np.where(there, norm, np.nan)[:, None]).T
     turns = np.array(
@@ -166,10 +166,10 @@ def by_pose(rows: Poses, names: Sequence[str], first: str, has_names: bool) -> P
     start = np.array([int(np.flatnonzero(of_row == i)[0]) for i in range(len(poses))])
     away = np.abs(rows.q - rows.q[start][of_row]).max(axis=1)
     if away.max() > ALIKE:
+        odd = int(np.argmax(away))
         raise RecordingError(
-            f"{rows.path}: line {int(np.argmax(away)) + 2}: pose {rows.names[int(np.argmax(away))]} has other angles in "
-            f"line {start[of_row[int(np.argmax(away))]] + 2}, by {away.max():.2g} rad; expected the same angles in all "
-            "rows of a pose"
+            f"{rows.path}: line {odd + 2}: pose {rows.names[odd]} has other angles in line {start[of_row[odd]] + 2}, "
+            f"by {away[odd]:.2g} rad; expected the same angles in all rows of a pose: give every pose a name of its own"
         )
     found = []
     assert rows.target is not None
