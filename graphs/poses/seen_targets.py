@@ -100,6 +100,10 @@ class SeenTargets:
         names = list(self._mounts)
         return tuple(names[self.held[i] if len(self.held) else 0] for i in poses)
 
+    def names_of_turns(self, which: NDArray[np.intp]) -> tuple[str, ...]:
+        """Names of the targets of some turns by their places in a pose, shape (t,)."""
+        return tuple(self._turned[i].name for i in which)
+
     def rows(self, point: SaggingPoint, values: Mapping[str, float]) -> SaggingPoint:
         """The rows that were measured, with their derivatives.
 

@@ -30,6 +30,7 @@ class TipErrors:
         names: of the target of each.
         turns: from measured orientations to predicted ones, shape (t, 3) [rad].
         turned: number of the pose of each of these, shape (t,).
+        turned_names: of the target of each of these.
     """
 
     vectors: Array
@@ -37,6 +38,7 @@ class TipErrors:
     names: tuple[str, ...]
     turns: Array
     turned: NDArray[np.intp]
+    turned_names: tuple[str, ...]
 
     @property
     def distances(self) -> Array:
@@ -49,10 +51,18 @@ class TipErrors:
         return np.asarray(np.linalg.norm(self.turns, axis=1))
 
     @property
-    def of_targets(self) -> dict[str, Array]:
-        """Distances by the name of the target [m]."""
-        names = np.array(self.names)
-        return {name: self.distances[names == name] for name in dict.fromkeys(self.names)}
+    def of_targets(self) -> dict[str, TipErrors]:
+        """Errors of each target by its name."""
+        found = {}
+        for name in dict.fromkeys(self.names):
+            mine = np.array([other == name for other in self.names], bool)
+            turned = np.array([other == name for other in self.turned_names], bool)
+            count, of_turns = int(mine.sum()), int(turned.sum())
+            found[name] = TipErrors(
+                self.vectors[mine], self.poses[mine], (name,) * count,
+                self.turns[turned], self.turned[turned], (name,) * of_turns,
+            )  # fmt: skip
+        return found
 
     @property
     def by_pose(self) -> Array:
@@ -76,6 +86,12 @@ def _sizes(errors: Array, unit: str) -> dict[str, float]:
     }
 
 
+def targets_json(errors: TipErrors) -> dict[str, dict[str, dict[str, float]]]:
+    """Errors of each target by its name; nothing where there is but one."""
+    each = errors.of_targets
+    return {"targets": {name: found.to_json() for name, found in each.items()}} if len(each) > 1 else {}
+
+
 def tip_errors(problem: PoseSet, calibration: Calibration | None = None) -> TipErrors:
     """Errors with transmissions that do nothing unseen.
 
@@ -90,9 +106,10 @@ def tip_errors(problem: PoseSet, calibration: Calibration | None = None) -> TipE
     there = seen.there.reshape(blocks.shape)[:, :, 0]
     places = int(np.count_nonzero(~seen.turns)) // 3
     poses, which = np.nonzero(there[:, :places])
-    turned = np.nonzero(there[:, places:])[0]
-    names = seen.names_of(poses, which)
-    return TipErrors(blocks[:, :places][there[:, :places]], poses, names, blocks[:, places:][there[:, places:]], turned)
+    turned, which_turned = np.nonzero(there[:, places:])
+    names, turned_names = seen.names_of(poses, which), seen.names_of_turns(which_turned)
+    vectors, turns = blocks[:, :places][there[:, :places]], blocks[:, places:][there[:, places:]]
+    return TipErrors(vectors, poses, names, turns, turned, turned_names)
 
 
 def without_sag(robot: Robot) -> Robot:
@@ -141,4 +158,5 @@ def summary(errors: Sequence[TipErrors]) -> TipErrors:
         tuple(name for each in errors for name in each.names),
         np.concatenate([each.turns for each in errors]),
         np.concatenate([each.turned + end for each, end in zip(errors, ends, strict=True)]),
+        tuple(name for each in errors for name in each.turned_names),
     )

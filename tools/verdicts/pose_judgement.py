@@ -95,20 +95,21 @@ def _still(result: PoseCalibration) -> Check:
     """Whether the tracker stood still: no step in what is left, anywhere in a session."""
     name, found = "A tracker that stands still", None
     for problem, errors in zip(result.problems, result.errors, strict=True):
-        m = len(errors.vectors)
+        vectors = errors.by_pose
+        m = len(vectors)
         if problem.poses.target is None or m < 2 * FEWEST:
             continue
-        before = np.cumsum(errors.vectors, axis=0)[FEWEST - 1 : m - FEWEST]
+        before = np.cumsum(vectors, axis=0)[FEWEST - 1 : m - FEWEST]
         k = np.arange(FEWEST, m - FEWEST + 1)[:, None]
-        steps = (errors.vectors.sum(axis=0) - before) / (m - k) - before / k
+        steps = (vectors.sum(axis=0) - before) / (m - k) - before / k
         weights = (k * (m - k) / m)[:, 0]
         falls = weights[:, None] * steps**2
         best = int(np.argmax(falls.sum(axis=1)))
-        after = np.var(errors.vectors, axis=0) - falls[best] / m
+        after = np.var(vectors, axis=0) - falls[best] / m
         score = float(np.sum(falls[best] / np.maximum(after, 1e-300)))
         if gammaincc(1.5, score / 2.0) * m < CHANCE:
-            jump, names = 1e3 * float(np.linalg.norm(steps[best])), problem.poses.names
-            at = best + FEWEST
+            jump = 1e3 * float(np.linalg.norm(steps[best]))
+            names, at = [problem.poses.names[i] for i in np.unique(errors.poses)], best + FEWEST
             found = (
                 f"From pose {names[at]} of {problem.poses.path} on all targets are shifted by {significant(jump, 2)} "
                 f"mm: the tracker, the base or the target was moved; give poses up to {names[at - 1]} and the others "
