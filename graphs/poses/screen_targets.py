@@ -10,14 +10,22 @@ from __future__ import annotations
 from itertools import combinations, product
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.graphs.poses.seen_targets import Mount, mounts, rotation_vectors
-from jointscope.graphs.poses.tracker_start import is_open, mean_rotation, tool_seen
+from jointscope.graphs.poses.seen_targets import Mount, mounts
+from jointscope.graphs.poses.tracker_start import is_open, tool_seen
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.error_parameters import TOOL
+from jointscope.robots.geometry.rotations import (
+    mean_rotation,
+    of_quaternions,
+    of_roll_pitch_yaw,
+    quaternion_xyzw,
+    roll_pitch_yaw,
+    rotation_vectors,
+    spread,
+)
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
 from jointscope.robots.recordings.poses import Sighting
 
@@ -126,7 +134,7 @@ def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: M
         return
     G, M = (tool_seen(problem)[0].turn @ mount.R_link)[there], measured[there]
     name, path = sighting.name, problem.poses.path
-    left = _spread(G, M)
+    left = _fits(G, M)
     if left > LARGEST_TURN:
         raise RecordingError(
             f"{path}: the orientations of {name} are off by {left:.2g} rad (rms) from any that turns with the tool; "
@@ -135,31 +143,29 @@ def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: M
     mean = mean_rotation(np.swapaxes(G, 1, 2) @ M)
     off = float(np.linalg.norm(rotation_vectors((mount.R_target.T @ mean)[None])))
     if off > LARGEST_TURN:
-        x, y, z, w = pin.Quaternion(mean).coeffs()
+        x, y, z, w = quaternion_xyzw(mean)
         raise RecordingError(
             f"{path}: {name} is not oriented on the tool as {problem.robot.path.name} says, off by {off:.2g} rad; "
             f"[{x:.3g}, {y:.3g}, {z:.3g}, {w:.3g}] would fit; leave out its `orientation`, and it is found"
         )
 
 
-def _spread(G: Array, M: Array) -> float:
+def _fits(G: Array, M: Array) -> float:
     """How far X of M = G X is from the same in all poses, root mean square [rad]."""
-    X = np.swapaxes(G, 1, 2) @ M
-    r = rotation_vectors(mean_rotation(X).T @ X)
-    return float(np.sqrt(np.mean(np.sum(r**2, axis=1))))
+    return spread(np.swapaxes(G, 1, 2) @ M)
 
 
 def _other_convention(G: Array, M: Array) -> str:
     """What would fit instead."""
-    ordered = np.array([pin.Quaternion(*pin.Quaternion(R).coeffs()).toRotationMatrix() for R in M])
-    if _spread(G, ordered) < LARGEST_TURN:
+    ordered = of_quaternions(np.array([np.roll(quaternion_xyzw(R), -1) for R in M]))
+    if _fits(G, ordered) < LARGEST_TURN:
         return "in the order w, x, y, z they fit: exchange the columns, expected qx, qy, qz, qw"
-    if _spread(G, np.swapaxes(M, 1, 2)) < LARGEST_TURN:
+    if _fits(G, np.swapaxes(M, 1, 2)) < LARGEST_TURN:
         return (
             "their inverses fit, as of the tracker in the axes of the target: expected the target in the axes of the "
             "tracker, give -qx, -qy, -qz, qw"
         )
-    if _spread(G, np.swapaxes(ordered, 1, 2)) < LARGEST_TURN:
+    if _fits(G, np.swapaxes(ordered, 1, 2)) < LARGEST_TURN:
         return (
             "their inverses in the order w, x, y, z fit: expected qx, qy, qz, qw of the target in axes of the tracker"
         )
@@ -172,7 +178,7 @@ def _other_convention(G: Array, M: Array) -> str:
                 f"they are those of axes with {axis} the other way, as of a left-handed tracker, while its positions "
                 "are right-handed; expected both in the same right-handed axes"
             )
-    roll, pitch, yaw = np.rad2deg(pin.rpy.matrixToRpy(Z))
+    roll, pitch, yaw = np.rad2deg(roll_pitch_yaw(Z))
     return (
         f"they fit in axes that are turned by roll {roll:.0f}, pitch {pitch:.0f}, yaw {yaw:.0f} degrees against those "
         "of the positions; expected both in the axes of the tracker"
@@ -183,11 +189,11 @@ def _turned_axes(G: Array, M: Array) -> tuple[Array, float]:
     """Z of M = Z G X with any X, in turn from turns by right angles, and what is left [rad]."""
     best = np.eye(3), np.inf
     for roll, pitch, yaw in product(range(4), (0, 1, 3), range(4)):
-        Z = np.array(pin.rpy.rpyToMatrix(*(0.5 * np.pi * np.array([roll, pitch, yaw]))))
+        Z = of_roll_pitch_yaw(*(0.5 * np.pi * angle for angle in (roll, pitch, yaw)))
         for _ in range(ROUNDS):
             X = mean_rotation(np.swapaxes(Z @ G, 1, 2) @ M)
             Z = mean_rotation(M @ np.swapaxes(G @ X, 1, 2))
-        left = _spread(Z @ G, M)
+        left = _fits(Z @ G, M)
         if left < best[1]:
             best = Z, left
     return best

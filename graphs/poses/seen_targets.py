@@ -22,13 +22,13 @@ from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, across, t
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.arm_chain import cross
 from jointscope.robots.geometry.error_parameters import TOOL
+from jointscope.robots.geometry.rotations import log_slopes, rotation_vectors
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
 
 Array = NDArray[np.float64]
 Block = tuple[Array, Array, dict[str, Array]]
 """Three rows of each pose, shape (m, 3), by the joints, shape (m, 3, n), and by values, shape (m, 3)."""
-SMALL = 1e-4  # [rad] below which a series is nearer than the formula
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def _turn(point: SaggingPoint, values: Mapping[str, float], mount: Mount, measur
         R = R @ turned(axis, np.array(values.get(f"{mount.owner}.{part}", 0.0)))
     seen = np.where(np.isfinite(measured), measured, R)
     r = rotation_vectors(R @ np.swapaxes(seen, 1, 2))
-    J = _log_slopes(r)
+    J = log_slopes(r)
     by_value = {name: np.einsum("mij,mj->mi", J, column[:, 3:]) for name, column in point.by_value.items()}
     by_value |= {name: np.einsum("mij,mj->mi", J, axis) for name, axis in own.items()}
     return r, J @ point.by_joint[:, 3:], by_value
@@ -184,25 +184,3 @@ def _together(point: SaggingPoint, blocks: list[Block], there: NDArray[np.bool_]
     by_joint = there[:, :, None] * np.concatenate([block[1] for block in blocks], axis=1)
     target = there * np.hstack([block[0] for block in blocks])
     return replace(point, target=target, by_joint=by_joint, by_value=by_value)
-
-
-def rotation_vectors(R: Array) -> Array:
-    """Log of rotations of shape (m, 3, 3), shape (m, 3) [rad]; those of less than half a turn."""
-    twice = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    sine, cosine = 0.5 * np.linalg.norm(twice, axis=1), 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(sine, cosine)
-    ratio = np.where(angle < SMALL, 1.0 + angle**2 / 6.0, angle / np.maximum(sine, 1e-300))
-    return np.asarray(0.5 * ratio[:, None] * twice)
-
-
-def _log_slopes(r: Array) -> Array:
-    """Derivative of Log(exp(w) exp(r)) by w at zero, shape (m, 3, 3).
-
-    1 - [r] / 2 + (1 / t^2 - (1 + cos t) / (2 t sin t)) [r]^2,  t = |r|
-    """
-    t = np.maximum(np.linalg.norm(r, axis=1), SMALL)
-    factor = 1.0 / t**2 - (1.0 + np.cos(t)) / (2.0 * t * np.sin(t))
-    K = np.zeros((len(r), 3, 3))
-    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = r[:, 0], r[:, 1], r[:, 2]
-    K = K - np.swapaxes(K, 1, 2)
-    return np.asarray(np.eye(3) - 0.5 * K + factor[:, None, None] * (K @ K))

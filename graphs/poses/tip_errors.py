@@ -119,9 +119,11 @@ def without_sag(robot: Robot) -> Robot:
 
 
 def without_geometry(robot: Robot) -> Robot:
-    """The robot as its URDF has it, its stiffnesses as they are."""
+    """The robot as its URDF has it, its stiffnesses as they are, and targets whose place nobody gave where they are."""
     soft = (f".{STIFFNESS}", *BEARING)
-    return robot.with_values({n: p.prior for n, p in robot.parameters.items() if not n.endswith(soft)})
+    found = () if robot.poses is None else tuple(f"{t.name}." for t in robot.poses.others if t.at is None)
+    parameters = {n: p for n, p in robot.parameters.items() if not n.startswith(found)} if found else robot.parameters
+    return robot.with_values({n: p.prior for n, p in parameters.items() if not n.endswith(soft)})
 
 
 def without_backlash(robot: Robot) -> Robot:

@@ -20,6 +20,7 @@ from jointscope.graphs.poses.seen_targets import Mount, mounts
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.error_parameters import TOOL
+from jointscope.robots.geometry.rotations import mean_rotation
 from jointscope.robots.geometry.tracker_fit import base_from_tracker, tracker_and_shift
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
@@ -144,12 +145,6 @@ def on_tool(problems: Sequence[PoseSet], name: str, mount: Mount) -> Array:
             R_tracker_link = tool_seen(problem)[0].turn @ mount.R_link
             found.append((np.swapaxes(R_tracker_link, 1, 2) @ sighting.turn)[seen])
     return np.concatenate(found)
-
-
-def mean_rotation(R: Array) -> Array:
-    """The rotation that is nearest to some, shape (3, 3): their mean, made a rotation by its singular values."""
-    U, _, Vt = np.linalg.svd(R.mean(axis=0))
-    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
 
 
 def tool_seen(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:

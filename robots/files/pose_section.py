@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.misplaced_joints import LENGTHS
@@ -17,6 +16,7 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.error_parameters import TOOL, TRACKER, error_parameters
+from jointscope.robots.geometry.rotations import of_quaternions, quaternion_xyzw
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import MountedTarget, PoseSetup
@@ -129,7 +129,7 @@ def _turn_of(section: Section) -> Array | None:
         raise RobotError(
             f"{section.place}.orientation: expected a quaternion [x, y, z, w] of norm one, got one of norm {norm:.4g}"
         )
-    return np.array(pin.Quaternion(xyzw / norm).toRotationMatrix())
+    return of_quaternions(xyzw[None] / norm)[0]
 
 
 def _other_targets(section: Section, link: str, positions: Topic, joints: tuple[str, ...]) -> tuple[MountedTarget, ...]:
@@ -198,7 +198,6 @@ def _write_turns(section: Any, setup: PoseSetup) -> None:
         (section, *(section["targets"][name] for name in setup.other_names)), setup.targets, strict=True
     ):
         if target.turn is not None and "orientation" not in entry:
-            xyzw = pin.Quaternion(target.turn).coeffs()
-            entry["orientation"] = [float(f"{v:.10g}") for v in xyzw.tolist()]
+            entry["orientation"] = [float(f"{v:.10g}") for v in quaternion_xyzw(target.turn).tolist()]
     if setup.estimate_turn_sigma and any(target.turn is not None for target in setup.targets):
         section["orientation_sigma"] = float(f"{setup.turn_sigma:.4g}")

@@ -16,10 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.geometry.rotations import quaternion_xyzw
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
 from jointscope.robots.recordings.recording import Notice
@@ -205,4 +205,4 @@ def _quaternion(turns: Array | None, pose: int) -> list[str]:
     """Cells of an orientation; empty where none was measured."""
     if turns is None or not np.isfinite(turns[pose, 0, 0]):
         return [""] * len(QUATERNION)
-    return [f"{x:.9f}" for x in pin.Quaternion(turns[pose]).coeffs().tolist()]
+    return [f"{x:.9f}" for x in quaternion_xyzw(turns[pose]).tolist()]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.geometry.rotations import of_quaternions
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
 from jointscope.robots.recordings.recording import Notice
@@ -68,18 +69,9 @@ def orientations(path: Path | str, xyzw: Array, places: Sequence[str], target: s
         what = "the identity" if abs(first[3]) > 1.0 - SAME else "the same"
         text = f"{path}: the orientation of {target} is {what} in all poses, as if the tracker gave none; not used"
         return Orientations(None, (Notice("poses", "info", int(there.sum()), text),))
-    x, y, z, w = (xyzw / np.where(there, norm, np.nan)[:, None]).T
-    turns = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    turns = of_quaternions(xyzw / np.where(there, norm, np.nan)[:, None])
     text = f"{path}: {counted(int(zero.sum()), 'orientation')} of {target} all zero: not measured there"
-    return Orientations(
-        np.moveaxis(turns, 2, 0), (Notice("poses", "info", int(zero.sum()), text),) if np.any(zero) else ()
-    )
+    return Orientations(turns, (Notice("poses", "info", int(zero.sum()), text),) if np.any(zero) else ())
 
 
 def quaternions(path: Path, head: Sequence[str], body: Sequence[Sequence[str]]) -> Array | None:
