@@ -27,6 +27,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Block = tuple[Array, Array, dict[str, Array]]
 """Three rows of each pose, shape (m, 3), by the joints, shape (m, 3, n), and by values, shape (m, 3)."""
 
@@ -82,8 +83,8 @@ class SeenTargets:
         if self.plain or poses.target is None:
             self.there, self.turns = np.ones((m, 3), bool), np.zeros(3, bool)
             return
-        seen = [np.isfinite(s.place) for s in self.sightings]
-        seen += [np.isfinite(s.turn).all(axis=2) for s in self._turned if s.turn is not None]
+        seen: list[Mask] = [np.isfinite(s.place) for s in self.sightings]
+        seen += [np.isfinite(s.turn[:, 0]) for s in self._turned if s.turn is not None]
         self.there = np.hstack(seen)
         self.turns = np.arange(self.there.shape[1]) >= 3 * len(self.sightings)
 
@@ -176,9 +177,9 @@ def _turn(point: SaggingPoint, values: Mapping[str, float], mount: Mount, measur
     return r, J @ point.by_joint[:, 3:], by_value
 
 
-def _together(point: SaggingPoint, blocks: list[Block], there: NDArray[np.bool_]) -> SaggingPoint:
+def _together(point: SaggingPoint, blocks: list[Block], mask: Mask) -> SaggingPoint:
     """Blocks of rows one below the other; zero where nothing was measured."""
-    still = np.zeros((len(there), 3))
+    still, there = np.zeros((len(mask), 3)), mask.astype(np.float64)
     names = dict.fromkeys(name for _, _, by_value in blocks for name in by_value)
     by_value = {name: there * np.hstack([block[2].get(name, still) for block in blocks]) for name in names}
     by_joint = there[:, :, None] * np.concatenate([block[1] for block in blocks], axis=1)

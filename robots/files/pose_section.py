@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -153,7 +154,7 @@ def _other_targets(section: Section, link: str, positions: Topic, joints: tuple[
                 f"{entry.place}: {name!r} is the name of the first target, of a joint, {TOOL}, {TRACKER} or has a dot; "
                 "give the target a name of its own"
             )
-        found.append(entry.build(lambda s, name=name: _other_target(s, name, link, positions)))
+        found.append(entry.build(partial(_other_target, name=name, link=link, positions=positions)))
     return tuple(found)
 
 
@@ -176,7 +177,7 @@ def _placed_targets(
     Raises:
         RobotError: a target that is not on the tool.
     """
-    found = {}
+    found: dict[str, Parameter] = {}
     tool = tree.model.frames[tree.frame_id(setup.link)].parentJoint
     for target in setup.others:
         where = f"{place}: poses.targets.{target.name}.link"

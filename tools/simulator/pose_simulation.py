@@ -67,7 +67,8 @@ def simulate_poses(
         EffectError: an unknown effect.
     """
     conditions = conditions or PoseConditions()
-    if robot.poses is None:
+    setup = robot.poses
+    if setup is None:
         raise RobotError(f"{robot.path.name} has no section `poses`; see docs/poses.md")
     if count < 1:
         raise SimulationError(f"number of poses: expected 1 or more, got {count}")
@@ -78,27 +79,27 @@ def simulate_poses(
     low, high = np.nan_to_num(robot.tree.limits.T, posinf=np.pi, neginf=-np.pi)
     middle, half = (low + high) / 2.0, np.minimum((high - low) / 2.0, np.pi)
     q = middle + REACH * half * rng.uniform(-1.0, 1.0, (count, robot.n))
-    unseen = robot.poses.joint_sigmas * rng.standard_normal(q.shape)
+    unseen = setup.joint_sigmas * rng.standard_normal(q.shape)
     sites, torques = arm.at_rest(q, unseen)
-    T = np.eye(4) if robot.poses.tracker is None else robot.poses.tracker
+    T = np.eye(4) if setup.tracker is None else setup.tracker
     shift = np.array([values.get(f"tracker.{part}", 0.0) for part in ("lx", "ly", "lz")])
     drift = np.linspace(0.0, 1.0, count)[:, None] * arm.drift
 
     def seen(targets: Array) -> Array:
-        noise = robot.poses.target_sigma * rng.standard_normal(targets.shape)
+        noise = setup.target_sigma * rng.standard_normal(targets.shape)
         return np.asarray((targets - T[:3, 3]) @ T[:3, :3] + shift + drift + noise)
 
     def turned(turns: Array) -> Array | None:
         if not conditions.orientation:
             return None
-        noise = robot.poses.turn_sigma * rng.standard_normal((len(turns), 3))
+        noise = setup.turn_sigma * rng.standard_normal((len(turns), 3))
         return np.stack([T[:3, :3].T @ R @ pin.exp3(w) for R, w in zip(turns, noise, strict=True)])
 
     (targets, turns), *others = sites.values()
     measured = seen(targets)
     read = q + ENCODER * rng.standard_normal(q.shape)
     turn = turned(turns)
-    sightings = zip(robot.poses.other_names, others, strict=True)
+    sightings = zip(setup.other_names, others, strict=True)
     more = tuple(Sighting(name, seen(places), turned(R)) for name, (places, R) in sightings)
     truth = {
         "robot": robot.name,

@@ -169,9 +169,11 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
         by_label[label] = {part: summary([found[part] for found in each]) for part in each[0]}
     content = {
         label: {
-            "poses": parts["whole model"].to_json()
-            | {"parts": {p: e.to_json() for p, e in parts.items()}}
-            | targets_json(parts["whole model"])
+            "poses": {
+                **parts["whole model"].to_json(),
+                "parts": {p: e.to_json() for p, e in parts.items()},
+                **targets_json(parts["whole model"]),
+            }
         }
         for label, parts in by_label.items()
     }

@@ -81,14 +81,14 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
         )
     target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
     _must_differ(path, np.hstack([q, target]))
-    rows = Poses(str(path), digest, names, q, target, torque=tau)
-    return _with_targets(path, rows, head, body, robot)
+    found = Poses(str(path), digest, names, q, target, torque=tau)
+    return _with_targets(path, found, head, body, robot)
 
 
 def _with_targets(path: Path, rows: Poses, head: Sequence[str], body: Sequence[Sequence[str]], robot: Robot) -> Poses:
     """Rows with measured places as poses, with the orientations that were measured."""
     assert robot.poses is not None
-    targets, xyzw, notices = target_names(path, head, body, robot), quaternions(path, head, body), []
+    targets, xyzw, notices = target_names(path, head, body, robot), quaternions(path, head, body), list[Notice]()
     if xyzw is not None:
         turns, owner = np.full((len(body), 3, 3), np.nan), np.array(targets or [robot.poses.link] * len(body))
         for target in dict.fromkeys(owner.tolist()):

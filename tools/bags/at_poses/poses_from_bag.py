@@ -69,8 +69,8 @@ def poses_from_bag(path: Path, robot: Robot) -> Poses:
             moving += 1
             continue
         tau = np.full(robot.n, np.nan) if effort is None else effort[inside].mean(axis=0)
-        means = [track.mean(mine) for track, mine in zip(tracks, seen, strict=True)]
-        found.append((q[inside].mean(axis=0), np.stack(means), tau))
+        told = np.stack([track.mean(mine) for track, mine in zip(tracks, seen, strict=True)])
+        found.append((q[inside].mean(axis=0), told, tau))
     if not found:
         raise RecordingError(
             f"{path}: {counted(len(rests), 'rest')} of all joints, none with a target in {setup.positions.topic}; "
@@ -87,9 +87,9 @@ def poses_from_bag(path: Path, robot: Robot) -> Poses:
     qs, means, torques = (np.array(part) for part in zip(*found, strict=True))
     names, sightings = tuple(str(i) for i in range(len(qs))), list[Sighting]()
     for i, track in enumerate(tracks):
-        told = orientations(path, means[:, i, 3:], [f"pose {name}" for name in names], track.name)
-        notices += told.notices
-        sightings.append(Sighting(track.name, means[:, i, :3], told.turns))
+        turned = orientations(path, means[:, i, 3:], [f"pose {name}" for name in names], track.name)
+        notices += turned.notices
+        sightings.append(Sighting(track.name, means[:, i, :3], turned.turns))
     return Poses(
         str(path),
         bag_sha256(path),
