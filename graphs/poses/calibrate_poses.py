@@ -266,13 +266,12 @@ def _result(
         robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale, turn_sigma=robot.poses.turn_sigma * turning
     )
     found = replace(found, parameters=parameters, poses=setup)
-    columns: dict[str, list[Array]] = {}
-    for problem, calibration in zip(problems, calibrations, strict=True):
-        for name, column in problem.point(calibration).by_value.items():
-            columns.setdefault(name, []).append(column)
-    names = error_names(problems[0].arm.chain.joints, setup.other_names)
-    order = [n for n in (*names, *_gaps(first)) if n in columns]
-    told = determined({name: filled(columns[name], 1) for name in order}, order)
+    points = [problem.point(calibration) for problem, calibration in zip(problems, calibrations, strict=True)]
+    names = (*error_names(problems[0].arm.chain.joints, setup.other_names), *_gaps(first))
+    order = [n for n in names if any(n in point.by_value for point in points)]
+    still = [np.zeros(problem.targets.there.shape) for problem in problems]
+    columns = {n: [p.by_value.get(n, zero) for p, zero in zip(points, still, strict=True)] for n in order}
+    told = determined({name: filled(each, 1) for name, each in columns.items()}, order)
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,

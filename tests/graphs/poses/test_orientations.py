@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Orientations of targets, by an arm in MuJoCo: right values and noises, what they add, and conventions that are wrong."""
+"""Orientations of targets, by an arm in MuJoCo: right values and noises, what they add, and wrong conventions."""
 
 from __future__ import annotations
 
@@ -97,7 +97,9 @@ def test_a_known_orientation_says_more_and_a_wrong_one_is_told(tmp_path, tx90l, 
     assert found["tool.mis_y"].sigma < open_one["tool.mis_y"].prior_sigma
     assert abs(found["tool.mis_y"].value - truth["parameters"]["tool.mis_y"]) < 3.0 * found["tool.mis_y"].sigma
     wrong = tool_with(tmp_path / "wrong", "", "  orientation: [0.0, 0.0, 0.0, 1.0]\n")
-    with pytest.raises(RecordingError, match="reflector is not oriented on the tool as tool.yaml says, off by .*leave"):
+    with pytest.raises(
+        RecordingError, match=r"reflector is not oriented on the tool as tool.yaml says, off by .*leave"
+    ):
         calibrate_poses(wrong, [poses])
 
 

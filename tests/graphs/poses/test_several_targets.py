@@ -162,7 +162,7 @@ def test_sigmas_are_honest_in_twenty_arms(robot):
     for seed in range(20):
         poses, truth = simulate_poses(robot, 25, seed, PoseConditions(orientation=seed % 2 == 1))
         found = calibrate_poses(robot, [with_holes(poses, seed)])
-        for name in WRIST + ("joint3.mis_x", "joint3.lz", "joint1.mis_y", "joint1.mis_x", "joint2.mis_x"):
+        for name in (*WRIST, "joint3.mis_x", "joint3.lz", "joint1.mis_y", "joint1.mis_x", "joint2.mis_x"):
             p = found.robot.parameters[name]
             z.append((p.value - truth["parameters"][name]) / p.sigma)
     assert 0.85 < np.sqrt(np.mean(np.square(z))) < 1.15 and np.mean(np.abs(z) < 2.0) > 0.91
@@ -177,7 +177,9 @@ def test_exchanged_names_and_lost_targets_are_told(robot, simulated):
     lost = replace(right, place=np.where(np.arange(30)[:, None] == 7, 0.0, right.place))
     with pytest.raises(RecordingError, match="the target right is at exactly zero in pose 7: the tracker had lost it"):
         calibrate_poses(robot, [replace(poses, others=(left, lost))])
-    with pytest.raises(RecordingError, match="the target 'top' is none of tool.yaml, which has reflector, left, right"):
+    with pytest.raises(
+        RecordingError, match=r"the target 'top' is none of tool.yaml, which has reflector, left, right"
+    ):
         calibrate_poses(robot, [replace(poses, others=(replace(left, name="top"), right))])
 
 

@@ -98,7 +98,7 @@ def _with_targets(path: Path, rows: Poses, head: Sequence[str], body: Sequence[S
             notices += found.notices
         rows = replace(rows, turn=turns if np.any(np.isfinite(turns)) else None)
     if targets:
-        rows = by_pose(rows, targets, robot.poses.link, "pose" in head)
+        rows = by_pose(rows, targets, [target.name for target in robot.poses.targets], "pose" in head)
     return replace(rows, notices=(*notices, *_same_names(path, rows.names)))
 
 

@@ -139,7 +139,7 @@ def _track(bag: Bag, section: str, key: str, target: MountedTarget) -> _Track:
     turn = BESIDE.get(last) if head else None
     if turn is None:
         return _Track(target.name, times, places)
-    need = replace(source, field=f"{head}.{turn}", unit="1")
+    need = replace(source, field=f"{head}.{turn}", unit="rad")  # a quaternion has no unit: by a factor of one
     beside, xyzw, _ = _signal(bag, StreamSource(key, need, (*AXES, "w"), of_target=True, section=section))
     if len(beside) != len(times):
         return _Track(target.name, times, places)

@@ -129,13 +129,13 @@ def target_names(path: Path, head: Sequence[str], body: Sequence[Sequence[str]],
     return tuple(names)
 
 
-def by_pose(rows: Poses, names: Sequence[str], first: str, has_names: bool) -> Poses:
+def by_pose(rows: Poses, names: Sequence[str], known: Sequence[str], has_names: bool) -> Poses:
     """Rows of one target each as poses of all that was seen in them.
 
     Args:
         rows: a row as a pose.
         names: target of each row.
-        first: name of the first target.
+        known: names of the targets of the robot file, in its order.
         has_names: whether the table has names of poses.
 
     Raises:
@@ -165,7 +165,7 @@ def by_pose(rows: Poses, names: Sequence[str], first: str, has_names: bool) -> P
         )
     found = []
     assert rows.target is not None
-    for target in dict.fromkeys([first, *seen]):
+    for target in (name for i, name in enumerate(known) if not i or name in seen):
         place, turn = np.full((len(poses), 3), np.nan), np.full((len(poses), 3, 3), np.nan)
         mine = seen.get(target, np.zeros(0, int))
         place[of_row[mine]] = rows.target[mine]
