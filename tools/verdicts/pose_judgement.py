@@ -35,7 +35,7 @@ APART = (3.0, 10.0)  # [sigma] that a distance which is said may be from that of
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _near_priors, _apart, _lacks)
+    makers = (_enough, _elsewhere, _repeatability, _turns, _outliers, _still, _within, _near_priors, _apart, _lacks)
     checks = (make(result) for make in (*makers, _backlash, _worth))
     return Judgement.of([check for check in checks if check is not None])
 
@@ -141,6 +141,26 @@ def _repeatability(result: PoseCalibration) -> Check:
             "tracker, or an effect that is missing"
         )
     return Check(level, name, f"{text}.")
+
+
+def _turns(result: PoseCalibration) -> Check | None:
+    """Whether orientations are as good as the robot file says; None where none were measured."""
+    turned = [problem for problem in result.problems if np.any(problem.targets.turns)]
+    if not turned or result.robot.poses is None:
+        return None
+    factor, count = turned[0].turning, len(summary(result.errors).turns)
+    level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
+    text = f"{count} orientations are those of a tracker that tells them to {_mrad(result.robot.poses.turn_sigma)} mrad"
+    if level != "good":
+        text += (
+            f", {significant(factor, 2)} times what `orientation_sigma` of the robot file says: a loose target, an "
+            "orientation of another time than the position, or an effect that turns the tool and is missing"
+        )
+    return Check(level, "Orientations as the tracker tells them", f"{text}.")
+
+
+def _mrad(angle: float) -> str:
+    return significant(1e3 * angle, 2)
 
 
 def _within(result: PoseCalibration) -> Check:

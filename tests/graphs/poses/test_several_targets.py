@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.rests.independent_states import reduced
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
@@ -195,3 +197,46 @@ def test_a_target_that_a_reflection_moved_is_left_out_with_its_pose(robot, simul
     place[11] += [0.0, 3e-3, 0.0]
     found = calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
     assert [name for _, name, _ in found.left_out] == ["11"]
+
+
+def test_balls_in_sockets_may_be_several_and_each_is_found_on_the_tool(tmp_path):
+    """Angles from the kinematics of pinocchio, turned until the ball that is named is in its socket."""
+    robot = tool_with(tmp_path, "low: {}", "  tool_sigma: 0.15\n  contact_distance: 0.05\n")
+    tree, rng = robot.tree, np.random.default_rng(4)
+    at = {"": np.array([0.01, -0.02, 0.03]), "low": np.array([0.09, 0.02, -0.04])}
+    q, contacts, held, places = [], [], [], []
+    for i, place in enumerate(("left", "right", "high", "far")):
+        corner = np.array([0.5, 0.4 - 0.3 * i, 0.3 + 0.2 * (i % 2)])
+        for k in (0, 1):
+            socket, name = corner + 0.05 * k * np.eye(3)[i % 3], f"{place}{k}"
+            places.append((name, place))
+            for ball in ("", "low"):
+                found = [angles for _ in range(30) if (angles := in_socket(tree, at[ball], socket, rng)) is not None][
+                    :5
+                ]
+                q += found
+                contacts += [name] * len(found)
+                held += [ball or "reflector"] * len(found)
+    q = np.array(q) + 2e-5 * rng.standard_normal((len(q), 6))
+    names = tuple(map(str, range(len(q))))
+    poses = Poses("sockets", "", names, q, None, tuple(contacts), tuple(places), held=tuple(held))
+    rigid = {n: p for n, p in robot.parameters.items() if "stiffness" not in n and "backlash" not in n}
+    found = calibrate_poses(replace(robot, parameters=rigid), [poses])
+    for owner, place in (("tool", at[""]), ("low", at["low"])):
+        for part, value in zip(("lx", "ly", "lz"), place, strict=True):
+            p = found.robot.parameters[f"{owner}.{part}"]
+            assert abs(p.value - value) < 3.5 * p.sigma < 4e-3, p.name
+    errors = tip_errors(found.problems[0], found.calibrations[0])
+    assert set(errors.of_targets) == {"reflector", "low"} and errors.to_json()["rms_mm"] < 0.1
+
+
+def in_socket(tree, ball, socket, rng):
+    """Angles that bring a point of the tool into a socket, from anywhere; None where that does not end."""
+    q = rng.uniform(-1.5, 1.5, 6)
+    for _ in range(40):
+        ends = [tree.body_poses("reflector", (q + d)[None]) for d in (*(1e-6 * np.eye(6)), np.zeros(6))]
+        points = np.array([R[0] @ ball + p[0] for R, p in ends])
+        J = (points[:6] - points[6]).T / 1e-6
+        q = q - np.clip(np.linalg.pinv(J) @ (points[6] - socket), -0.5, 0.5)
+    R, p = tree.body_poses("reflector", q[None])
+    return q if np.linalg.norm(R[0] @ ball + p[0] - socket) < 1e-9 and np.abs(q).max() < 2.2 else None
