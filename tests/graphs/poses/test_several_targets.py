@@ -211,9 +211,8 @@ def test_balls_in_sockets_may_be_several_and_each_is_found_on_the_tool(tmp_path)
             socket, name = corner + 0.05 * k * np.eye(3)[i % 3], f"{place}{k}"
             places.append((name, place))
             for ball in ("", "low"):
-                found = [angles for _ in range(30) if (angles := in_socket(tree, at[ball], socket, rng)) is not None][
-                    :5
-                ]
+                tried = (in_socket(tree, at[ball], socket, rng) for _ in range(60))
+                found = list(islice((angles for angles in tried if angles is not None), 4))
                 q += found
                 contacts += [name] * len(found)
                 held += [ball or "reflector"] * len(found)
