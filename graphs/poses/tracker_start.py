@@ -27,6 +27,7 @@ from jointscope.robots.recordings.poses import Poses, Sighting
 
 Array = NDArray[np.float64]
 TOOL_KNOWN = 5e-3  # [m] the place of a target that is known less well is looked for with that of the tracker
+FEWEST = 4  # sightings of a target that tell its place and that of the tracker
 ANY_TURN = 0.1  # [rad] prior sigma of an orientation on the tool that the poses themselves have told
 
 
@@ -63,7 +64,7 @@ def _with_trackers(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list
     if setup is None or known:
         return robot, problems
     first = problems[0].of_first
-    if setup.tool_sigma > TOOL_KNOWN and first.poses.target is not None and len(first.poses):
+    if setup.tool_sigma > TOOL_KNOWN and first.poses.target is not None and len(first.poses) >= FEWEST:
         shift = tracker_and_target(first, first.poses.target)[1]
         values = {f"{TOOL}.{part}": float(v) for part, v in zip(LENGTHS, shift, strict=True)}
         robot = robot.with_values(values if all(abs(robot.parameters[n].value) < TOOL_KNOWN for n in values) else {})

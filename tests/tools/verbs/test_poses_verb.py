@@ -264,9 +264,13 @@ def test_several_targets_with_orientations_from_the_first_command_to_the_last(tm
         x, y, z, w = truth[target.name]
         R = of_quaternions(np.array([[x, y, z, w]]))[0]
         assert np.linalg.norm(R - target.turn) < 1e-2
-    (tmp_path / "limits.yaml").write_text("format: 1\nlimits:\n  - {poses: true, p90_mrad: 0.3, p90_mm: 0.1}\n")
-    compared = ["compare", arm, found["yaml"], "--poses", str(tmp_path / "others.csv"), "--json", found["json"]]
-    assert main(compared) == 0
+    (tmp_path / "limits.yaml").write_text(
+        "limits:\n  - {poses: all, p90_mrad: 0.35}\n  - {poses: all, max_mrad: 0.1}\n"
+    )
+    compared = ["compare", found["yaml"], "--poses", str(tmp_path / "others.csv")]
+    assert main([*compared, "--accept", str(tmp_path / "limits.yaml")]) == 3
+    assert "Not accepted: 1 of 2 limits" in (said := capsys.readouterr().out) and "0.35" in said and " mrad" in said
+    assert main([*compared[:1], arm, *compared[1:], "--json", found["json"]]) == 0
     models = json.loads((tmp_path / "found.json").read_text())["models"]
     assert models["found"]["poses"]["p90_mrad"] < 0.35 < 1.0 < models["tool"]["poses"]["p90_mrad"]
     assert set(models["found"]["poses"]["targets"]) == {"reflector", "left", "right"}
