@@ -264,9 +264,9 @@ def test_several_targets_with_orientations_from_the_first_command_to_the_last(tm
         x, y, z, w = truth[target.name]
         R = of_quaternions(np.array([[x, y, z, w]]))[0]
         assert np.linalg.norm(R - target.turn) < 1e-2
-    (tmp_path / "limits.yaml").write_text(
-        "limits:\n  - {poses: all, p90_mrad: 0.35}\n  - {poses: all, max_mrad: 0.1}\n"
-    )
+    limits = ("p90_mrad: 0.35, because: welding", "max_mrad: 0.1, because: no arm is")
+    text = "".join(f"  - {{poses: all, {limit}}}\n" for limit in limits)
+    (tmp_path / "limits.yaml").write_text(f"limits:\n{text}")
     compared = ["compare", found["yaml"], "--poses", str(tmp_path / "others.csv")]
     assert main([*compared, "--accept", str(tmp_path / "limits.yaml")]) == 3
     assert "Not accepted: 1 of 2 limits" in (said := capsys.readouterr().out) and "0.35" in said and " mrad" in said
