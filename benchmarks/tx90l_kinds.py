@@ -13,8 +13,9 @@ import numpy as np
 
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
-from jointscope.graphs.poses.calibrate_poses import calibrate_poses, placed
+from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.tip_errors import tip_errors
+from jointscope.graphs.poses.tracker_start import placed
 from jointscope.robots.geometry.error_parameters import BEARING, STIFFNESS
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.at_poses.read_poses import read_poses

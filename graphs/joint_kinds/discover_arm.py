@@ -22,9 +22,10 @@ from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candida
 from jointscope.graphs.joint_kinds.calibrate_kinds import MOST_PASSES, calibrate_kinds
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, placed, squared_distances
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, squared_distances
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
+from jointscope.graphs.poses.tracker_start import placed
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
@@ -90,12 +91,13 @@ class ArmDiscovery:
 
     def whitened(self, step: ArmStep, sessions: Sequence[PoseSet]) -> float:
         """Root mean square error of a model on poses, per coordinate [sigma of the last model's noise]; 1 is noise."""
-        found = []
+        found, counts = [], []
         for problem in sessions:
             robot = replace(step.calibrated.robot, poses=self.robot.poses)
-            other = replace(problem, robot=robot, repeatability=1.0)
+            other = replace(problem, robot=robot, repeatability=1.0, turning=1.0)
             found.append(squared_distances(other, other.start(Calibration.of(robot))[1]))
-        return float(np.sqrt(np.mean(np.concatenate(found)) / 3.0))
+            counts.append(other.targets.there.sum(axis=1))
+        return float(np.sqrt(np.mean(np.concatenate(found)) / np.mean(np.concatenate(counts))))
 
 
 def discover_arm(

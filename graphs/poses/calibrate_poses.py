@@ -14,23 +14,24 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
+from jointscope.graphs.poses.linear_poses import filled
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
-from jointscope.graphs.poses.tracker_start import tracker_and_target
-from jointscope.graphs.poses.trimmed_poses import TrimmedPoses
+from jointscope.graphs.poses.tracker_start import placed
+from jointscope.graphs.poses.trimmed_poses import CHANCE, TrimmedPoses
+from jointscope.graphs.poses.two_noises import noise_ratios
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
-from jointscope.robots.bodies.misplaced_joints import LENGTHS
 from jointscope.robots.errors import RecordingError, SolveError
-from jointscope.robots.geometry.error_parameters import TOOL, error_names
-from jointscope.robots.geometry.tracker_fit import base_from_tracker
+from jointscope.robots.geometry.error_parameters import error_names
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
 from jointscope.robots.recordings.poses import Poses
@@ -38,7 +39,6 @@ from jointscope.robots.recordings.poses import Poses
 Array = NDArray[np.float64]
 PASSES = 12  # of repeatability and outliers
 AGREES = 0.02  # relative change of the repeatability that asks for no further pass
-TOOL_KNOWN = 5e-3  # [m] the place of a target that is known less well is looked for with that of the tracker
 OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
 MOST_OUT = 0.2  # share of the poses that may be left out
 MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is missing pulls along go a long way
@@ -117,10 +117,10 @@ def calibrate_poses(
     screen_poses(problems)
     before = tuple(tip_errors(problem) for problem in problems)
     out: list[tuple[str, str, float]] = []
-    scale, weighted, iterations = 1.0, False, 0
+    scale, turning, weighted, iterations = 1.0, 1.0, False, 0
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
-        problems = [replace(problem, repeatability=scale) for problem in problems]
+        problems = [replace(problem, repeatability=scale, turning=turning) for problem in problems]
         everything = [*problems, *others]
         solution = solve(everything, _estimate(everything, known), max_iterations=MOST_ITERATIONS, progress=None)
         iterations, known = iterations + len(solution.iterations), solution.estimate.calibrations
@@ -135,9 +135,10 @@ def calibrate_poses(
         if i == 0 and out:
             continue
         distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
-        worst = max(float(d.max()) for d in distances)
+        far = [d * _as_one_target(p) for p, d in zip(problems, distances, strict=True)]
+        worst = max(float(d.max()) for d in far)
         if weighted and i < PASSES - 1 and worst > OUTLYING:
-            problems, found = _without_outliers(problems, distances, max(OUTLYING, 0.25 * worst))
+            problems, found = _without_outliers(problems, far, max(OUTLYING, 0.25 * worst))
             out += found
             if len(out) > MOST_OUT * sum(map(len, sessions)):
                 raise SolveError(
@@ -149,12 +150,12 @@ def calibrate_poses(
         pairs = zip(others, known[len(problems) :], strict=True)
         elsewhere = [other.linearize(np.zeros((0, 1)), c).C for other, c in pairs]
         ratio = _chi2(problems, known[0], covariance, distances, elsewhere)
-        wanted = scale * np.sqrt(ratio) if robot.poses is not None and robot.poses.estimate_sigma else scale
-        if abs(np.log(wanted / scale)) < AGREES:
+        changes = _changes(problems, known[: len(problems)], covariance, ratio)
+        if np.all(np.abs(np.log(changes)) < AGREES):
             break
-        scale, weighted = float(wanted), True
+        scale, turning, weighted = float(scale * changes[0]), float(turning * changes[1]), True
     seconds = time.perf_counter() - began
-    return _result(robot, problems, known[: len(problems)], covariance, before, scale, ratio, out, iterations, seconds)
+    return _result(robot, problems, known[: len(problems)], covariance, before, ratio, out, iterations, seconds)
 
 
 def _must_be_poses(sessions: Sequence[Poses]) -> None:
@@ -166,32 +167,6 @@ def _must_be_poses(sessions: Sequence[Poses]) -> None:
             f"expected a list of poses, got {type(wrong).__name__}; jointscope.tools.bags.at_poses.read_poses."
             "read_poses(path, robot) reads those of a table or bag: calibrate_poses(robot, [read_poses(path, robot)])"
         )
-
-
-def placed(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list[PoseSet]]:
-    """The sessions with the tracker where it stands; found from the poses where nothing says it."""
-    setup = robot.poses
-    problems = [
-        PoseSet(robot, poses, np.eye(4) if setup is None or setup.tracker is None else setup.tracker)
-        for poses in sessions
-    ]
-    if setup is None or setup.tracker is not None or all(poses.contacts for poses in sessions):
-        for problem in problems:
-            _ = problem.arm  # says what is missing
-        return robot, problems
-    placed = []
-    if setup.tool_sigma > TOOL_KNOWN and problems[0].poses.target is not None:
-        shift = tracker_and_target(problems[0], problems[0].poses.target)[1]
-        values = {f"{TOOL}.{part}": float(v) for part, v in zip(LENGTHS, shift, strict=True)}
-        robot = robot.with_values(values if all(abs(robot.parameters[n].value) < TOOL_KNOWN for n in values) else {})
-        problems = [problem.of_robot(robot) for problem in problems]
-    for problem in problems:
-        known = problem.values(Calibration.of(robot))
-        targets = problem.arm.at(problem.q, np.zeros_like(problem.q), known).target
-        assert problem.poses.target is not None
-        placed.append(replace(problem, tracker=base_from_tracker(targets, problem.poses.target)[0]))
-    robot = replace(robot, poses=replace(setup, tracker=placed[0].tracker))
-    return robot, [problem.of_robot(robot) for problem in placed]
 
 
 def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> Estimate:
@@ -209,6 +184,26 @@ def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
     point = problem.point(calibration)
     r = problem.misses(point, calibration)
     return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(problem.covariances(point), r[:, :, None])[:, :, 0]))
+
+
+def _as_one_target(problem: PoseSet) -> Array:
+    """What makes squared distances of poses with any number of coordinates as unlikely as those with three."""
+    return np.asarray(chi2.isf(CHANCE, 3) / chi2.isf(CHANCE, problem.targets.there.sum(axis=1)))
+
+
+def _changes(
+    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariance: Array, ratio: float
+) -> tuple[float, float]:
+    """Factors on the repeatability of the joints and on the noise of orientations that the residuals ask for."""
+    setup = problems[0].robot.poses
+    assert setup is not None
+    by_joints, by_turns = ratio, 1.0
+    if any(np.any(problem.targets.turns) for problem in problems):
+        by_joints, by_turns = noise_ratios(problems, calibrations, covariance)
+    return (
+        float(np.sqrt(by_joints)) if setup.estimate_sigma else 1.0,
+        float(np.sqrt(by_turns)) if setup.estimate_turn_sigma else 1.0,
+    )
 
 
 def _chi2(
@@ -255,8 +250,7 @@ def _result(
     calibrations: Sequence[Calibration],
     covariance: Array,
     before: tuple[TipErrors, ...],
-    scale: float,
-    chi2: float,
+    ratio: float,
     out: Sequence[tuple[str, str, float]],
     iterations: int,
     seconds: float,
@@ -267,17 +261,20 @@ def _result(
     found = robot.with_values(dict(zip(first.names, first.values.tolist(), strict=True)))
     parameters = with_sigmas(found.parameters, dict(zip(first.names, sigmas.tolist(), strict=True)))
     assert robot.poses is not None
-    setup = replace(robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale)
+    scale, turning = problems[0].repeatability, problems[0].turning
+    setup = replace(
+        robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale, turn_sigma=robot.poses.turn_sigma * turning
+    )
     found = replace(found, parameters=parameters, poses=setup)
-    columns: dict[str, list[Array]] = {}
-    for problem, calibration in zip(problems, calibrations, strict=True):
-        for name, column in problem.point(calibration).by_value.items():
-            columns.setdefault(name, []).append(column)
-    order = [n for n in (*error_names(problems[0].arm.chain.joints), *_gaps(first)) if n in columns]
-    told = determined({name: np.concatenate(columns[name]) for name in order}, order)
+    points = [problem.point(calibration) for problem, calibration in zip(problems, calibrations, strict=True)]
+    names = (*error_names(problems[0].arm.chain.joints, setup.other_names), *_gaps(first))
+    order = [n for n in names if any(n in point.by_value for point in points)]
+    still = [np.zeros(problem.targets.there.shape) for problem in problems]
+    columns = {n: [p.by_value.get(n, zero) for p, zero in zip(points, still, strict=True)] for n in order}
+    told = determined({name: filled(each, 1) for name, each in columns.items()}, order)
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
-        found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, chi2,
+        found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,
         tuple(out), iterations, seconds,
     )  # fmt: skip
 

@@ -34,13 +34,14 @@ class LinearPoses:
     """Whitened rows of all poses: residual r + J d of a step d away from the calibrated values (`LinearKind`).
 
     Attributes:
-        r: shape (3 m,) [sigma].
-        J: columns of the values and of the points of contacts, shape (3 m, p).
+        r: shape (k m,) [sigma]; k rows for each pose, zero where it has fewer.
+        J: columns of the values and of the points of contacts, shape (k m, p).
         tied: information on the columns from priors and known distances, shape (p, p).
         pull: slope of the cost of these, shape (p,).
         groups: number of the group of each pose, shape (m,).
         contacts: number of the contact of each pose, shape (m,); -1 where a tracker measured.
-        whiten: of each pose, shape (m, 3, 3).
+        whiten: of each pose, shape (m, k, k).
+        measured: number of coordinates of each pose, shape (m,).
         off, apart: whitened residuals of known distances between contacts, shape (d,), and their columns, shape (d, p);
             `tied` and `pull` hold them, too.
         places: for each session, which of the columns are those of its calibration.
@@ -53,6 +54,7 @@ class LinearPoses:
     groups: NDArray[np.intp]
     contacts: NDArray[np.intp]
     whiten: Array
+    measured: Array
     off: Array
     apart: Array
     places: tuple[NDArray[np.intp], ...]
@@ -87,8 +89,8 @@ class LinearPoses:
             place = np.zeros(calibration.size, dtype=np.intp)
             place[index], place[own] = np.arange(size), np.arange(first, first + len(own))
             W, r, J = _whitened(problem, calibration)
-            wide = np.zeros((len(r), total))
-            wide[:, place] = J
+            wide = np.zeros((*r.shape, total))
+            wide[:, :, place] = J
             off, own_apart = problem.distances(calibration)
             apart = np.zeros((len(off), total))
             apart[:, place] = own_apart
@@ -98,13 +100,15 @@ class LinearPoses:
             held += [number[c] for c in problem.poses.contacts] or [-1] * len(problem.poses)
             names += problem.poses.groups
             first += len(own)
-            pieces.append((r, wide, W))
+            pieces.append((r, wide, W, problem.targets.there.sum(axis=1)))
         groups = {name: i for i, name in enumerate(dict.fromkeys(names))}
-        r, J, W = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        r, J = (filled([piece[i] for piece in pieces], 1) for i in range(2))
+        W, measured = filled([piece[2] for piece in pieces], 2), np.concatenate([piece[3] for piece in pieces])
         off, apart = (np.concatenate([tie[k] for tie in ties]) for k in range(2))
         tied, pull = tied + apart.T @ apart, pull + apart.T @ off
         numbers = np.array([groups[name] for name in names])
-        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W, off, apart, tuple(places))
+        r, J = r.reshape(-1), J.reshape(r.size, total)
+        return LinearPoses(r, J, tied, pull, numbers, np.array(held), W, measured, off, apart, tuple(places))
 
     @cached_property
     def fold_of(self) -> NDArray[np.intp]:
@@ -119,25 +123,30 @@ class LinearPoses:
     @property
     def counted(self) -> float:
         """Number of measured coordinates."""
-        return float(len(self.r))
+        return float(self.measured.sum())
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of each pose, k."""
+        return self.whiten.shape[1]
 
     @cached_property
     def basis(self) -> Array:
-        """Orthonormal basis of all that the columns and what ties them explain, shape (3 m + p, p)."""
+        """Orthonormal basis of all that the columns and what ties them explain, shape (k m + p, p)."""
         return np.asarray(np.linalg.qr(np.vstack([self.J, np.linalg.cholesky(self.tied).T]))[0])
 
     def whitened(self, columns: Array) -> Array:
-        """Columns of shape (m, 3, k) as rows, shape (3 m, k)."""
+        """Columns of shape (m, k, q) as rows, shape (k m, q)."""
         return np.asarray((self.whiten @ columns).reshape(-1, columns.shape[2]))
 
     def beside(self, extra: Array) -> Array:
-        """What is left of columns when everything else may explain them, shape (3 m + p, k)."""
+        """What is left of columns when everything else may explain them, shape (k m + p, q)."""
         wide = np.vstack([extra, np.zeros((len(self.tied), extra.shape[1]))])
         return np.asarray(wide - self.basis @ (self.basis.T @ wide))
 
     def equations(self, extra: Array, out: int | None = None) -> tuple[Array, Array]:
         """As `LinearKind` says."""
-        rows = slice(None) if out is None else np.repeat(self.fold_of != out, 3)
+        rows = slice(None) if out is None else np.repeat(self.fold_of != out, self.rows)
         A = self._wide(extra)[rows]
         return A.T @ A, A.T @ self.r[rows]
 
@@ -148,13 +157,13 @@ class LinearPoses:
 
     def left_out(self, extra: Array, step: Array, fold: int) -> float:
         """As `LinearKind` says; contacts of the poses that were left out are where they fit best."""
-        rows = (self.r + self._wide(extra) @ step).reshape(-1, 3)
+        rows = (self.r + self._wide(extra) @ step).reshape(-1, self.rows)
         held = self.fold_of == fold
         for contact in set(self.contacts[held].tolist()) - {-1}:
             mine = self.contacts == contact
-            W = self.whiten[mine]
-            H, slope = np.einsum("mij,mik->jk", W, W), np.einsum("mij,mi->j", W, rows[mine])
-            rows[mine] -= W @ np.linalg.solve(H, slope)
+            W = self.whiten[mine][:, :3, :3]
+            H, slope = np.einsum("mij,mik->jk", W, W), np.einsum("mij,mi->j", W, rows[mine][:, :3])
+            rows[mine, :3] -= W @ np.linalg.solve(H, slope)
         return float(np.sum(rows[held] ** 2))
 
     def _wide(self, extra: Array) -> Array:
@@ -177,7 +186,7 @@ def prior_pull(robot: Robot, names: Sequence[str]) -> Array:
 
 
 def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
-    """What the parameters of an effect that is not there would do to the targets, shape (m, 3, k).
+    """What the parameters of an effect that is not there would do to the rows of poses, shape (m, k, q).
 
     Of a stiffness its compliance counts, which is zero in a rigid joint.
     """
@@ -189,13 +198,22 @@ def columns_of(result: PoseCalibration, hypothesis: ArmHypothesis) -> Array:
         by_value = other.seen(problem.values(calibration) | added).by_value
         columns = np.stack([by_value[name] for name in hypothesis.names], axis=2)
         found.append(-columns * RIGID**2 if hypothesis.kind.soft else columns)
-    return np.concatenate(found)
+    return filled(found, 1)
+
+
+def filled(pieces: Sequence[Array], axes: int) -> Array:
+    """Arrays of some sessions one behind the other, their next axes made as long as the longest by zeros."""
+    longest = [max(piece.shape[1 + k] for piece in pieces) for k in range(axes)]
+    wide = []
+    for piece in pieces:
+        more = [(0, size - piece.shape[1 + k]) for k, size in enumerate(longest)]
+        wide.append(np.pad(piece, [(0, 0), *more, *[(0, 0)] * (piece.ndim - 1 - axes)]))
+    return np.concatenate(wide)
 
 
 def _whitened(problem: PoseSet, calibration: Calibration) -> tuple[Array, Array, Array]:
-    """Whitening of each pose, shape (m, 3, 3), residual, shape (3 m,), and columns, shape (3 m, p)."""
+    """Whitening of each pose, shape (m, k, k), residual, shape (m, k), and columns, shape (m, k, p)."""
     point = problem.point(calibration)
     W = np.linalg.inv(np.linalg.cholesky(problem.covariances(point)))
     r = (W @ problem.misses(point, calibration)[:, :, None])[:, :, 0]
-    columns = W @ problem.columns(point, calibration)
-    return W, r.reshape(-1), columns.reshape(-1, calibration.size)
+    return W, r, W @ problem.columns(point, calibration)

@@ -4,7 +4,8 @@
     target_measured = tracker(target(q_motor + e, values)) + noise,    e = 0 +- repeatability of each joint
 
 Eliminating e leaves the covariance J S J' of the transmissions in every pose, which is no sphere. Where a contact holds
-the target, the unknown point of the contact takes the place of the measured position.
+the target, the unknown point of the contact takes the place of the measured position. Several targets on the tool, and
+their orientations, are more rows of the same pose: they share its e.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from jointscope.factors.block import POINT, Block
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
+from jointscope.graphs.poses.seen_targets import SeenTargets
 from jointscope.graphs.rests.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.model.robot import Robot
@@ -42,6 +44,7 @@ class PoseSet:
         tracker: base from tracker, shape (4, 4).
         repeatability: factor on the joints' sigmas of the robot file.
         owner: number of the session; None for a whole one.
+        turning: factor on the sigma of orientations of the robot file.
     """
 
     robot: Robot
@@ -49,6 +52,7 @@ class PoseSet:
     tracker: Array
     repeatability: float = 1.0
     owner: int | None = None
+    turning: float = 1.0
 
     kind = "poses"
     priors = ()
@@ -56,7 +60,12 @@ class PoseSet:
     @property
     def measured(self) -> int:
         """Number of measured coordinates."""
-        return 3 * len(self.poses)
+        return int(self.targets.there.sum())
+
+    @property
+    def of_first(self) -> PoseSet:
+        """The poses in which the first target was seen, and its place only."""
+        return replace(self, poses=self.poses.of_first)
 
     def of_robot(self, robot: Robot) -> PoseSet:
         """The same poses of a robot with other values."""
@@ -66,6 +75,18 @@ class PoseSet:
     def arm(self) -> SaggingArm:
         """The robot's arm."""
         return SaggingArm(self.robot)
+
+    @cached_property
+    def targets(self) -> SeenTargets:
+        """What was seen, as k rows of each pose."""
+        return SeenTargets(self.robot, self.poses)
+
+    @cached_property
+    def noise(self) -> Array:
+        """Of the rows of a pose, 1 sigma, shape (k,) [m], [rad]."""
+        setup = self.robot.poses
+        assert setup is not None
+        return np.where(self.targets.turns, setup.turn_sigma * self.turning, setup.target_sigma)
 
     @cached_property
     def contacts(self) -> tuple[str, ...]:
@@ -103,7 +124,7 @@ class PoseSet:
         return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
 
     def point(self, calibration: Calibration, e: Array | None = None) -> SaggingPoint:
-        """Where the target is: in the axes of the tracker, or in those of the base where contacts hold it.
+        """Rows of what was seen: in the axes of the tracker, or in those of the base where contacts hold the target.
 
         Args:
             calibration: the values.
@@ -113,12 +134,14 @@ class PoseSet:
 
     def seen(self, values: Mapping[str, float], e: Array | None = None) -> SaggingPoint:
         """The same for values of all parameters by name."""
-        found = self.arm.at(self.q, np.zeros_like(self.q) if e is None else e, values)
-        return found if self.poses.contacts else in_tracker(found, self.tracker, values, self.poses.shares)
+        found = self.arm.at(self.q, np.zeros_like(self.q) if e is None else e, values, not self.targets.plain)
+        if not self.poses.contacts:
+            found = in_tracker(found, self.tracker, values, self.poses.shares)
+        return self.targets.rows(found, values)
 
     def columns(self, point: SaggingPoint, calibration: Calibration) -> Array:
-        """Derivative of what is predicted less what is measured by all coordinates of the calibration, (m, 3, p)."""
-        J = np.zeros((len(self.poses), 3, calibration.size))
+        """Derivative of what is predicted less what is measured by all coordinates of the calibration, (m, k, p)."""
+        J = np.zeros((*self.targets.there.shape, calibration.size))
         start = calibration.columns[DYNAMICS].start
         for i, (name, scale) in enumerate(zip(calibration.names, calibration.value_by_coordinate, strict=True)):
             if name in point.by_value:
@@ -129,16 +152,15 @@ class PoseSet:
         return J
 
     def misses(self, point: SaggingPoint, calibration: Calibration) -> Array:
-        """Where the target is predicted less where it was, shape (m, 3) [m]."""
+        """Rows of what is predicted less what was measured, shape (m, k) [m], [rad]."""
         if self.poses.target is not None:
-            return point.target - self.poses.target
+            return point.target - (self.poses.target if self.targets.plain else self.targets.measured)
         return point.target - np.array([calibration[contact_block(c)] for c in self.poses.contacts])
 
     def covariances(self, point: SaggingPoint) -> Array:
-        """Of what is missed: transmissions and noise of the target, shape (m, 3, 3) [m^2]."""
-        assert self.robot.poses is not None
+        """Of what is missed: transmissions and noise of the target, shape (m, k, k) [m^2], [rad^2]."""
         J = point.by_joint * self.sigmas
-        return np.asarray(J @ np.swapaxes(J, 1, 2) + self.robot.poses.target_sigma**2 * np.eye(3))
+        return np.asarray(J @ np.swapaxes(J, 1, 2) + np.diag(self.noise**2))
 
     @cached_property
     def pairs(self) -> dict[str, tuple[str, str]]:
@@ -150,14 +172,13 @@ class PoseSet:
 
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations at transmission errors of shape (m, n)."""
-        assert self.robot.poses is not None
-        point, sigma = self.point(calibration, x), self.robot.poses.target_sigma
+        point, each = self.point(calibration, x), self.noise[:, None]
         own = np.broadcast_to(np.diag(1.0 / self.sigmas), (*x.shape, x.shape[1]))
         no = np.zeros((*x.shape, calibration.size))
         system = of_independent_states(
-            np.hstack([self.misses(point, calibration) / sigma, x / self.sigmas]),
-            np.hstack([point.by_joint / sigma, own]),
-            np.hstack([self.columns(point, calibration) / sigma, no]),
+            np.hstack([self.misses(point, calibration) / self.noise, x / self.sigmas]),
+            np.hstack([point.by_joint / each, own]),
+            np.hstack([self.columns(point, calibration) / each, no]),
         )
         self._add_distances(system, calibration)
         return system

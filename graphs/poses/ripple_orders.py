@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
-from jointscope.graphs.poses.linear_poses import LinearPoses
+from jointscope.graphs.poses.linear_poses import LinearPoses, filled
 from jointscope.robots.geometry.arm_effects import ArmHypothesis
 
 Array = NDArray[np.float64]
@@ -22,14 +22,14 @@ def with_best_order(linear: LinearPoses, result: PoseCalibration, hypothesis: Ar
     j = result.problems[0].arm.chain.joints.index(hypothesis.owner)
     q = np.concatenate([problem.q[:, j] for problem in result.problems])
     pairs = zip(result.problems, result.calibrations, strict=True)
-    turn = np.concatenate([problem.point(calibration).by_joint[:, :, j] for problem, calibration in pairs])
+    turn = filled([problem.point(calibration).by_joint[:, :, j] for problem, calibration in pairs], 1)
     angles = np.outer(q, hypothesis.kind.orders)
     scores = _scores(linear, hypothesis.kind.size, *(turn[:, :, None] * f(angles)[:, None] for f in (np.cos, np.sin)))
     return replace(hypothesis, order=hypothesis.kind.orders[int(np.argmax(scores))])
 
 
 def _scores(linear: LinearPoses, sigma: float, cos: Array, sin: Array) -> Array:
-    """Fall of chi2 by each pair of columns of shape (m, 3, k), all else fitted anew, shape (k,)."""
+    """Fall of chi2 by each pair of columns of shape (m, k, q), all else fitted anew, shape (q,)."""
     columns = [linear.whitened(each) for each in (cos, sin)]
     g = np.stack([each.T @ linear.r for each in columns], axis=1)  # all else is at its best, so that it takes no part
     own = [linear.beside(each) for each in columns]

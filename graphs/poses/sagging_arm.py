@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An arm that sags: where its target is for given angles of the motors, and how that depends on every value.
 
+Derivatives may be those of the tool as a body: of its target, and how the tool turns, one below the other.
+
 Gravity is taken where the arm has sagged, in as many looks as that takes (Neubauer et al. 2015, eq. 12
 to 14). Derivatives are those of the equilibrium: what moves the arm moves its weight, too.
 """
@@ -14,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.poses.what_gives_way import WhatGivesWay
-from jointscope.robots.bodies.misplaced_joints import LENGTHS
+from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.pose_section import no_poses
 from jointscope.robots.geometry.arm_chain import ArmChain, ChainPoint
 from jointscope.robots.geometry.arm_effects import DRIFT
-from jointscope.robots.geometry.error_parameters import TRACKER
-from jointscope.robots.geometry.gravity_slopes import gravity_slopes
+from jointscope.robots.geometry.error_parameters import TOOL, TRACKER
+from jointscope.robots.geometry.gravity_slopes import YIELDING, gravity_slopes
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -30,19 +32,21 @@ SETTLED = 1e-8  # [rad] that nothing may give way from look to look
 
 @dataclass(frozen=True)
 class SaggingPoint:
-    """Where the target is, shape (m, 3) [m], with derivatives.
+    """Where the target is, shape (m, 3) [m], with derivatives: k = 3 of its place, k = 6 of its place and its turn.
 
     Attributes:
         target: in the base frame.
-        by_joint: by the turn of each joint of the chain, shape (m, 3, n).
-        by_value: by each parameter in its unit, by name, shape (m, 3).
+        by_joint: by the turn of each joint of the chain, shape (m, k, n).
+        by_value: by each parameter in its unit, by name, shape (m, k).
         sag: how far the target is from where a rigid arm would have it, shape (m, 3) [m].
+        turn: orientation of the link of the target, shape (m, 3, 3).
     """
 
     target: Array
     by_joint: Array
     by_value: Mapping[str, Array]
     sag: Array
+    turn: Array
 
 
 class SaggingArm:
@@ -63,8 +67,15 @@ class SaggingArm:
             raise RobotError(no_poses(robot))
         self.chain = ArmChain(robot.tree, robot.poses.link, robot.poses.at)
 
-    def at(self, q: Array, e: Array, values: Mapping[str, float]) -> SaggingPoint:
-        """The target for angles and transmission errors of the chain's joints, shape (m, n) each [rad]."""
+    def at(self, q: Array, e: Array, values: Mapping[str, float], turning: bool = False) -> SaggingPoint:
+        """The target for angles and transmission errors of the chain's joints, shape (m, n) each [rad].
+
+        Args:
+            q: angles of the motors.
+            e: what transmissions do unseen.
+            values: of all parameters.
+            turning: whether derivatives shall be those of the turn of the tool, too.
+        """
         chain, parts = self.chain, WhatGivesWay(self.chain.joints, values)
         read = q + e + parts.waves(q)
         rigid = point = chain.at(read, values)
@@ -76,29 +87,49 @@ class SaggingArm:
             if np.max(np.abs(now - last), initial=0.0) < SETTLED:
                 break
             last = now
-        columns, by_yield = _following(chain, point, parts) if parts.some else (point.by_error, _by_yield(point))
-        by_value = {**columns, **parts.columns(q, point, by_yield)}
-        return SaggingPoint(point.target, by_yield[:, :, : len(chain.joints)], by_value, point.target - rigid.target)
+        by_error, by_yield = _by_error(chain, point, turning), _by_yield(point, turning)
+        if parts.some:
+            by_error, by_yield = _following(chain, point, parts, by_error, by_yield)
+        by_value = {**by_error, **parts.columns(q, point, by_yield)}
+        by_joint = by_yield[:, :, : len(chain.joints)]
+        turn = np.stack([point.by_error[f"{TOOL}.{part}"] for part in LENGTHS], axis=2)
+        return SaggingPoint(point.target, by_joint, by_value, point.target - rigid.target, turn)
 
 
-def _by_yield(point: ChainPoint) -> Array:
-    """Derivative of the target by turns of the joints, then by tilts of the bearings about x' and y', (m, 3, 3 n)."""
-    return np.concatenate([point.by_joint, point.by_bearing[..., 0], point.by_bearing[..., 1]], axis=2)
+def _by_yield(point: ChainPoint, turning: bool) -> Array:
+    """Derivative of the target by turns of the joints, then by tilts of the bearings about x' and y', (m, k, 3 n)."""
+    by_yield = np.concatenate([point.by_joint, point.by_bearing[..., 0], point.by_bearing[..., 1]], axis=2)
+    if not turning:
+        return by_yield
+    axes = np.concatenate([point.turns[:, :, k] for k in YIELDING], axis=1)
+    return np.concatenate([by_yield, np.swapaxes(axes, 1, 2)], axis=1)
 
 
-def _following(chain: ArmChain, point: ChainPoint, parts: WhatGivesWay) -> tuple[dict[str, Array], Array]:
+def _by_error(chain: ArmChain, point: ChainPoint, turning: bool) -> Mapping[str, Array]:
+    """Derivative of the target by each geometric error, shape (m, k); its own orientation is none of the tool."""
+    if not turning:
+        return point.by_error
+    places = [(j, k) for j in range(len(chain.joints)) for k in range(len(ANGLES))]
+    axes = {f"{chain.joints[j]}.{ANGLES[k]}": point.turns[:, j, k] for j, k in places}
+    still = np.zeros_like(point.target)
+    return {name: np.hstack([column, axes.get(name, still)]) for name, column in point.by_error.items()}
+
+
+def _following(
+    chain: ArmChain, point: ChainPoint, parts: WhatGivesWay, by_error: Mapping[str, Array], by_yield: Array
+) -> tuple[Mapping[str, Array], Array]:
     """Derivatives by geometry and masses, and by what gives way, when everything soft follows gravity.
 
     Deflections x = C tau(x, v) make the target move by T (1 - C H)^-1 C dtau/dv beside what it does itself.
     """
     slopes, soft = gravity_slopes(chain.joints, point, chain.gravity_vector), parts.softness(point)
     kept = np.eye(soft.shape[1]) - soft[:, :, None] * slopes.by_turn
-    by_yield = np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(_by_yield(point), 1, 2)), 1, 2)
+    by_yield = np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(by_yield, 1, 2)), 1, 2)
     by_load = by_yield * soft[:, None]
     found = {name: np.einsum("mka,ma->mk", by_load, slope) for name, slope in slopes.by_value.items()}
-    still = np.zeros_like(point.target)
-    names = dict.fromkeys([*point.by_error, *found])
-    return {name: point.by_error.get(name, still) + found.get(name, still) for name in names}, by_yield
+    still = np.zeros(by_yield.shape[:2])
+    names = dict.fromkeys([*by_error, *found])
+    return {name: by_error.get(name, still) + found.get(name, still) for name in names}, by_yield
 
 
 def in_tracker(
@@ -112,12 +143,14 @@ def in_tracker(
         values: of the parameters.
         shares: of the session that have passed at each pose, shape (m,), from 0 to 1.
     """
-    R, o = base_from_tracker[:3, :3], base_from_tracker[:3, 3]
-    own = [f"{TRACKER}.{part}" for part in LENGTHS]
-    by_value = {name: column @ R for name, column in point.by_value.items()}
-    by_value |= {name: np.broadcast_to(axis, point.target.shape) for name, axis in zip(own, np.eye(3), strict=True)}
+    R, o, k = base_from_tracker[:3, :3], base_from_tracker[:3, 3], point.by_joint.shape[1]
+    own, each = [f"{TRACKER}.{part}" for part in LENGTHS], np.kron(np.eye(k // 3), R) if k > 3 else R
+    by_value = {name: column @ each for name, column in point.by_value.items()}
+    shape, axes = (len(point.target), k), np.eye(k)[:3]
+    by_value |= {name: np.broadcast_to(axis, shape) for name, axis in zip(own, axes, strict=True)}
     shift = np.array([values.get(name, 0.0) for name in own])
     if DRIFT[0] in values:
-        by_value |= {name: shares[:, None] * axis for name, axis in zip(DRIFT, np.eye(3), strict=True)}
+        by_value |= {name: shares[:, None] * axis for name, axis in zip(DRIFT, axes, strict=True)}
         shift = shift + shares[:, None] * np.array([values[name] for name in DRIFT])
-    return SaggingPoint((point.target - o) @ R + shift, R.T @ point.by_joint, by_value, point.sag @ R)
+    seen = (point.target - o) @ R + shift
+    return SaggingPoint(seen, each.T @ point.by_joint, by_value, point.sag @ R, R.T @ point.turn)

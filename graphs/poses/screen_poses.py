@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.screen_targets import screen_targets, screen_tool
 from jointscope.graphs.poses.tip_errors import contact_distances
 from jointscope.graphs.poses.tracker_start import tracker_and_target
 from jointscope.robots.errors import RecordingError
@@ -34,8 +35,11 @@ def screen_poses(problems: Sequence[PoseSet]) -> None:
     """
     for problem in problems:
         _check_angles(problem)
-        if problem.poses.target is not None:
-            _check_targets(problem, problem.poses.target)
+        screen_targets(problem)
+        first = problem.of_first
+        if first.poses.target is not None and len(first.poses):
+            _check_targets(first, first.poses.target)
+        screen_tool(problem)
         _check_contacts(problem)
     _check_number(problems)
 
@@ -180,7 +184,7 @@ def _check_number(problems: Sequence[PoseSet]) -> None:
     """More coordinates than values, or priors decide."""
     poses = sum(len(problem.poses) for problem in problems)
     contacts = sum(len(problem.contacts) for problem in problems)
-    told = 3 * poses - 3 * contacts
+    told = sum(problem.measured for problem in problems) - 3 * contacts
     if poses < FEWEST or told < FEWEST:
         more = max(FEWEST - poses, -(-(FEWEST - told) // 3))
         at = f" at {contacts} contacts" if contacts else ""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far predicted targets are from measured ones: the numbers by which a calibrated arm is judged."""
+"""How far predicted targets are from measured ones: the numbers by which a calibrated arm is judged.
+
+Distances in millimetres, and where orientations were measured the turns between both in milliradians.
+"""
 
 from __future__ import annotations
 
@@ -19,28 +22,74 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TipErrors:
-    """Distances of m poses [m].
+    """Errors of all targets that were seen, pose after pose.
 
     Attributes:
-        vectors: predicted less measured, shape (m, 3) [m].
+        vectors: predicted less measured, shape (s, 3) [m].
+        poses: number of the pose of each, shape (s,).
+        names: of the target of each.
+        turns: from measured orientations to predicted ones, shape (t, 3) [rad].
+        turned: number of the pose of each of these, shape (t,).
+        turned_names: of the target of each of these.
     """
 
     vectors: Array
+    poses: NDArray[np.intp]
+    names: tuple[str, ...]
+    turns: Array
+    turned: NDArray[np.intp]
+    turned_names: tuple[str, ...]
 
     @property
     def distances(self) -> Array:
-        """Shape (m,) [m]."""
+        """Shape (s,) [m]."""
         return np.asarray(np.linalg.norm(self.vectors, axis=1))
 
+    @property
+    def angles(self) -> Array:
+        """Sizes of the turns, shape (t,) [rad]."""
+        return np.asarray(np.linalg.norm(self.turns, axis=1))
+
+    @property
+    def of_targets(self) -> dict[str, TipErrors]:
+        """Errors of each target by its name."""
+        found = {}
+        for name in dict.fromkeys(self.names):
+            mine = np.array([other == name for other in self.names], bool)
+            turned = np.array([other == name for other in self.turned_names], bool)
+            count, of_turns = int(mine.sum()), int(turned.sum())
+            found[name] = TipErrors(
+                self.vectors[mine], self.poses[mine], (name,) * count,
+                self.turns[turned], self.turned[turned], (name,) * of_turns,
+            )  # fmt: skip
+        return found
+
+    @property
+    def by_pose(self) -> Array:
+        """Mean over the targets of each pose, shape (m, 3) [m]."""
+        first = np.unique(self.poses, return_index=True)[1]
+        count = np.diff(np.append(first, len(self.poses)))
+        return np.asarray(np.add.reduceat(self.vectors, first, axis=0) / count[:, None])
+
     def to_json(self) -> dict[str, float]:
-        """In millimetres."""
-        mm = 1e3 * self.distances
-        return {
-            "mean_mm": float(mm.mean()),
-            "p90_mm": float(np.quantile(mm, 0.9)),
-            "max_mm": float(mm.max()),
-            "rms_mm": float(np.sqrt(np.mean(mm**2))),
-        }
+        """In millimetres, and where orientations were measured in milliradians."""
+        found = _sizes(1e3 * self.distances, "mm")
+        return found | (_sizes(1e3 * self.angles, "mrad") if len(self.turns) else {})
+
+
+def _sizes(errors: Array, unit: str) -> dict[str, float]:
+    return {
+        f"mean_{unit}": float(errors.mean()),
+        f"p90_{unit}": float(np.quantile(errors, 0.9)),
+        f"max_{unit}": float(errors.max()),
+        f"rms_{unit}": float(np.sqrt(np.mean(errors**2))),
+    }
+
+
+def targets_json(errors: TipErrors) -> dict[str, dict[str, dict[str, float]]]:
+    """Errors of each target by its name; nothing where there is but one."""
+    each = errors.of_targets
+    return {"targets": {name: found.to_json() for name, found in each.items()}} if len(each) > 1 else {}
 
 
 def tip_errors(problem: PoseSet, calibration: Calibration | None = None) -> TipErrors:
@@ -52,7 +101,15 @@ def tip_errors(problem: PoseSet, calibration: Calibration | None = None) -> TipE
     """
     if calibration is None:
         calibration = problem.start(Calibration.of(problem.robot))[1]
-    return TipErrors(problem.misses(problem.point(calibration), calibration))
+    rows, seen = problem.misses(problem.point(calibration), calibration), problem.targets
+    blocks = rows.reshape(len(rows), -1, 3)
+    there = seen.there.reshape(blocks.shape)[:, :, 0]
+    places = int(np.count_nonzero(~seen.turns)) // 3
+    poses, which = np.nonzero(there[:, :places])
+    turned, which_turned = np.nonzero(there[:, places:])
+    names, turned_names = seen.names_of(poses, which), seen.names_of_turns(which_turned)
+    vectors, turns = blocks[:, :places][there[:, :places]], blocks[:, places:][there[:, places:]]
+    return TipErrors(vectors, poses, names, turns, turned, turned_names)
 
 
 def without_sag(robot: Robot) -> Robot:
@@ -62,9 +119,11 @@ def without_sag(robot: Robot) -> Robot:
 
 
 def without_geometry(robot: Robot) -> Robot:
-    """The robot as its URDF has it, its stiffnesses as they are."""
+    """The robot as its URDF has it, its stiffnesses as they are, and targets whose place nobody gave where they are."""
     soft = (f".{STIFFNESS}", *BEARING)
-    return robot.with_values({n: p.prior for n, p in robot.parameters.items() if not n.endswith(soft)})
+    found = () if robot.poses is None else tuple(f"{t.name}." for t in robot.poses.others if t.at is None)
+    parameters = {n: p for n, p in robot.parameters.items() if not n.startswith(found)} if found else robot.parameters
+    return robot.with_values({n: p.prior for n, p in parameters.items() if not n.endswith(soft)})
 
 
 def without_backlash(robot: Robot) -> Robot:
@@ -94,4 +153,12 @@ def contact_distances(problem: PoseSet, calibration: Calibration) -> dict[str, f
 
 def summary(errors: Sequence[TipErrors]) -> TipErrors:
     """Several sessions as one."""
-    return TipErrors(np.concatenate([each.vectors for each in errors]))
+    ends = np.cumsum([0, *(int(each.poses.max(initial=-1)) + 1 for each in errors)])[:-1]
+    return TipErrors(
+        np.concatenate([each.vectors for each in errors]),
+        np.concatenate([each.poses + end for each, end in zip(errors, ends, strict=True)]),
+        tuple(name for each in errors for name in each.names),
+        np.concatenate([each.turns for each in errors]),
+        np.concatenate([each.turned + end for each, end in zip(errors, ends, strict=True)]),
+        tuple(name for each in errors for name in each.turned_names),
+    )

@@ -34,7 +34,7 @@ class _Fit:
     """Values of a fit to some poses.
 
     Attributes:
-        r: what it leaves, shape (m, 3) [sigma].
+        r: what it leaves, shape (m, k) [sigma].
         K: its covariance with noise one, shape (p, p).
         told: number of values that the poses decide, not their priors.
         cost: of what ties the values.
@@ -64,14 +64,16 @@ class TrimmedPoses:
         self, robot: Robot, problems: Sequence[PoseSet], calibrations: Sequence[Calibration], most: float
     ) -> None:
         self._linear = LinearPoses.at(robot, problems, calibrations)
-        self._r = self._linear.r.reshape(-1, 3)
-        self._J = self._linear.J.reshape(len(self._r), 3, -1)
+        self._r = self._linear.r.reshape(-1, self._linear.rows)
+        self._J = self._linear.J.reshape(*self._r.shape, -1)
+        self._measured = self._linear.measured.astype(np.float64)
+        self._each = float(self._measured.mean())
         self._most = most
 
     def outlying(self) -> Array:
         """Distance of each pose from what the others predict, shape (m,) [sigma]; 0 of those that fit."""
         m, none = len(self._r), np.zeros(len(self._r))
-        few = int(np.ceil(self._fit(np.ones(m, bool)).told / 3.0)) + 1
+        few = int(np.ceil(self._fit(np.ones(m, bool)).told / self._each)) + 1
         keep = m - int(self._most * m)
         if few > SMALL * m or keep == m:
             return none
@@ -116,24 +118,26 @@ class TrimmedPoses:
     def _nearer(self, inside: Mask, keep: int) -> tuple[float, Mask]:
         """Cost of a fit to some poses at those nearest to it, and which these are."""
         fit = self._fit(inside)
-        nearest = np.argsort(fit.squares)[:keep]
+        nearest = np.argsort(fit.squares * (self._each / self._measured))[:keep]
         found = np.zeros(len(inside), bool)
         found[nearest] = True
         return float(fit.squares[nearest].sum()) + fit.cost, found
 
-    def _predicted(self, inside: Mask) -> tuple[Array, float]:
+    def _predicted(self, inside: Mask) -> tuple[Array, Array]:
         """Squared distance of each pose from what the others among some poses predict, and its limit [sigma^2].
 
         The noise is that of these poses.
         """
         fit = self._fit(inside)
         spread = self._J @ fit.K @ np.swapaxes(self._J, 1, 2)
-        C = np.eye(3) + np.where(inside, -1.0, 1.0)[:, None, None] * spread
+        C = np.eye(self._r.shape[1]) + np.where(inside, -1.0, 1.0)[:, None, None] * spread
         squares = np.einsum("mk,mk->m", fit.r, np.linalg.solve(C, fit.r[:, :, None])[:, :, 0]) / self._noise(inside)
-        return np.asarray(squares), 3.0 * float(f.isf(CHANCE, 3, max(3.0 * inside.sum() - fit.told, 1.0)))
+        free = max(float(self._measured[inside].sum()) - fit.told, 1.0)
+        return np.asarray(squares), self._measured * f.isf(CHANCE, self._measured, free)
 
     def _noise(self, inside: Mask) -> float:
         """Power of what some poses leave [sigma^2]; they are the nearest, so what it would be of all is more."""
-        fit, share = self._fit(inside), float(inside.mean())
-        nearest = float(chi2.cdf(chi2.ppf(share, 3), 5)) / share
-        return float(fit.squares[inside].sum()) / (max(3.0 * inside.sum() - fit.told, 1.0) * nearest)
+        fit, share, each = self._fit(inside), float(inside.mean()), self._each
+        nearest = float(chi2.cdf(chi2.ppf(share, each), each + 2.0)) / share
+        free = max(float(self._measured[inside].sum()) - fit.told, 1.0)
+        return float(fit.squares[inside].sum()) / (free * nearest)

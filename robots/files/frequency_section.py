@@ -73,7 +73,8 @@ def check_still_parameters(robot: Robot, parameters: Mapping[str, Parameter]) ->
         RobotError: unknown, or in another unit.
     """
     place, units = robot.path.name, {} if robot.frequency is None else frequency_units(robot.joints)
-    units |= {} if robot.poses is None else pose_units(robot.joints) | effect_units(robot.joints)
+    if robot.poses is not None:
+        units |= pose_units(robot.joints, robot.poses.other_names) | effect_units(robot.joints)
     for name, parameter in parameters.items():
         if name not in units:
             raise RobotError(f"{place}: parameters: unknown parameter {name!r}{did_you_mean(name, list(units))}")

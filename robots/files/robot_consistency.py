@@ -209,7 +209,9 @@ def _check_parameters(robot: Robot, place: str) -> None:
         units |= {
             name: unit for pair in robot.torque_sensor.parameters for name, unit in zip(pair, ("1", "N m"), strict=True)
         }
-    of_poses = {} if robot.poses is None else effect_units(robot.joints) | pose_units(robot.joints)
+    of_poses = {}
+    if robot.poses is not None:
+        of_poses = effect_units(robot.joints) | pose_units(robot.joints, robot.poses.other_names)
     of_frequency = {} if robot.frequency is None else frequency_units(robot.joints)
     units = of_poses | of_frequency | units
     for name, parameter in robot.parameters.items():

@@ -51,7 +51,10 @@ def move_joints(root: ET.Element, robot: Robot) -> None:
             turn = turn @ turned(axis, np.array(errors.get(f"{name}.{part}", 0.0)))
         _move(joints.get(name), name, _lengths(errors, name), turn)
     parent = {child.get("link"): joint for joint in joints.values() for child in joint.findall("child")}
-    for owner, link, sign in ((TOOL, robot.poses.link, 1.0), (TRACKER, robot.poses.tracker_link, -1.0)):
+    owners = [(TOOL, robot.poses.link, 1.0), (TRACKER, robot.poses.tracker_link, -1.0)]
+    links = [target.link for target in robot.poses.targets]
+    owners += [(target.name, target.link, 1.0) for target in robot.poses.others if links.count(target.link) == 1]
+    for owner, link, sign in owners:
         mount = parent.get(link) if link is not None else None
         if mount is not None and mount.get("type") == "fixed":
             _move_behind(mount, sign * _lengths(errors, owner))

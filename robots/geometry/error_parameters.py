@@ -31,9 +31,9 @@ STRIBECK = "motor_stribeck.torque"  # of the breakaway of a motor's dry friction
 LOAD_FRICTION = "load_dependent_friction.coefficient"  # of the torque that a drive passes on
 
 
-def error_names(joints: Sequence[str]) -> tuple[str, ...]:
-    """Names of all geometric errors along a chain of joints, from the tracker to the target."""
-    return (*(f"{TRACKER}.{part}" for part in LENGTHS), *misplacement_names([*joints, TOOL]))
+def error_names(joints: Sequence[str], others: Sequence[str] = ()) -> tuple[str, ...]:
+    """Names of all geometric errors along a chain of joints, from the tracker to the target, and further targets."""
+    return (*(f"{TRACKER}.{part}" for part in LENGTHS), *misplacement_names([*joints, TOOL, *others]))
 
 
 def is_geometry(name: str) -> bool:
@@ -47,18 +47,20 @@ def is_length(name: str) -> bool:
     return name.rpartition(".")[2] in LENGTHS
 
 
-def error_parameters(joints: Sequence[str], length_sigma: float, angle_sigma: float) -> dict[str, Parameter]:
+def error_parameters(
+    joints: Sequence[str], length_sigma: float, angle_sigma: float, others: Sequence[str] = ()
+) -> dict[str, Parameter]:
     """All errors at zero, with the sizes that they may have as standard deviations of their priors [m], [rad]."""
     found = {}
-    for name in error_names(joints):
+    for name in error_names(joints, others):
         unit, sigma = ("m", length_sigma) if is_length(name) else ("rad", angle_sigma)
         found[name] = Parameter(name, 0.0, unit, 0.0, sigma, positive=False)
     return found
 
 
-def pose_units(joints: Sequence[str]) -> dict[str, str]:
+def pose_units(joints: Sequence[str], others: Sequence[str] = ()) -> dict[str, str]:
     """Units of all parameters that poses may tell, by name."""
-    units = {name: "m" if is_length(name) else "rad" for name in error_names(joints)}
+    units = {name: "m" if is_length(name) else "rad" for name in error_names(joints, others)}
     for joint in joints:
         units |= {f"{joint}.{BACKLASH}": "rad", f"{joint}.{STIFFNESS}": "N m/rad"}
         units |= {f"{joint}.{part}": "N m/rad" for part in BEARING} | {f"{joint}.{part}": "rad" for part in WAVES}

@@ -14,6 +14,25 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Sighting:
+    """What a tracker measured of a further target in m poses, in its axes; not a number where it did not see it.
+
+    Attributes:
+        name: of the target.
+        place: shape (m, 3) [m].
+        turn: orientation, R_tracker_target, shape (m, 3, 3); None where none was measured.
+    """
+
+    name: str
+    place: Array
+    turn: Array | None = None
+
+    def only(self, kept: NDArray[np.bool_]) -> Sighting:
+        """In some of the poses."""
+        return replace(self, place=self.place[kept], turn=None if self.turn is None else self.turn[kept])
+
+
+@dataclass(frozen=True)
 class Poses:
     """Poses of one session.
 
@@ -22,12 +41,17 @@ class Poses:
         sha256: of that file.
         names: of the poses, as the user counts them.
         q: angles of the robot's joints, shape (m, n) [rad].
-        target: measured positions in the axes of the tracker, shape (m, 3) [m]; None where contacts hold the target.
+        target: measured positions in the axes of the tracker, shape (m, 3) [m], not a number where it was not seen;
+            None where contacts hold the target.
         contacts: name of the contact of each pose; empty where positions were measured.
         places: name of the place of each contact, by contact; contacts of one place have a known distance.
         torque: measured torques of the motors, shape (m, n) [N m]; None where there are none.
         notices: what was left out or looked odd.
         share: of the session that had passed at each pose, shape (m,); None for poses at even distances.
+        turn: measured orientations of the target, R_tracker_target, shape (m, 3, 3), not a number where there was none;
+            None where none were measured.
+        others: further targets on the tool.
+        held: name of the target that is held in each contact; empty where that is the first one.
     """
 
     path: str
@@ -40,6 +64,9 @@ class Poses:
     torque: Array | None = None
     notices: tuple[Notice, ...] = ()
     share: Array | None = None
+    turn: Array | None = None
+    others: tuple[Sighting, ...] = ()
+    held: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.q)
@@ -57,7 +84,17 @@ class Poses:
             places=tuple(pair for pair in self.places if pair[0] in contacts),
             torque=None if self.torque is None else self.torque[kept],
             share=self.shares[kept],
+            turn=None if self.turn is None else self.turn[kept],
+            others=tuple(other.only(kept) for other in self.others),
+            held=tuple(self.held[i] for i in some) if self.held else (),
         )
+
+    @property
+    def of_first(self) -> Poses:
+        """The poses in which the first target was seen, and its place only."""
+        if self.target is None or not (self.others or self.turn is not None):
+            return self
+        return replace(self.only(np.all(np.isfinite(self.target), axis=1)), turn=None, others=())
 
     @property
     def shares(self) -> Array:

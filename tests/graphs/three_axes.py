@@ -74,7 +74,12 @@ def _misplaced(folder: Path, robot: Robot, errors: dict[str, float]) -> Robot:
     root = read_urdf(robot.tree.urdf)
     values = {name: SimpleNamespace(value=error) for name, error in errors.items()}
     move_joints(
-        root, SimpleNamespace(poses=SimpleNamespace(link=None, tracker_link=None), parameters=values, tree=robot.tree)
+        root,
+        SimpleNamespace(
+            poses=SimpleNamespace(link=None, tracker_link=None, targets=(), others=()),
+            parameters=values,
+            tree=robot.tree,
+        ),
     )
     (folder / "true.urdf").write_text(urdf_text(root), encoding="utf-8")
     text = robot.path.read_text(encoding="utf-8").replace("ready:tx90l/tx90l.urdf", "true.urdf")

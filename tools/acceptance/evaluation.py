@@ -192,7 +192,9 @@ def _of_poses(limit: Limit, content: Mapping[str, Any]) -> _Found:
     values = [session.get(limit.quantity) for session in sessions]
     known = [value for value in values if isinstance(value, int | float)]
     worst = max(known) if known and len(known) == len(values) else None
-    return _number(worst, "mm", "this result says nothing of poses")
+    unit = limit.quantity.rpartition("_")[2]
+    what = "poses" if unit == "mm" else "orientations of poses"
+    return _number(worst, unit, f"this result says nothing of {what}")
 
 
 def _number(value: Any, unit: str = "", otherwise: str = "it is no number") -> _Found:

@@ -29,7 +29,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "parameter": (*RANGES, "sigma", "sigma_percent", "drift", "drift_percent"),
     "channel": ("rmse", "chi2", "error"),
     "joint": ("missing_torque_percent",),
-    "poses": ("mean_mm", "p90_mm", "max_mm", "rms_mm"),
+    "poses": ("mean_mm", "p90_mm", "max_mm", "rms_mm", "mean_mrad", "p90_mrad", "max_mrad", "rms_mrad"),
 }
 """What can be limited, by what it is of."""
 

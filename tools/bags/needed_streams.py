@@ -33,12 +33,14 @@ class StreamSource:
         source: where it is in the bag.
         channels: name of each column.
         of_target: whether it is the position of a target, which a tracker may lose.
+        section: of the robot file that names it.
     """
 
     name: str
     source: Topic
     channels: tuple[str, ...]
     of_target: bool = False
+    section: str = "sensors"
 
 
 def needed_streams(robot: Robot) -> list[StreamSource]:
@@ -118,7 +120,9 @@ def own_messages(
     """
     if not need.of_target:
         return None
-    return target_messages(need.name, need.source.names, topic, message_type, need.source.field, some)
+    return target_messages(
+        f"{need.section}.{need.name}", need.source.names, topic, message_type, need.source.field, some
+    )
 
 
 def in_si(source: Topic, values: NDArray[np.float64], before: NDArray[np.float64] | None = None) -> NDArray[np.float64]:

@@ -91,7 +91,7 @@ def _sag(robot: Robot) -> dict[str, str]:
     """What poses have found beside the geometry."""
     if robot.poses is None:
         return {}
-    geometry = error_names(robot.joints)
+    geometry = error_names(robot.joints, robot.poses.other_names)
     found = [name for name in pose_units(robot.joints) if name in robot.parameters and name not in geometry]
     return {", ".join(found): f"{NO_PLACE}; it depends on load and position"} if found else {}
 

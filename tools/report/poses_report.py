@@ -16,7 +16,8 @@ from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
-from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.numbers import with_sigma
+from jointscope.tools.presentation.tip_numbers import target_rows, tip_cells, tip_head
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
@@ -73,21 +74,23 @@ def _verdict(result: PoseCalibration) -> Section:
 def _waterfall(result: PoseCalibration) -> Section:
     """What each part of the model is worth on the poses that were used."""
     each = [parts_of(replace(problem, robot=result.robot)) for problem in result.problems]
-    rows = []
-    for part in reversed(each[0]):
-        mm = summary([found[part] for found in each]).to_json()
-        rows.append([escape(part), *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm", "rms_mm"))])
-    head = ["model", "mean [mm]", "90 % [mm]", "largest [mm]", "rms [mm]"]
+    errors = {part: summary([found[part] for found in each]) for part in reversed(each[0])}
+    rows = [[escape(part), *tip_cells(found)] for part, found in errors.items()]
+    rows += [[f"whole model: {escape(name)}", *tip_cells(found)] for name, found in target_rows(errors["whole model"])]
+    head = ["model", *tip_head(errors["whole model"])]
     lead = "Distance of the predicted target from the measured one, with and without each part of the model."
-    return Section("parts", "What each part is worth", table(head, rows, range(1, 5)), lead)
+    return Section("parts", "What each part is worth", table(head, rows, range(1, len(head))), lead)
 
 
 def _histogram(result: PoseCalibration) -> Section:
-    after, before = (MM * summary(errors).distances for errors in (result.errors, result.before))
+    before, after = summary(result.before), summary(result.errors)
+    named = [("before", "k0", before), ("after", "k1", after)]
+    bars = [(title, colour, "distance [mm]", MM * each.distances) for title, colour, each in named]
+    bars += [(title, colour, "turn [mrad]", MM * each.angles) for title, colour, each in named if len(each.turns)]
     pictures = []
-    for title, values, colour in (("before", before, "k0"), ("after", after, "k1")):
+    for title, colour, label, values in bars:
         counts, edges = np.histogram(values, BINS, (0.0, float(values.max()) * 1.02 + 1e-12))
-        axes = Axes(f"{title}: number of poses", x_label="distance [mm]", width=510)
+        axes = Axes(f"{title}: number of poses", x_label=label, width=510)
         pictures.append(figure([plot(axes, [Bars(title, edges, counts.astype(float), colour)])]))
     return Section(
         "histogram", "How far off", "".join(pictures), "Every pose is one error; the last bar is the worst one."
@@ -108,17 +111,20 @@ def left_of_poses(problems: Sequence[PoseSet], left: Sequence[TipErrors]) -> Sec
     panels = []
     for problem, errors in zip(problems, left, strict=True):
         number = np.arange(len(problem.poses), dtype=float)
-        panels.append(_dots("pose, in the order of the session", number, errors.vectors))
-        for j, joint in enumerate(problem.arm.chain.joints):
-            panels.append(_dots(f"{joint} [rad]", problem.q[:, j], errors.vectors))
+        over = {"pose, in the order of the session": number}
+        over |= {f"{joint} [rad]": problem.q[:, j] for j, joint in enumerate(problem.arm.chain.joints)}
+        for label, x in over.items():
+            panels.append(_dots(label, x[errors.poses], errors.vectors, "left over [um]"))
+            if len(errors.turns):
+                panels.append(_dots(label, x[errors.turned], errors.turns, "turn left over [urad]"))
     keys = [Key("x", "k0"), Key("y", "k1"), Key("z", "k2")]
     lead = "A cloud without a shape is wanted. Drift over the session is the tracker's; waves over a joint are its own."
     return Section("left", "What is left", figure(panels, keys), lead)
 
 
-def _dots(label: str, x: Array, vectors: Array) -> str:
+def _dots(label: str, x: Array, vectors: Array, title: str) -> str:
     order = np.argsort(x)
-    axes = Axes("left over [um]", x_label=label, height=170, zoomable=False)
+    axes = Axes(title, x_label=label, height=170, zoomable=False)
     marks = [Curve("xyz"[k], x[order], MICRO * vectors[order, k], f"k{k}", "dots") for k in range(3)]
     return plot(axes, marks)
 

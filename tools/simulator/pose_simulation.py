@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError, SimulationError
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.recordings.poses import Poses, Sighting
 from jointscope.tools.simulator.arm.arm_bodies import ArmBodies, true_values
 from jointscope.tools.simulator.arm.pose_effects import PoseEffect, pose_effects
 from jointscope.tools.simulator.world.mujoco_module import load_mujoco
@@ -36,17 +37,19 @@ class PoseConditions:
         values: of parameters by full name, where they shall not be drawn.
         effects: texts ID@OWNER[:param=value,...].
         perfect: no geometric errors but those in `values`.
+        orientation: whether the tracker tells how targets are oriented.
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
     effects: Iterable[str] = ()
     perfect: bool = False
+    orientation: bool = False
 
 
 def simulate_poses(
     robot: Robot, count: int, seed: int = 0, conditions: PoseConditions | None = None, session: str = "poses"
 ) -> tuple[Poses, dict[str, Any]]:
-    """Simulates poses with a tracker.
+    """Simulates poses with a tracker, which sees all targets of the robot file.
 
     Args:
         robot: with a section `poses`.
@@ -64,24 +67,40 @@ def simulate_poses(
         EffectError: an unknown effect.
     """
     conditions = conditions or PoseConditions()
-    if robot.poses is None:
+    setup = robot.poses
+    if setup is None:
         raise RobotError(f"{robot.path.name} has no section `poses`; see docs/poses.md")
     if count < 1:
         raise SimulationError(f"number of poses: expected 1 or more, got {count}")
     values = true_values(robot, seed, conditions.values, conditions.perfect)
     effects = pose_effects(conditions.effects, robot.joints)
-    arm, rng = _Arm(robot, values, effects), random_stream(seed, session)
+    orientations = _orientations(robot, seed) if conditions.orientation else {}
+    arm, rng = _Arm(robot, values, effects, orientations), random_stream(seed, session)
     low, high = np.nan_to_num(robot.tree.limits.T, posinf=np.pi, neginf=-np.pi)
     middle, half = (low + high) / 2.0, np.minimum((high - low) / 2.0, np.pi)
     q = middle + REACH * half * rng.uniform(-1.0, 1.0, (count, robot.n))
-    unseen = robot.poses.joint_sigmas * rng.standard_normal(q.shape)
-    targets, torques = arm.at_rest(q, unseen)
-    T = np.eye(4) if robot.poses.tracker is None else robot.poses.tracker
+    unseen = setup.joint_sigmas * rng.standard_normal(q.shape)
+    sites, torques = arm.at_rest(q, unseen)
+    T = np.eye(4) if setup.tracker is None else setup.tracker
     shift = np.array([values.get(f"tracker.{part}", 0.0) for part in ("lx", "ly", "lz")])
     drift = np.linspace(0.0, 1.0, count)[:, None] * arm.drift
-    noise = robot.poses.target_sigma * rng.standard_normal(targets.shape)
-    measured = (targets - T[:3, 3]) @ T[:3, :3] + shift + drift + noise
+
+    def seen(targets: Array) -> Array:
+        noise = setup.target_sigma * rng.standard_normal(targets.shape)
+        return np.asarray((targets - T[:3, 3]) @ T[:3, :3] + shift + drift + noise)
+
+    def turned(turns: Array) -> Array | None:
+        if not conditions.orientation:
+            return None
+        noise = setup.turn_sigma * rng.standard_normal((len(turns), 3))
+        return np.stack([T[:3, :3].T @ R @ pin.exp3(w) for R, w in zip(turns, noise, strict=True)])
+
+    (targets, turns), *others = sites.values()
+    measured = seen(targets)
     read = q + ENCODER * rng.standard_normal(q.shape)
+    turn = turned(turns)
+    sightings = zip(setup.other_names, others, strict=True)
+    more = tuple(Sighting(name, seen(places), turned(R)) for name, (places, R) in sightings)
     truth = {
         "robot": robot.name,
         "seed": seed,
@@ -90,16 +109,35 @@ def simulate_poses(
         "effects": [effect.truth for effect in effects],
         "targets": targets.tolist(),
     }
+    if conditions.orientation:
+        truth["orientations_xyzw"] = {name: pin.Quaternion(R).coeffs().tolist() for name, R in arm.orientations.items()}
     names = tuple(map(str, range(count)))
-    return Poses("simulation", "", names, read, measured, torque=torques), truth
+    return Poses("simulation", "", names, read, measured, torque=torques, turn=turn, others=more), truth
+
+
+def _orientations(robot: Robot, seed: int) -> dict[str, Array]:
+    """Any orientation of each target on its link that the robot file does not give, R_link_target by name."""
+    rng, setup = random_stream(seed, "orientations"), robot.poses
+    assert setup is not None
+    drawn = {target.name: rng.standard_normal(4) for target in setup.targets}
+    given = {target.name: target.turn for target in setup.targets if target.turn is not None}
+    return {
+        name: np.array(pin.Quaternion(v / np.linalg.norm(v)).toRotationMatrix()) for name, v in drawn.items()
+    } | given
 
 
 class _Arm:
     """A compiled model and the springs of its hinges."""
 
-    def __init__(self, robot: Robot, values: Mapping[str, float], effects: Iterable[PoseEffect]):
-        self._mujoco, self._robot = load_mujoco(), robot
-        self._bodies = ArmBodies(robot, values, effects)
+    def __init__(
+        self,
+        robot: Robot,
+        values: Mapping[str, float],
+        effects: Iterable[PoseEffect],
+        orientations: Mapping[str, Array],
+    ):
+        self._mujoco, self._robot, self.orientations = load_mujoco(), robot, orientations
+        self._bodies = ArmBodies(robot, values, effects, orientations)
         self.drift = np.array([self._bodies.size("tracker_drift", "robot", axis) for axis in "xyz"])
         self._model = self._built().compile()
         self._data = self._mujoco.MjData(self._model)
@@ -107,9 +145,15 @@ class _Arm:
             self._model.joint(i).name: int(self._model.joint(i).qposadr[0]) for i in range(self._model.njnt)
         }
 
-    def at_rest(self, motors: Array, unseen: Array) -> tuple[Array, Array]:
-        """Targets, shape (m, 3) [m], and torques of the motors, shape (m, n) [N m], for angles of the motors."""
-        targets, torques = np.empty((len(motors), 3)), np.empty_like(motors)
+    def at_rest(self, motors: Array, unseen: Array) -> tuple[dict[str, tuple[Array, Array]], Array]:
+        """Targets for angles of the motors, and torques of the motors, shape (m, n) [N m].
+
+        Returns:
+            Places, shape (m, 3) [m], and orientations, shape (m, 3, 3), of all targets by name; torques.
+        """
+        assert self._robot.poses is not None
+        names, m = [target.name for target in self._robot.poses.targets], len(motors)
+        sites, torques = {n: (np.empty((m, 3)), np.empty((m, 3, 3))) for n in names}, np.empty_like(motors)
         for k, (angles, errors) in enumerate(zip(motors, unseen, strict=True)):
             driven = {
                 joint: a + self._waves(joint, a) + e
@@ -127,9 +171,11 @@ class _Arm:
                         place = self._places[f"{joint}.{axis}"]
                         self._data.qpos[place] = self._tilt(joint, axis, pull[place])
             self._mujoco.mj_forward(self._model, self._data)
-            targets[k] = self._data.site("target").xpos
+            for name, (places, turns) in sites.items():
+                site = self._data.site(f"target {name}")
+                places[k], turns[k] = site.xpos, site.xmat.reshape(3, 3)
             torques[k] = [self._data.qfrc_bias[self._places[joint]] for joint in self._robot.joints]
-        return targets, torques
+        return sites, torques
 
     def _waves(self, joint: str, angle: float) -> float:
         """What encoder and gear are off at an angle of the motor [rad]."""

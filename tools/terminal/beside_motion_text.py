@@ -11,20 +11,26 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import percent
+from jointscope.tools.presentation.tip_numbers import tip_cells, tip_head
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.same_values import same_values
+
+SIZES = ("mean", "p90", "max")
 
 
 def poses_beside_motion(result: CalibrationResult) -> str:
     """How far targets are from where the model has them; empty without poses."""
     problems = [problem.of_robot(result.robot) for problem, *_ in result.sets if isinstance(problem, PoseSet)]
+    if not problems:
+        return ""
+    errors = [tip_errors(problem) for problem in problems]
+    shown = tip_head(max(errors, key=lambda each: len(each.turns)), SIZES)
     rows = []
-    for problem in problems:
-        mm = tip_errors(problem).to_json()
-        shown = [f"{mm[key]:.3g}" for key in ("mean_mm", "p90_mm", "max_mm")]
-        rows.append([problem.poses.path, str(len(problem.poses)), *shown])
-    head = ["poses in the same estimate", "number", "mean [mm]", "90 % [mm]", "largest [mm]"]
-    return text_table(head, rows, "<>>>>") if rows else ""
+    for problem, each in zip(problems, errors, strict=True):
+        cells = tip_cells(each, SIZES)
+        cells += [""] * (len(shown) - len(cells))
+        rows.append([problem.poses.path, str(len(problem.poses)), *cells])
+    return text_table(["poses in the same estimate", "number", *shown], rows, "<>" + ">" * len(shown))
 
 
 def responses_beside_motion(result: CalibrationResult) -> str:

@@ -9,12 +9,14 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.tools.bags.clocks.durations import counted
-from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.numbers import with_sigma
 from jointscope.tools.presentation.silent_values import silent_sentences
+from jointscope.tools.presentation.tip_numbers import target_rows, tip_cells, tip_head
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 SHOWN_OUT, SHOWN_COMBINATIONS = 5, 18
+SHOWN_SIZES = ("mean", "p90", "max")
 
 
 def pose_calibration_text(result: PoseCalibration) -> str:
@@ -30,14 +32,15 @@ def pose_errors_text(by_label: Mapping[str, Mapping[str, TipErrors]], count: int
         by_label: by name of the model, then by what is left in it.
         count: number of poses.
     """
-    rows = []
+    rows, head = [], list[str]()
     for label, parts in by_label.items():
         for part, errors in parts.items():
-            mm = errors.to_json()
-            rows.append([label, part, *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm", "rms_mm"))])
-    head = ["model", "of it", "mean [mm]", "90 % [mm]", "largest [mm]", "rms [mm]"]
+            rows.append([label, part, *tip_cells(errors)])
+            head = ["model", "of it", *tip_head(errors)]
+            each = target_rows(errors) if part == "whole model" else []
+            rows += [[label, f"  {name}", *tip_cells(of_it)] for name, of_it in each]
     said = f"{counted(count, 'pose')}, distance of the predicted target from the measured one"
-    return f"{said}\n{text_table(head, rows, '<<>>>>')}"
+    return f"{said}\n{text_table(head, rows, '<<' + '>' * (len(head) - 2))}"
 
 
 def _headline(result: PoseCalibration) -> str:
@@ -62,11 +65,10 @@ def _verdict(result: PoseCalibration) -> str:
 
 
 def _tips(result: PoseCalibration) -> str:
-    rows = []
-    for label, errors in (("before", summary(result.before)), ("after", summary(result.errors))):
-        mm = errors.to_json()
-        rows.append([label, *(significant(mm[key], 3) for key in ("mean_mm", "p90_mm", "max_mm"))])
-    return text_table(["target", "mean [mm]", "90 % [mm]", "largest [mm]"], rows, "<>>>")
+    before, after = summary(result.before), summary(result.errors)
+    named = [("before", before), ("after", after), *((f"  {name}", each) for name, each in target_rows(after))]
+    head = ["target", *tip_head(after, SHOWN_SIZES)]
+    return text_table(head, [[label, *tip_cells(e, SHOWN_SIZES)] for label, e in named], "<" + ">" * (len(head) - 1))
 
 
 def _parameters(result: PoseCalibration) -> str:

@@ -129,8 +129,8 @@ def urdf_files(robot: Robot, urdf: Path | None) -> dict[Path, str]:
 
 def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[str, dict[str, Any]]:
     """Errors of some models on poses, for the screen and for JSON."""
-    from jointscope.graphs.poses.calibrate_poses import placed
-    from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary
+    from jointscope.graphs.poses.tip_errors import TipErrors, parts_of, summary, targets_json
+    from jointscope.graphs.poses.tracker_start import placed
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.poses_text import pose_errors_text
 
@@ -143,7 +143,13 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
         each = [parts_of(problem) for problem in problems]
         by_label[label] = {part: summary([found[part] for found in each]) for part in each[0]}
     content = {
-        label: {"poses": parts["whole model"].to_json() | {"parts": {p: e.to_json() for p, e in parts.items()}}}
+        label: {
+            "poses": {
+                **parts["whole model"].to_json(),
+                "parts": {p: e.to_json() for p, e in parts.items()},
+                **targets_json(parts["whole model"]),
+            }
+        }
         for label, parts in by_label.items()
     }
     used = [{"kind": "poses", "path": poses.path, "sha256": poses.sha256} for poses in sessions]
@@ -152,6 +158,7 @@ def compare_poses(robots: Mapping[str, Robot], paths: Sequence[Path]) -> tuple[s
 
 def pose_json(result: Any) -> dict[str, Any]:
     """A calibration for machines."""
+    from jointscope.graphs.poses.tip_errors import summary, targets_json
     from jointscope.tools.verdicts.pose_judgement import judge_poses
 
     robot = result.robot
@@ -176,8 +183,16 @@ def pose_json(result: Any) -> dict[str, Any]:
         "left_out": [{"path": path, "pose": pose, "sigmas": sigmas} for path, pose, sigmas in result.left_out],
         "poses": [errors.to_json() for errors in result.errors],
         "poses_before": [errors.to_json() for errors in result.before],
+        **targets_json(summary(result.errors)),
+        **_turn_noise(result),
         **judge_poses(result).to_json(),
     }
+
+
+def _turn_noise(result: Any) -> dict[str, float]:
+    """Noise of orientations [rad], where there are any."""
+    turned = any(problem.targets.turns.any() for problem in result.problems)
+    return {"orientation_sigma": float(result.robot.poses.turn_sigma)} if turned else {}
 
 
 def pose_origin(result: Any, start: Robot) -> dict[str, Any]:

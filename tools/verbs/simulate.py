@@ -51,6 +51,7 @@ def add_parser(subparsers: Any) -> None:
         "arm that is shaken; default: what the robot has",
     )
     parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, or 2 if shaken")
+    parser.add_argument("--orientation", action="store_true", help="of poses: the tracker tells it of every target")
     parser.add_argument("--session", default="poses", metavar="NAME", help="another name gives other poses of the arm")
     add_shaking_options(parser)
     parser.add_argument(
@@ -100,7 +101,7 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
 
     if args.output.suffix.lower() != ".csv":
         raise SimulationError(f"{args.output}: poses are written as a table; expected a name that ends with .csv")
-    conditions = PoseConditions(assignments(args.set), args.effect)
+    conditions = PoseConditions(assignments(args.set), args.effect, orientation=args.orientation)
     poses, truth = simulate_poses(robot, args.count or 40, args.seed, conditions, args.session)
     with whole_file(args.output) as path:
         path.write_text(pose_table(poses, robot), encoding="utf-8")

@@ -35,7 +35,7 @@ APART = (3.0, 10.0)  # [sigma] that a distance which is said may be from that of
 
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
-    makers = (_enough, _elsewhere, _repeatability, _outliers, _still, _within, _near_priors, _apart, _lacks)
+    makers = (_enough, _elsewhere, _repeatability, _turns, _outliers, _still, _within, _near_priors, _apart, _lacks)
     checks = (make(result) for make in (*makers, _backlash, _worth))
     return Judgement.of([check for check in checks if check is not None])
 
@@ -95,20 +95,21 @@ def _still(result: PoseCalibration) -> Check:
     """Whether the tracker stood still: no step in what is left, anywhere in a session."""
     name, found = "A tracker that stands still", None
     for problem, errors in zip(result.problems, result.errors, strict=True):
-        m = len(errors.vectors)
+        vectors = errors.by_pose
+        m = len(vectors)
         if problem.poses.target is None or m < 2 * FEWEST:
             continue
-        before = np.cumsum(errors.vectors, axis=0)[FEWEST - 1 : m - FEWEST]
+        before = np.cumsum(vectors, axis=0)[FEWEST - 1 : m - FEWEST]
         k = np.arange(FEWEST, m - FEWEST + 1)[:, None]
-        steps = (errors.vectors.sum(axis=0) - before) / (m - k) - before / k
+        steps = (vectors.sum(axis=0) - before) / (m - k) - before / k
         weights = (k * (m - k) / m)[:, 0]
         falls = weights[:, None] * steps**2
         best = int(np.argmax(falls.sum(axis=1)))
-        after = np.var(errors.vectors, axis=0) - falls[best] / m
+        after = np.var(vectors, axis=0) - falls[best] / m
         score = float(np.sum(falls[best] / np.maximum(after, 1e-300)))
         if gammaincc(1.5, score / 2.0) * m < CHANCE:
-            jump, names = 1e3 * float(np.linalg.norm(steps[best])), problem.poses.names
-            at = best + FEWEST
+            jump = 1e3 * float(np.linalg.norm(steps[best]))
+            names, at = [problem.poses.names[i] for i in np.unique(errors.poses)], best + FEWEST
             found = (
                 f"From pose {names[at]} of {problem.poses.path} on all targets are shifted by {significant(jump, 2)} "
                 f"mm: the tracker, the base or the target was moved; give poses up to {names[at - 1]} and the others "
@@ -140,6 +141,26 @@ def _repeatability(result: PoseCalibration) -> Check:
             "tracker, or an effect that is missing"
         )
     return Check(level, name, f"{text}.")
+
+
+def _turns(result: PoseCalibration) -> Check | None:
+    """Whether orientations are as good as the robot file says; None where none were measured."""
+    turned = [problem for problem in result.problems if np.any(problem.targets.turns)]
+    if not turned or result.robot.poses is None:
+        return None
+    factor, count = turned[0].turning, len(summary(result.errors).turns)
+    level = "good" if factor <= REPEATS[0] else "warn" if factor <= REPEATS[1] else "bad"
+    text = f"{count} orientations are those of a tracker that tells them to {_mrad(result.robot.poses.turn_sigma)} mrad"
+    if level != "good":
+        text += (
+            f", {significant(factor, 2)} times what `orientation_sigma` of the robot file says: a loose target, an "
+            "orientation of another time than the position, or an effect that turns the tool and is missing"
+        )
+    return Check(level, "Orientations as the tracker tells them", f"{text}.")
+
+
+def _mrad(angle: float) -> str:
+    return significant(1e3 * angle, 2)
 
 
 def _within(result: PoseCalibration) -> Check:

@@ -14,8 +14,8 @@ import jointscope as js
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.calibrate_kinds import calibrate_kinds
-from jointscope.graphs.poses.calibrate_poses import placed
 from jointscope.graphs.poses.tip_errors import tip_errors
+from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors

@@ -12,10 +12,11 @@ import pytest
 from measured_poses import TX90L, table
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.poses.calibrate_poses import calibrate_poses, placed
+from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors, without_sag
+from jointscope.graphs.poses.tracker_start import placed
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.pose_section import with_poses
 from jointscope.robots.files.robot_file import load_robot

@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from measured_poses import PANDA, TX90L
+from tools_with_targets import tool_with
 
-from jointscope.robots.errors import RecordingError
+from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.geometry.rotations import of_quaternions
 from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.command_line import main
 
@@ -238,3 +240,64 @@ def test_verbs_that_cannot_say_so_in_one_line(tmp_path, monkeypatch, capsys, arg
     said = capsys.readouterr().err
     assert told in said and said.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["p.csv"]
+
+
+def test_several_targets_with_orientations_from_the_first_command_to_the_last(tmp_path, capsys):
+    pytest.importorskip("mujoco", reason="the simulator needs the extra `sim`")
+    tool_with(tmp_path)
+    arm = str(tmp_path / "tool.yaml")
+    for name, count in (("fit", "30"), ("others", "40")):
+        options = ["--kind", "poses", "--orientation", "--seed", "3", "--count", count, "--session", name]
+        assert main(["simulate", arm, "-o", str(tmp_path / f"{name}.csv"), *options]) == 0
+    found = {key: str(tmp_path / f"found.{key}") for key in ("yaml", "json", "html", "urdf")}
+    outputs = ["-o", found["yaml"], "--json", found["json"], "--report", found["html"], "--urdf", found["urdf"]]
+    assert main(["calibrate", arm, "--poses", str(tmp_path / "fit.csv"), *outputs]) == 0
+    said = capsys.readouterr().out
+    assert "Yes, this calibration is good." in said and "largest [mrad]" in said
+    assert "90 orientations are those of a tracker that tells them to 0.1" in said
+    content = json.loads((tmp_path / "found.json").read_text())
+    assert list(content["targets"]) == ["reflector", "left", "right"]
+    assert content["orientation_sigma"] == pytest.approx(1e-4, rel=0.2) and content["poses"][0]["rms_mrad"] < 0.25
+    assert "turn left over [urad]" in (tmp_path / "found.html").read_text()
+    truth = json.loads((tmp_path / "fit.truth.json").read_text())["orientations_xyzw"]
+    for target in load_robot(found["yaml"]).poses.targets:
+        x, y, z, w = truth[target.name]
+        R = of_quaternions(np.array([[x, y, z, w]]))[0]
+        assert np.linalg.norm(R - target.turn) < 1e-2
+    limits = ("p90_mrad: 0.35, because: welding", "max_mrad: 0.1, because: no arm is")
+    text = "".join(f"  - {{poses: all, {limit}}}\n" for limit in limits)
+    (tmp_path / "limits.yaml").write_text(f"limits:\n{text}")
+    compared = ["compare", found["yaml"], "--poses", str(tmp_path / "others.csv")]
+    assert main([*compared, "--accept", str(tmp_path / "limits.yaml")]) == 3
+    assert "Not accepted: 1 of 2 limits" in (said := capsys.readouterr().out) and "0.35" in said and " mrad" in said
+    assert main([*compared[:1], arm, *compared[1:], "--json", found["json"]]) == 0
+    models = json.loads((tmp_path / "found.json").read_text())["models"]
+    assert models["found"]["poses"]["p90_mrad"] < 0.35 < 1.0 < models["tool"]["poses"]["p90_mrad"]
+    assert set(models["found"]["poses"]["targets"]) == {"reflector", "left", "right"}
+    assert models["found"]["poses"]["parts"]["without geometric errors"]["p90_mm"] < 5.0  # `right` stays where it is
+    assert (
+        main(["calibrate", found["yaml"], "--poses", str(tmp_path / "others.csv"), "-o", str(tmp_path / "a.yaml")]) == 0
+    )
+    assert "Yes, this calibration is good." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("targets", "more", "told"),
+    [
+        ("joint1: {}", "", "'joint1' is the name of the first target, of a joint, tool, tracker or has a dot"),
+        ("left: {link: link9}", "", "poses.targets.left.link: no link 'link9'"),
+        ("left: {link: base_link}", "", "base_link does not move as one with reflector; expected a link of the tool"),
+        ("left: {att: [0, 0, 0]}", "", "unknown key 'att'"),
+        ("left: {at: [0, 0]}", "", "at: expected 3 finite numbers"),
+        (
+            "left: {orientation: [1, 1, 0, 0]}",
+            "",
+            "expected a quaternion [x, y, z, w] of norm one, got one of norm 1.414",
+        ),
+        ("", "  orientation_sigma: 0\n", "orientation_sigma"),
+    ],
+)
+def test_targets_that_cannot_be_are_told(tmp_path, targets, more, told):
+    with pytest.raises(RobotError) as err:
+        tool_with(tmp_path, targets, more)
+    assert told in str(err.value) and "\n" not in str(err.value)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses from a table (CSV): one row per pose, with angles of the joints and the place of the target, or its contact.
+"""Poses from a table (CSV): one row per pose and target, with angles of the joints and its place, or its contact.
 
 Columns: `pose`, a name for each joint (its own, its ending, or q1, q2, ...), `x`, `y`, `z` or `contact`, and where they
-are there `JOINT.torque` (or tau1, tau2, ...) and `place`, which contacts of a known distance share.
+are there `JOINT.torque` (or tau1, tau2, ...), `target`, `qx`, `qy`, `qz`, `qw`, and `place`, which contacts of a known
+distance share.
 """
 
 from __future__ import annotations
@@ -11,16 +12,19 @@ import csv
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.geometry.rotations import quaternion_xyzw
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.poses import Poses
+from jointscope.robots.recordings.poses import Poses, Sighting
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor
+from jointscope.tools.bags.at_poses.target_rows import QUATERNION, by_pose, orientations, quaternions, target_names
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")
@@ -67,7 +71,8 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
         pairs = tuple(dict.fromkeys(zip(contacts, places, strict=True)))
         unused = () if setup.contact_distance is None else _unused_distance(path, pairs)
         notices = (*_same_names(path, names), *unused)
-        return Poses(str(path), digest, names, q, None, contacts, pairs, tau, notices)
+        held = target_names(path, head, body, robot)
+        return Poses(str(path), digest, names, q, None, contacts, pairs, tau, notices, held=held)
     missing = [axis for axis in AXES if axis not in head]
     if missing:
         raise RecordingError(
@@ -76,7 +81,25 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
         )
     target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
     _must_differ(path, np.hstack([q, target]))
-    return Poses(str(path), digest, names, q, target, torque=tau, notices=_same_names(path, names))
+    found = Poses(str(path), digest, names, q, target, torque=tau)
+    return _with_targets(path, found, head, body, robot)
+
+
+def _with_targets(path: Path, rows: Poses, head: Sequence[str], body: Sequence[Sequence[str]], robot: Robot) -> Poses:
+    """Rows with measured places as poses, with the orientations that were measured."""
+    assert robot.poses is not None
+    targets, xyzw, notices = target_names(path, head, body, robot), quaternions(path, head, body), list[Notice]()
+    if xyzw is not None:
+        turns, owner = np.full((len(body), 3, 3), np.nan), np.array(targets or [robot.poses.link] * len(body))
+        for target in dict.fromkeys(owner.tolist()):
+            mine = np.flatnonzero(owner == target)
+            found = orientations(path, xyzw[mine], [f"line {i + 2}" for i in mine], target)
+            turns[mine] = np.nan if found.turns is None else found.turns
+            notices += found.notices
+        rows = replace(rows, turn=turns if np.any(np.isfinite(turns)) else None)
+    if targets:
+        rows = by_pose(rows, targets, [target.name for target in robot.poses.targets], "pose" in head)
+    return replace(rows, notices=(*notices, *_same_names(path, rows.names)))
 
 
 def _same_names(path: Path, names: Sequence[str]) -> tuple[Notice, ...]:
@@ -162,12 +185,24 @@ def _numbers(path: Path, body: Sequence[Sequence[str]], head: Sequence[str], col
 
 
 def pose_table(poses: Poses, robot: Robot) -> str:
-    """Poses with measured targets as the text of a table [rad, N m, m]."""
-    assert poses.target is not None
+    """Poses with measured targets as the text of a table [rad, N m, m]; a row for each pose and target."""
+    assert poses.target is not None and robot.poses is not None
     torque = [f"{joint}.torque" for joint in robot.joints] if poses.torque is not None else []
-    lines = [",".join(["pose", *robot.joints, *torque, *AXES])]
+    seen = (Sighting(robot.poses.link, poses.target, poses.turn), *poses.others)
+    oriented = list(QUATERNION) if any(s.turn is not None for s in seen) else []
+    lines = [",".join(["pose", *robot.joints, *torque, *["target"] * bool(poses.others), *AXES, *oriented])]
     for i, name in enumerate(poses.names):
         tau = [] if poses.torque is None else poses.torque[i].tolist()
-        cells = [f"{x:.9f}" for x in poses.q[i]] + [f"{x:.4f}" for x in tau] + [f"{x:.7f}" for x in poses.target[i]]
-        lines.append(",".join([name, *cells]))
+        angles = [f"{x:.9f}" for x in poses.q[i]] + [f"{x:.4f}" for x in tau]
+        for s in seen:
+            if np.isfinite(s.place[i, 0]):
+                cells = [*[s.name] * bool(poses.others), *(f"{x:.7f}" for x in s.place[i])]
+                lines.append(",".join([name, *angles, *cells, *(_quaternion(s.turn, i) if oriented else [])]))
     return "\n".join(lines) + "\n"
+
+
+def _quaternion(turns: Array | None, pose: int) -> list[str]:
+    """Cells of an orientation; empty where none was measured."""
+    if turns is None or not np.isfinite(turns[pose, 0, 0]):
+        return [""] * len(QUATERNION)
+    return [f"{x:.9f}" for x in quaternion_xyzw(turns[pose]).tolist()]

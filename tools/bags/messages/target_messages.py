@@ -24,7 +24,7 @@ def target_messages(
     """Which messages of a topic tell of one target in the axes of one tracker.
 
     Args:
-        sensor: name of the target in the robot file.
+        sensor: where the target is in the robot file, as "sensors.tip".
         names: its `child_frame_id`; empty where the robot file gives none.
         topic: all messages.
         message_type: their type.
@@ -44,19 +44,20 @@ def target_messages(
     if names and names[0] not in children and not some:
         known = [child for child in children if child]
         raise RecordingError(
-            f"topic {topic.name}: no message has the {CHILD} {names[0]!r} of sensors.{sensor}.names"
+            f"topic {topic.name}: no message has the {CHILD} {names[0]!r} of {sensor}.names"
             f"{did_you_mean(names[0], known)}"
         )
     if not names and len(children) > 1:
         raise RecordingError(
             f"topic {topic.name} tells of several targets ({CHILD} {_listed(children)}); name the one of "
-            f"sensors.{sensor} in the robot file, for example `names: [{next(filter(None, children))}]`"
+            f"{sensor} in the robot file, for example `names: [{next(filter(None, children))}]`"
         )
     own = [k for k, frame in enumerate(frames) if not names or (frame is not None and frame.target == names[0])]
     trackers = Counter(frame.tracker for k in own if (frame := frames[k]) is not None)
     if len(trackers) > 1:
+        name = sensor.rpartition(".")[2]
         raise RecordingError(
-            f"topic {topic.name}: the positions of {sensor} are in the axes of several trackers (header.frame_id "
+            f"topic {topic.name}: the positions of {name} are in the axes of several trackers (header.frame_id "
             f"{_listed(trackers)}); expected one: give each a topic and a sensor of its own, or transform the positions"
         )
     return np.array(own, dtype=np.intp)

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from jointscope.robots.bodies.misplaced_joints import misplacement_names
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.error_parameters import error_names, is_length
 from jointscope.robots.model.robot import Robot
@@ -20,6 +21,7 @@ from jointscope.tools.simulator.world.specification import joint_axis, link_body
 
 Array = NDArray[np.float64]
 LENGTH, ANGLE = 2.5e-4, 5e-4  # [m], [rad] 1 sigma of the errors that are drawn
+ANYWHERE = 0.05  # [m] 1 sigma of the place on the tool of a target whose place the robot file does not give
 VARIATION = 0.2  # of stiffnesses about those of the robot file, 1 sigma of the logarithm
 
 
@@ -39,14 +41,25 @@ def true_values(robot: Robot, seed: int, given: Mapping[str, float], perfect: bo
     if unknown:
         raise RobotError(f"robot {robot.name!r} has no parameter {unknown!r}")
     rng, values = random_stream(seed, "arm"), {}
+    others = _other_targets(robot, seed, perfect)
     for name in error_names(robot.joints):
         size = (LENGTH if is_length(name) else ANGLE) * rng.standard_normal()
         values[name] = 0.0 if perfect else float(size)
     for name, parameter in robot.parameters.items():
-        if name not in values:
+        if name not in values and name not in others:
             drawn = parameter.prior * float(np.exp(VARIATION * rng.standard_normal()))
             values[name] = drawn if parameter.positive and not parameter.fixed else parameter.prior
-    return {**values, **given}
+    return {**values, **others, **given}
+
+
+def _other_targets(robot: Robot, seed: int, perfect: bool) -> dict[str, float]:
+    """Errors of further targets; one whose place nobody gives is anywhere on the tool."""
+    rng, values = random_stream(seed, "targets"), {}
+    for target in () if robot.poses is None else robot.poses.others:
+        for name in misplacement_names([target.name]):
+            size = (LENGTH if is_length(name) else ANGLE) * (0.0 if perfect else rng.standard_normal())
+            values[name] = float(ANYWHERE * rng.standard_normal() if is_length(name) and target.at is None else size)
+    return values
 
 
 class ArmBodies:
@@ -56,10 +69,17 @@ class ArmBodies:
         robot: its tree.
         values: geometric errors by full name.
         effects: what is wrong with it.
+        orientations: of targets on their links where the robot file does not give it, R_link_target, by name.
     """
 
-    def __init__(self, robot: Robot, values: Mapping[str, float], effects: Iterable[PoseEffect]):
-        self._robot, self._values = robot, values
+    def __init__(
+        self,
+        robot: Robot,
+        values: Mapping[str, float],
+        effects: Iterable[PoseEffect],
+        orientations: Mapping[str, Array] | None = None,
+    ):
+        self._robot, self._values, self._orientations = robot, values, orientations or {}
         self._of = {(effect.id, effect.owner): effect.parameters for effect in effects}
 
     def size(self, effect: str, owner: str, part: str) -> float:
@@ -116,17 +136,26 @@ class ArmBodies:
             if name not in welded or name in giving:
                 found[name] = parent, {"": axis, ".y": y, ".x": x}
         if robot.poses is not None:
-            self._add_target(spec, parent)
+            self._add_targets(parent)
         return found
 
-    def _add_target(self, spec: Any, body: Any) -> None:
+    def _add_targets(self, body: Any) -> None:
+        """A site for each target, and the payload at the first one."""
         setup, tree = self._robot.poses, self._robot.tree
         assert setup is not None
-        placement = tree.model.frames[tree.frame_id(setup.link)].placement
-        error = [self.value("tool", part) for part in ("lx", "ly", "lz")]
-        at = placement.act(setup.at + np.array(error))
-        body.add_site(name="target", pos=at)
-        mass = self.size("payload", "robot", "mass")
+        places = []
+        for i, target in enumerate(setup.targets):
+            owner = target.name if i else "tool"
+            placement = tree.model.frames[tree.frame_id(target.link)].placement
+            error = np.array([self.value(owner, part) for part in ("lx", "ly", "lz")])
+            places.append(placement.act((np.zeros(3) if target.at is None else target.at) + error))
+            turn = placement.rotation @ self._orientations.get(
+                target.name, np.eye(3) if target.turn is None else target.turn
+            )
+            for part, axis in (("mis_y", [0.0, 1.0, 0.0]), ("mis_x", [1.0, 0.0, 0.0]), ("offset", [0.0, 0.0, 1.0])):
+                turn = turn @ pin.exp3(self.value(owner, part) * np.array(axis))
+            body.add_site(name=f"target {target.name}", pos=places[-1], quat=quaternion_wxyz(turn))
+        at, mass = places[0], self.size("payload", "robot", "mass")
         if mass > 0.0:
             body.add_body(
                 name="payload",

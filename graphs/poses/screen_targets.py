@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mistakes in several targets and in their orientations: names exchanged, places on the tool, conventions.
+
+An orientation that a tracker tells is R_tracker_target = R_tracker_tool X with one X in all poses. Where no X fits,
+each of the usual other conventions is tried.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.seen_targets import Mount, mounts
+from jointscope.graphs.poses.tracker_start import is_open, tool_seen
+from jointscope.robots.errors import RecordingError
+from jointscope.robots.geometry.error_parameters import TOOL
+from jointscope.robots.geometry.rotations import (
+    mean_rotation,
+    of_quaternions,
+    of_roll_pitch_yaw,
+    quaternion_xyzw,
+    roll_pitch_yaw,
+    rotation_vectors,
+    spread,
+)
+from jointscope.robots.geometry.tracker_fit import base_from_tracker
+from jointscope.robots.recordings.poses import Sighting
+
+Array = NDArray[np.float64]
+FEWEST = 6  # sightings that tell a mistake from chance
+FAR = 0.01  # [m] names of targets that fit to less are right
+MUCH_BETTER = 0.2  # of what is left, where names that were exchanged fit
+LARGEST_ERROR = 0.05  # [m] that errors of an arm can make
+LARGEST_TURN = 0.1  # [rad] the same
+ROUNDS = 20  # of turns before and behind the arm's
+LIKELY = 0.05  # [rad] that axes may be away from those that are named
+
+
+def screen_targets(problem: PoseSet) -> None:
+    """Looks at the targets of a session.
+
+    Raises:
+        RecordingError: something is plainly wrong.
+    """
+    if problem.poses.target is None or problem.targets.plain:
+        return
+    for sighting in problem.targets.sightings:
+        lost = [problem.poses.names[i] for i in np.flatnonzero(np.all(sighting.place == 0.0, axis=1))]
+        if lost:
+            raise RecordingError(
+                f"{problem.poses.path}: the target {sighting.name} is at exactly zero in pose {', '.join(lost[:5])}"
+                f"{' and more' * (len(lost) > 5)}: the tracker had lost it; remove these rows"
+            )
+    found = mounts(problem.robot)
+    known = [s for s in problem.targets.sightings if _is_known(problem, found[s.name])]
+    for one, other in combinations(known, 2):
+        _check_names(problem, one, other)
+
+
+def screen_tool(problem: PoseSet) -> None:
+    """Looks at the place of further targets on the tool and at orientations, where the first target fits.
+
+    Raises:
+        RecordingError: something is plainly wrong.
+    """
+    if problem.poses.target is None or problem.targets.plain:
+        return
+    found = mounts(problem.robot)
+    for sighting in problem.targets.sightings:
+        mount = found[sighting.name]
+        if mount.owner != TOOL and _is_known(problem, mount):
+            _check_place(problem, sighting, mount)
+        if sighting.turn is not None:
+            _check_turns(problem, sighting, sighting.turn, mount)
+
+
+def _is_known(problem: PoseSet, mount: Mount) -> bool:
+    return mount.owner == TOOL or not is_open(problem.robot, mount.owner)
+
+
+def _predicted(problem: PoseSet, name: str) -> Array:
+    """Places of a target in the axes of the tracker, shape (m, 3)."""
+    (point, values), found = tool_seen(problem), mounts(problem.robot)
+    first = next(iter(found.values()))
+    return np.asarray(point.target + point.turn @ (found[name].place(values) - first.place(values)))
+
+
+def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
+    """Two targets may have each other's name: with both the other way round a tracker fits somewhere."""
+    there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
+    if there.sum() < FEWEST:
+        return
+    predicted = np.concatenate([_predicted(problem, s.name)[there] for s in (one, other)])
+    places = [one.place[there], other.place[there]]
+    left, exchanged = (base_from_tracker(predicted, np.concatenate(each))[1] for each in (places, places[::-1]))
+    if left > FAR and exchanged < MUCH_BETTER * left:
+        raise RecordingError(
+            f"{problem.poses.path}: the targets {one.name} and {other.name} seem to be exchanged: with both the other "
+            f"way round the arm fits to {1e3 * exchanged:.2g} mm instead of {1e3 * left:.3g} mm; check the names in "
+            f"the table, or in `targets` of {problem.robot.path.name}"
+        )
+
+
+def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
+    point, _ = tool_seen(problem)
+    there = np.isfinite(sighting.place[:, 0])
+    away = (sighting.place - _predicted(problem, sighting.name))[there]
+    misses = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+    if there.sum() < FEWEST or misses < LARGEST_ERROR:
+        return
+    on_link = np.einsum("mji,mj->mi", point.turn[there] @ mount.R_link, away)
+    shift = on_link.mean(axis=0)
+    left = float(np.sqrt(np.mean(np.sum((on_link - shift) ** 2, axis=1))))
+    assert problem.robot.poses is not None
+    target = next(target for target in problem.robot.poses.targets if target.name == sighting.name)
+    hint = "check the names of the targets, and the link that carries it"
+    if left < LARGEST_ERROR / 5.0 and target.at is not None:
+        x, y, z = (f"{v:.3g}" for v in target.at + shift)
+        hint = (
+            f"at [{x}, {y}, {z}] of {target.link} it fits to {1e3 * left:.2g} mm; leave out its `at`, and it is found"
+        )
+    raise RecordingError(
+        f"{problem.poses.path}: the target {sighting.name} is not where {problem.robot.path.name} has it on the tool, "
+        f"it is off by {1e3 * misses:.3g} mm; {hint}"
+    )
+
+
+def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: Mount) -> None:
+    there = np.isfinite(measured[:, 0, 0])
+    if there.sum() < FEWEST:
+        return
+    G, M = (tool_seen(problem)[0].turn @ mount.R_link)[there], measured[there]
+    name, path = sighting.name, problem.poses.path
+    left = _fits(G, M)
+    if left > LARGEST_TURN:
+        raise RecordingError(
+            f"{path}: the orientations of {name} are off by {left:.2g} rad (rms) from any that turns with the tool; "
+            + _other_convention(G, M)
+        )
+    mean = mean_rotation(np.swapaxes(G, 1, 2) @ M)
+    off = float(np.linalg.norm(rotation_vectors((mount.R_target.T @ mean)[None])))
+    if off > LARGEST_TURN:
+        x, y, z, w = quaternion_xyzw(mean)
+        raise RecordingError(
+            f"{path}: {name} is not oriented on the tool as {problem.robot.path.name} says, off by {off:.2g} rad; "
+            f"[{x:.3g}, {y:.3g}, {z:.3g}, {w:.3g}] would fit; leave out its `orientation`, and it is found"
+        )
+
+
+def _fits(G: Array, M: Array) -> float:
+    """How far X of M = G X is from the same in all poses, root mean square [rad]."""
+    return spread(np.swapaxes(G, 1, 2) @ M)
+
+
+def _other_convention(G: Array, M: Array) -> str:
+    """What would fit instead."""
+    ordered = of_quaternions(np.array([np.roll(quaternion_xyzw(R), -1) for R in M]))
+    if _fits(G, ordered) < LARGEST_TURN:
+        return "in the order w, x, y, z they fit: exchange the columns, expected qx, qy, qz, qw"
+    if _fits(G, np.swapaxes(M, 1, 2)) < LARGEST_TURN:
+        return (
+            "their inverses fit, as of the tracker in the axes of the target: expected the target in the axes of the "
+            "tracker, give -qx, -qy, -qz, qw"
+        )
+    if _fits(G, np.swapaxes(ordered, 1, 2)) < LARGEST_TURN:
+        return (
+            "their inverses in the order w, x, y, z fit: expected qx, qy, qz, qw of the target in axes of the tracker"
+        )
+    Z, left = _turned_axes(G, M)
+    if left > LARGEST_TURN:
+        return "no other convention fits: check that they are of this target, or leave them out"
+    for k, axis in enumerate("xyz"):
+        if np.linalg.norm(rotation_vectors((np.diag(2.0 * np.eye(3)[k] - 1.0) @ Z)[None])) < LIKELY:
+            return (
+                f"they are those of axes with {axis} the other way, as of a left-handed tracker, while its positions "
+                "are right-handed; expected both in the same right-handed axes"
+            )
+    roll, pitch, yaw = np.rad2deg(roll_pitch_yaw(Z))
+    return (
+        f"they fit in axes that are turned by roll {roll:.0f}, pitch {pitch:.0f}, yaw {yaw:.0f} degrees against those "
+        "of the positions; expected both in the axes of the tracker"
+    )
+
+
+def _turned_axes(G: Array, M: Array) -> tuple[Array, float]:
+    """Z of M = Z G X with any X, in turn from turns by right angles, and what is left [rad]."""
+    best = np.eye(3), np.inf
+    for roll, pitch, yaw in product(range(4), (0, 1, 3), range(4)):
+        Z = of_roll_pitch_yaw(*(0.5 * np.pi * angle for angle in (roll, pitch, yaw)))
+        for _ in range(ROUNDS):
+            X = mean_rotation(np.swapaxes(Z @ G, 1, 2) @ M)
+            Z = mean_rotation(M @ np.swapaxes(G @ X, 1, 2))
+        left = _fits(Z @ G, M)
+        if left < best[1]:
+            best = Z, left
+    return best
