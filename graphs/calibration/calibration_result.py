@@ -249,7 +249,8 @@ class CalibrationResult:
             "parameters": self._json_parameters(),
             "weak_directions": [{"parameters": d.weights, "sigma": d.sigma} for d in self.weak_directions],
             "channels": {
-                name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
+                name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2, "unit": fit.unit}
+                for name, fit in self.channels.items()
             },
             "noise": {}
             if self.robot.free_links

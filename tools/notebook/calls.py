@@ -82,7 +82,8 @@ def calibrate(
         RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
         SolveError: no convergence, or a value that nothing determines.
     """
-    model, limits = robot_of(robot), limits_of(accept)
+    model = robot_of(robot)
+    limits = limits_of(accept, [model])
     if isinstance(recordings, Sequence) and not recordings and (rests or poses or frequency):
         raise RecordingError(
             "no recording of motion is given; from poses alone call calibrate_poses(robot, [read_poses(path, robot)]), "
@@ -130,7 +131,8 @@ def compare(
         RobotError: two robots have the same name and no labels, or read different topics.
         RecordingError: the recording cannot be a measurement of these robots.
     """
-    models, limits = labelled(robots), limits_of(accept)
+    models = labelled(robots)
+    limits = limits_of(accept, models.values())
     check_same_streams(models)
     first = next(iter(models.values()))
     (read_one,) = without_stretches(recordings_of([recording], first), leave_out)
@@ -166,8 +168,9 @@ def diagnose(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    limits = limits_of(accept)
-    model, learnt, held = to_learn_from(robot, recordings, holdout, leave_out)
+    given = robot_of(robot)
+    limits = limits_of(accept, [given])
+    model, learnt, held = to_learn_from(given, recordings, holdout, leave_out)
     if model.free_links:
         found = diagnose_links(model, learnt, held, progress=progress)
     else:

@@ -103,7 +103,8 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.verdicts.judgement import judge
 
     load_user_effects(args.effects)
-    robot, limits = load_robot(args.robot), limits_of(args)
+    robot = load_robot(args.robot)
+    limits = limits_of(args, [robot])
     still = _still_kinds(args, robot, files, limits)
     if still is not None:
         with progress_bar() as progress:

@@ -58,12 +58,12 @@ def run(args: argparse.Namespace) -> int:
     check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
-    limits = limits_of(args)
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.notebook.calls import diagnose
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
+    limits = limits_of(args, [robot])
     if args.poses or args.frequency:
         if limits:
             raise RobotError(ARM_LIMITS)

@@ -176,7 +176,7 @@ def test_a_simulation_says_what_it_is_and_saves_its_truth_alone(simulated, tmp_p
 def limited(found, folder, *lines: str):
     """A made-up result held against limits, as `calibrate` and `compare` do it."""
     (folder / "limits.yaml").write_text("limits:\n" + "".join(f"  - {{{line}, because: a bench}}\n" for line in lines))
-    limits = limits_of(folder / "limits.yaml")
+    limits = limits_of(folder / "limits.yaml", [found.robot])
     return Calibrated.of(found, acceptance=check_models(limits, {"doggy": found.to_json()}))
 
 
@@ -188,13 +188,17 @@ def test_without_limits_a_result_is_not_evaluated_and_never_accepted_by_silence(
 @pytest.mark.parametrize(
     ("lines", "outcome", "said"),
     [
-        (["parameter: joint2.stiffness, at_least: 1"], "pass", "Accepted: all 1 limits are kept."),
+        (["parameter: joint2.stiffness, at_least: 1 N m/rad"], "pass", "Accepted: the limit is met."),
         (
-            ["parameter: joint2.stiffness, at_least: 1", "parameter: joint2.stiffness, at_most: 1"],
+            ["parameter: joint2.stiffness, at_least: 1 N m/rad", "parameter: joint2.stiffness, at_most: 1 N m/rad"],
             "fail",
             "Not accepted: 1 of 2 limits",
         ),
-        (["parameter: joint2.stiffness, at_least: 1", "poses: all, p90_mm: 1"], "not evaluated", "Undecided: 1 of 2"),
+        (
+            ["parameter: joint2.stiffness, at_least: 1 N m/rad", "poses: all, p90_mm: 1"],
+            "not evaluated",
+            "Undecided: 1 of 2",
+        ),
     ],
 )
 def test_limits_are_shown_and_saved_with_the_result(lines, outcome, said, tmp_path):
