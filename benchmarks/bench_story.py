@@ -40,8 +40,8 @@ def main() -> None:
         section = story_section(found["discovery"], HIDDEN[:1] if quick else HIDDEN).markdown()
         print(section)
         if not quick:
+            write_section(section)  # first: the commit of a tree with another picture would be one "with changes"
             shutil.copyfile(Path(folder) / "story" / "story.svg", PICTURE)
-            write_section(section)
 
 
 def story_section(discovery: dict[str, Any], hidden: tuple[str, ...]) -> Section:
