@@ -25,7 +25,7 @@ CERTAIN = 2.0  # sigma
 TABLES = {"parameter": "parameters", "channel": "channels", "joint": "missing_torque_percent"}
 """Where in the JSON the names of a subject stand."""
 NO_TORQUE = (
-    "this result says nothing of missing_torque_percent: `jointscope diagnose` finds it where encoders on rigid joints "
+    "this result has no missing_torque_percent: `jointscope diagnose` finds it if encoders on rigid joints "
     "tell torques; elsewhere models are judged by predictions, which `channel` with a `horizon` limits"
 )
 
@@ -122,7 +122,7 @@ def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:
         return
     table = content.get(TABLES[limit.subject])
     if not table:
-        nothing = f"this result says nothing of {TABLES[limit.subject]}"
+        nothing = f"this result has no {TABLES[limit.subject]}"
         yield Checked(limit, limit.pattern, OPEN, NO_TORQUE if limit.subject == "joint" else nothing)
         return
     names = [name for name in table if fnmatchcase(name, limit.pattern)]
@@ -218,7 +218,7 @@ def _of_poses(limit: Limit, content: Mapping[str, Any]) -> _Found:
     values = [session.get(limit.quantity) for session in sessions]
     known = [value for value in values if isinstance(value, int | float)]
     worst = max(known) if known and len(known) == len(values) else None
-    return _number(worst, "mm", "this result says nothing of poses")
+    return _number(worst, "mm", "this result has no poses")
 
 
 def _number(value: Any, unit: str = "", otherwise: str = "it is no number") -> _Found:

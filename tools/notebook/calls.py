@@ -71,7 +71,7 @@ def calibrate(
         poses: tables or bags of the arm at rest with a measured target, for the same estimate.
         frequency: bags in which the arm is shaken, one for each pose, for the same estimate.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
-        accept: limits that the result must keep (docs/accept.md); `result.accepted` says whether it does.
+        accept: limits that the result must meet (docs/accept.md); `result.accepted` says whether it does.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         biases_only: leave dynamics and mountings as they are.
@@ -124,7 +124,7 @@ def compare(
         recording: one that no model was fitted to.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
-        accept: limits that each model must keep (docs/accept.md); `result.accepted` says whether they do.
+        accept: limits that each model must meet (docs/accept.md); `result.accepted` says whether they do.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
@@ -160,7 +160,7 @@ def diagnose(
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that the model lacks, for the pictures.
-        accept: limits that the model must keep (docs/accept.md); `result.accepted` says whether it does.
+        accept: limits that the model must meet (docs/accept.md); `result.accepted` says whether it does.
         side_by_side: processes that fit the candidates; this one alone if not given.
         progress: called with a text and the share done, from 0 to 1.
 

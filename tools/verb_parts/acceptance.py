@@ -19,7 +19,7 @@ def add_accept_option(parser: argparse.ArgumentParser) -> None:
         "--accept",
         type=Path,
         metavar="LIMITS.yaml",
-        help="limits that the result must keep (docs/accept.md); exit code 3 if one fails, 4 if one is not evaluated",
+        help="limits that the result must meet (docs/accept.md); exit code 3 if one fails, 4 if one is not evaluated",
     )
 
 

@@ -30,7 +30,7 @@ def add_frequency_option(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="BAG",
-        help="recordings of the arm shaken in one pose each (docs/frequency.md)",
+        help="recordings of the arm being shaken, in one pose each (docs/frequency.md)",
     )
 
 
@@ -42,7 +42,7 @@ def add_holdout_frequency_option(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="BAG",
-        help="recordings of the arm shaken that are scored once per step, but never influence the choice",
+        help="recordings of the arm being shaken that are scored once per step, but never influence the choice",
     )
 
 

@@ -27,7 +27,7 @@ def add_rests_option(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="BAG",
-        help="recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
+        help="recordings in which the robot repeatedly stands still, with or without weights (docs/rests.md)",
     )
 
 

@@ -133,7 +133,7 @@ def _heldout(result: FrequencyCalibration) -> Check:
 
 
 def _agree(result: FrequencyCalibration) -> Check:
-    name, found = "Recordings that tell the same values", result.explained
+    name, found = "Recordings that agree on the values", result.explained
     tests = {**found.between_poses, **{f"realisation {n}": a for n, a in found.between_realisations.items()}}
     if not tests:
         return Check("info", name, "One pose and one realisation: nothing to compare; shake the arm in another pose.")
@@ -152,7 +152,7 @@ def _agree(result: FrequencyCalibration) -> Check:
 def _told(result: FrequencyCalibration) -> Check:
     springs = [name for name in result.silent if name.split(".", 1)[1] == STIFFNESS]
     level = "warn" if springs else "info" if result.silent else "good"
-    return Check(level, "Values that are told", f"Springs and dampers: {identifiable_sentence(result)}.")
+    return Check(level, "Values that are determined", f"Springs and dampers: {identifiable_sentence(result)}.")
 
 
 def _friction(result: FrequencyCalibration) -> Check:

@@ -118,8 +118,8 @@ def judge(result: CalibrationResult) -> Judgement:
 def _consequences(checks: Sequence[Check]) -> list[Check]:
     """Checks of values that no model could have found: their advice would mend nothing."""
     told = (
-        "That cannot be told as long as drives saturate, a tracker is late or moves, a load changes, something pushes, "
-        "or samples are too rare."
+        "That cannot be judged as long as drives saturate, a tracker is late or moves, a load changes, something "
+        "pushes, or samples are too rare."
     )
     return [Check("info", check.name, told) if check.level in ("warn", "bad") else check for check in checks]
 
