@@ -72,7 +72,7 @@ def test_the_figures_of_the_story_are_those_that_its_benchmark_wrote():
     errors = [[float(cell) for cell in step if re.fullmatch(r"[\d.]+", cell)] for step in steps]
     words = " ".join(text_of(ROOT / "README.md").split())
     said = re.search(
-        r"error falls from ([\d.]+) to ([\d.]+) sensor sigmas, where noise alone would leave ([\d.]+)", words
+        r"error falls from ([\d.]+) to ([\d.]+) sensor sigmas, where noise alone would leave (\d+\.\d+)", words
     )
     assert said and [float(figure) for figure in said.groups()] == [errors[0][1], errors[-1][1], errors[-1][2]]
     drawn = re.findall(r">([\d.]+) σ<", text_of(ROOT / "docs/pictures/story.svg"))
