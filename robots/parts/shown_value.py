@@ -49,5 +49,11 @@ def quantity(value: float, sigma: float | None, unit: str) -> str:
     if sigma and math.isfinite(sigma):
         last = math.floor(math.log10(sigma)) - 1  # two digits of the sigma
         size = math.floor(math.log10(abs(value))) if value else last
-        text = f"{value:.{max(size - last + 1, 1)}g} ± {sigma:.{max(2, last + 2)}g}"
+        text = f"{_rounded(value, max(size - last + 1, 3))} ± {_rounded(sigma, 2)}"
     return f"{text} {'' if unit == '1' else unit}".rstrip()
+
+
+def _rounded(value: float, digits: int) -> str:
+    """So many significant digits, and no power of ten where only zeros would follow: 120, not 1.2e+02."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+0" in text else text

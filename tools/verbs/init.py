@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         content["drives"] = drive_content(guess)
         content["locked"] = {h.joint: h.position for h in guess.held}
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
-    print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
+    print(f"{guess.name}: {', '.join(guess.roles.joints)}; inferred from the recording:")
     held = {h.joint for h in guess.held}
     for line in guesses_in_sections(text):
         key = line.partition(":")[0].strip("'")
