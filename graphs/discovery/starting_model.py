@@ -66,8 +66,8 @@ def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
     for notice in screen_all(recording, robot):
         if notice.kind in (MIRRORED, FELT_GRAVITY):
             raise RecordingError(
-                f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file, or leave "
-                f"{notice.stream} out of it, then search again"
+                f"{recording.path}: {notice.text}; no effect can be identified beside that: correct the robot file, or "
+                f"leave {notice.stream} out of it, then search again"
             )
 
 

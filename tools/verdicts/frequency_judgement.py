@@ -98,7 +98,7 @@ def _noise(result: FrequencyCalibration) -> Check:
     known = [pose for pose in result.explained.poses if pose.over_noise is not None]
     left = percent(max(float(pose.left.max()) for pose in result.explained.poses))
     if not known:
-        return Check("info", name, f"The balance leaves up to {left} of a motor's torque; one period tells no noise.")
+        return Check("info", name, f"The balance leaves up to {left} of a motor's torque; one period shows no noise.")
     ratios = [_ratio(pose) for pose in known]
     text = f"The balance leaves up to {left} of a motor's torque, {_range(ratios)} times the power of the noise"
     if max(ratios) > AS_NOISE:
@@ -119,7 +119,7 @@ def _range(ratios: Sequence[float]) -> str:
 def _heldout(result: FrequencyCalibration) -> Check:
     name, found = "A realisation that others predict", result.explained
     if not found.heldout:
-        return Check("info", name, "One realisation of the phases cannot tell; record another one.")
+        return Check("info", name, "One realisation of the phases cannot decide; record another one.")
     ratios = {number: error / found.fitted[number] for number, error in found.heldout.items()}
     worst = max(ratios, key=lambda number: ratios[number])
     level = "good" if ratios[worst] <= WORSE[0] else "warn" if ratios[worst] <= WORSE[1] else "bad"

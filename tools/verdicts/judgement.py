@@ -217,7 +217,7 @@ def _determined(result: CalibrationResult) -> Check:
         return Check(
             "bad",
             name,
-            f"Typical values are {known}: the recording tells their ratios at best. Hold one that you know with "
+            f"Typical values are {known}: the recording determines their ratios at best. Hold one that you know with "
             "`fixed: true` in the robot file, or record more.",
         )
     weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]
