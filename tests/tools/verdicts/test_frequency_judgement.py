@@ -73,7 +73,7 @@ def test_friction_beyond_its_law_is_no_fault_and_one_period_tells_no_noise():
     name = "What is left against the noise"
     assert judged(pose(over_noise=1.2))[1][name].level == "good"
     assert "50 times the power of the noise: friction" in judged(pose(over_noise=50.0))[1][name].text
-    assert "one period does not show the noise" in judged(pose(over_noise=None))[1][name].text
+    assert "one period shows no noise" in judged(pose(over_noise=None))[1][name].text
 
 
 @pytest.mark.parametrize(("error", "level"), [(1.05, "good"), (1.3, "warn"), (2.0, "bad")])
